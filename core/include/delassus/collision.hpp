@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Shapes and where they touch. A module that the first scene with shapes loads finds near pairs by a kept library
+// (FCL's dynamic tree, double precision) and their gaps in closed form, exact to rounding.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "delassus/export.hpp"
+
+namespace delassus {
+
+using Vector3 = std::array<double, 3>;
+/// Unit quaternion (w, x, y, z): the rotation from the body frame to the world frame.
+using Quaternion = std::array<double, 4>;
+
+struct Pose {
+    Vector3 position{0.0, 0.0, 0.0};
+    Quaternion orientation{1.0, 0.0, 0.0, 0.0};
+};
+
+/// A closed surface of triangles, in the shape's own frame, m. Collision takes its convex hull.
+struct Mesh {
+    std::vector<Vector3> vertices;
+    std::vector<std::array<std::int32_t, 3>> triangles;  ///< counter-clockwise from outside
+};
+
+enum class ShapeKind {
+    Sphere,    ///< size = (radius, -, -)
+    Box,       ///< size = half of the edges
+    Capsule,   ///< along z; size = (radius, half length of the straight part, -)
+    Cylinder,  ///< along z; size = (radius, half length, -)
+    Plane,     ///< the half space z ≤ 0; size unused; of fixed bodies only
+    Convex     ///< mesh
+};
+
+/// A shape on a body.
+struct Shape {
+    ShapeKind kind = ShapeKind::Sphere;
+    Vector3 size{0.0, 0.0, 0.0};       ///< m
+    std::shared_ptr<const Mesh> mesh;  ///< Convex only
+    Pose pose;                         ///< of the shape in the frame of its body
+    std::int32_t body = -1;            ///< index of its body, −1 for the world
+    double margin = 0.0;  ///< m, the sphere-swept margin ε_m of seed section 5: the solid is the shape shrunk by
+                          ///< it and swept by a sphere of this radius, so that gaps are smooth near edges
+};
+
+/// A point where two shapes are nearer than the envelope.
+struct ContactPoint {
+    std::int32_t shape_a = 0, shape_b = 0;  ///< shape_a < shape_b
+    Vector3 point_a{}, point_b{};           ///< on the surfaces, world frame
+    Vector3 normal{};                       ///< unit, from a to b
+    double gap = 0.0;                       ///< normal · (point_b − point_a); negative in penetration, m
+    std::uint32_t feature = 0;              ///< which point of several between the pair; stable while they slide little
+};
+
+/// Finds contacts among a fixed set of shapes that move with their bodies.
+class DELASSUS_API CollisionDetector {
+public:
+    virtual ~CollisionDetector();
+
+    /// All points nearer than envelope (m, ε_e of seed section 5), for shapes of different bodies that are not
+    /// excluded, at least one of them not fixed. Ordered by (shape_a, shape_b, feature): equal inputs give equal
+    /// outputs, bit for bit. poses: of the bodies by index. Pairs of flat faces give up to four points or more, edges
+    /// two, the rest one.
+    virtual void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) = 0;
+};
+
+/// What a detector is made of.
+struct CollisionSetup {
+    std::vector<Shape> shapes;
+    std::vector<bool> fixed;                                   ///< of bodies: whether it never moves
+    std::vector<std::pair<std::int32_t, std::int32_t>> apart;  ///< pairs of bodies that never touch (joined ones)
+    /// Of bodies: those of one group, a number from 0 on, never touch one another (the nodes of a mesh); −1: no group.
+    /// Empty: no groups at all.
+    std::vector<std::int32_t> group{};
+};
+
+/// Loads the collision module and makes a detector. Throws InputError where this build has no FCL, for sizes that are
+/// not positive and finite, a margin that leaves no core (a mesh's should be less than the distance of the centroid of
+/// its hull from the nearest face), a plane on a moving body, a mesh that is open, inside out or without volume.
+[[nodiscard]] DELASSUS_API std::unique_ptr<CollisionDetector> make_collision_detector(CollisionSetup setup);
+
+}  // namespace delassus

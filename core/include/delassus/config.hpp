@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The solver section of a configuration (docs/configuration.md):
+//
+//     solver:
+//       name: pgs
+//       tolerance: 1e-8
+//       options: {omega: 1.2}
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/plugin_info.hpp"
+#include "delassus/problem.hpp"
+#include "delassus/registry.hpp"
+#include "delassus/solver.hpp"
+
+namespace delassus {
+
+/// Which solver, and what it may take. What is absent keeps the default of SolveSettings, or the problem's own law.
+struct SolverConfig {
+    std::string name;  ///< a plugin's name, or the path of a shared library; empty if not given
+    OptionTexts options;
+    std::optional<double> tolerance;
+    std::optional<std::int64_t> max_iterations;
+    std::optional<double> time_limit;  ///< seconds
+    std::optional<Law> law;
+
+    /// Default settings with what is given here in place.
+    [[nodiscard]] DELASSUS_API SolveSettings settings() const;
+};
+
+/// A whole configuration.
+struct Config {
+    SolverConfig solver;
+    std::vector<std::filesystem::path> plugin_path;  ///< folders, absolute or relative to the file
+};
+
+/// Parses YAML. where names the text in messages, e.g. the file. Throws InputError with line, key and the nearest valid
+/// key.
+[[nodiscard]] DELASSUS_API Config parse_config(const std::string& yaml, std::string_view where);
+[[nodiscard]] DELASSUS_API Config read_config(const std::filesystem::path& file);
+
+/// Parses "name" or "name(key=value,key=value)", the form of `delassus compare --solvers`. Throws InputError.
+[[nodiscard]] DELASSUS_API SolverConfig parse_solver(std::string_view text);
+
+/// Loads the plugin that the configuration names and makes a solver with its options. The registry must outlive the
+/// solver.
+[[nodiscard]] DELASSUS_API Solver make_solver(const Registry& registry, const SolverConfig& config);
+
+}  // namespace delassus

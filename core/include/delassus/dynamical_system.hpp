@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A mechanical system as timesteppers see it:
+//
+//     M v̇ = f(q, v, t) + C_qᵀ λ + D_Aᵀ λ_A          n rows
+//     C(q, t) = 0                                    m rows: bilateral constraints, λ are their reaction forces
+//     λ_A ∈ Υ  ⊥  u_A ∈ Υ*                           contacts, stops, motors with limits: see UnilateralRows
+//
+// q lies on a Lie group (unit quaternions beside plain coordinates) and moves by an exponential increment; v has n
+// entries, for a rigid body the velocity of its mass centre in the world frame and its angular velocity in the body
+// frame. Units are the system's own, as a rule SI. Every array belongs to the caller; none is kept.
+//
+// A user's own system derives from DynamicalSystem and works with every timestepper and solver (examples/ode).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/matrix_assembler.hpp"
+#include "delassus/problem.hpp"
+
+namespace delassus {
+
+struct State {
+    double t = 0.0;
+    std::vector<double> q;  ///< position_size()
+    std::vector<double> v;  ///< n()
+};
+
+/// How tangent matrices are formed. Newton's residual is exact with either; cone problems need the symmetric one.
+enum class Tangent {
+    Exact,     ///< the derivative; unsymmetric where forces are gyroscopic or follow the body
+    Symmetric  ///< its symmetric part, ½(A + Aᵀ)
+};
+
+/// A 3 × 3 block on the diagonal of an n × n matrix that is the identity elsewhere.
+struct DiagonalBlock3 {
+    std::int32_t first = 0;
+    double value[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};  ///< row-major
+};
+
+/// Unilateral rows and rows with bounded forces, collected block by block. A row is one of D_A with
+///     u = D_A v + rate (+ gap/h in a step of size h)
+class UnilateralRows {
+public:
+    /// One block: `rows` rows with one cone.
+    struct Block {
+        Cone cone;                 ///< for a box, bounds of the force (N, Nm); a stepper multiplies by h
+        double restitution = 0.0;  /// e in [0, 1] of Newton's law u_n⁺ ≥ −e u_n⁻; normal row of a contact
+        std::uint64_t key = 0;     ///< the same constraint has the same key in the next step: for warm starts
+    };
+    struct Row {
+        double gap = 0.0;   ///< position-level value Φ of the row, 0 for tangential and box rows
+        double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity
+    };
+
+    DELASSUS_API void clear();
+
+    /// Adds an entry to the row that end_row() closes. Columns of one row may come in any order but not twice.
+    void entry(std::int32_t column, double value) { entries_.push_back({column, value}); }
+    DELASSUS_API void end_row(double gap = 0.0, double rate = 0.0);
+    /// Closes a block of the rows since the last one; throws InputError if their number is not cone.rows.
+    DELASSUS_API void end_block(Cone cone, std::uint64_t key, double restitution = 0.0);
+
+    struct Entry {
+        std::int32_t column;
+        double value;
+    };
+    [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+    [[nodiscard]] const std::vector<Row>& rows() const { return rows_; }
+    [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+    /// rows() + 1 positions in entries().
+    [[nodiscard]] const std::vector<std::int32_t>& row_start() const { return row_start_; }
+
+private:
+    std::vector<Block> blocks_;
+    std::vector<Row> rows_;
+    std::vector<Entry> entries_;
+    std::vector<std::int32_t> row_start_ = {0};
+    std::size_t rows_in_blocks_ = 0;
+};
+
+class DELASSUS_API DynamicalSystem {
+public:
+    virtual ~DynamicalSystem();
+
+    // ---- Sizes and the group ----
+
+    /// Number of velocities n.
+    [[nodiscard]] virtual std::int32_t n() const = 0;
+    /// Length of q; n() unless the system says otherwise.
+    [[nodiscard]] virtual std::int32_t position_size() const;
+    /// Rows of the bilateral constraints, by blocks that belong together (a joint); m() is their sum.
+    [[nodiscard]] virtual std::vector<std::int32_t> constraint_blocks() const;
+    [[nodiscard]] std::int32_t m() const;
+    [[nodiscard]] virtual State initial_state() const = 0;
+
+    /// result ← q ∘ exp(δ) (seed eq. 54); δ: n. result may be q. Default: q + δ, where position_size() = n.
+    virtual void increment(const double* q, const double* delta, double* result) const;
+    /// δ ← log(from⁻¹ ∘ to), the inverse: increment(from, δ) = to. Rotations by less than π. Default: to − from.
+    virtual void difference(const double* from, const double* to, double* delta) const;
+    /// The blocks in which T(δ)⁻¹ differs from the identity, where exp(δ + T⁻¹ε) = exp(δ) ∘ exp(ε) + O(ε²). Default:
+    /// none.
+    virtual void inverse_tangent(const double* delta, std::vector<DiagonalBlock3>& blocks) const;
+
+    // ---- Forces: functions of the state, added to what the arrays hold ----
+
+    /// M += factor · M(q), symmetric positive definite or semidefinite.
+    virtual void add_mass(const State& state, double factor, MatrixAssembler& M) const = 0;
+    /// result += factor · M(q) x; both n.
+    virtual void multiply_mass(const State& state, double factor, const double* x, double* result) const = 0;
+    /// result += factor · f(q, v, t); n. Gyroscopic and velocity-dependent inertial terms are part of f.
+    virtual void add_force(const State& state, double factor, double* result) const = 0;
+    /// H += factor · K, K = −∂f/∂q along increments. Default: nothing (f does not depend on q).
+    virtual void add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
+    /// H += factor · R, R = −∂f/∂v. Default: nothing.
+    virtual void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
+    /// H += factor · ∂(M(q) a)/∂q for a fixed acceleration a; n. Default: nothing (M is constant).
+    virtual void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
+                                        MatrixAssembler& H) const;
+    /// Whether add_stiffness or add_damping ever add anything: a step without them factorises nothing.
+    [[nodiscard]] virtual bool has_stiffness() const;
+
+    // ---- Bilateral constraints; nothing by default ----
+
+    /// C(q, t); m.
+    virtual void constraint(const State& state, double* C) const;
+    /// D += C_q along increments, so that d/dt C = C_q v + C_t; m × n, rows from first_row.
+    virtual void add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const;
+    /// C_t ← ∂C/∂t; m.
+    virtual void constraint_rate(const State& state, double* C_t) const;
+    /// c ← d²C/dt² at v̇ = 0: (C_q v)_q v + 2 C_qt v + C_tt; m. For consistent initial accelerations.
+    virtual void constraint_curvature(const State& state, double* c) const;
+    /// H += factor · ∂(C_qᵀ λ)/∂q for fixed λ; m. Default: nothing.
+    virtual void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
+                                          MatrixAssembler& H) const;
+
+    // ---- Contacts, stops, bounded motors; nothing by default ----
+
+    /// Whether collect_unilateral() ever finds anything: then only a timestepper for such rows will do.
+    [[nodiscard]] virtual bool has_unilateral() const;
+    /// The rows that may become active within a step of size h.
+    virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);
+
+    // ---- What is conserved; for reports ----
+
+    /// Kinetic plus potential energy, J; NaN where the system does not know it. Default: NaN.
+    [[nodiscard]] virtual double energy(const State& state) const;
+};
+
+}  // namespace delassus

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The error measures by which every solver is judged (docs/errors.md). They are computed here, from the problem and
+// (x, λ) alone.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "delassus/export.hpp"
+#include "delassus/needs.hpp"
+
+namespace delassus {
+
+/// All are zero at a solution and dimensionless; u = D x + E λ + b, with the De Saxcé term under the Coulomb law.
+struct Errors {
+    double natural = 0.0;  ///< ‖S⁻¹(λ − P_Υ(λ − S²u))‖ / ‖S r‖
+    double siconos = 0.0;  ///< ‖λ − P_Υ(λ − u)‖ / max(‖r‖, ‖λ‖, ‖u‖): depends on units, for comparison only
+    double balance = 0.0;  ///< ‖H x − Dᵀλ − a‖ / max(‖H x‖, ‖Dᵀλ‖, ‖a‖)
+    double cone = 0.0;     ///< ‖S⁻¹(λ − P_Υ λ)‖ / ‖S r‖
+    double dual = 0.0;     ///< ‖S(u − P_Υ* u)‖ / ‖S r‖
+    double gap = 0.0;      ///< |⟨λ, u⟩| / ‖S r‖²; for a box the gap of its variational inequality
+    /// No error: what rounding alone may contribute to natural at this (x, λ), so that a smaller one says nothing.
+    /// ε ‖S (|D||x| + |E||λ| + |b|) + S⁻¹|λ|‖ / ‖S r‖ with the unit roundoff ε = 1.1e-16
+    double rounding = 0.0;
+};
+
+/// Measures solutions of one problem, which must outlive it (moves of the problem are fine as long as the meter is
+/// not used meanwhile).
+///
+/// S and r need H⁻¹. Where H is singular or indefinite, so that N does not exist, |diag H|⁻¹ stands in for it, with the
+/// mean of the others for a zero entry; for an unsymmetric H they are exact, by LU.
+class ErrorMeter {
+public:
+    DELASSUS_API explicit ErrorMeter(const PreparedProblem& problem);
+    DELASSUS_API ~ErrorMeter();
+    ErrorMeter(const ErrorMeter&) = delete;
+    ErrorMeter& operator=(const ErrorMeter&) = delete;
+
+    /// x: n, lambda: m, finite. Throws InputError on wrong sizes.
+    [[nodiscard]] DELASSUS_API Errors measure(std::span<const double> x, std::span<const double> lambda) const;
+
+    /// The natural error alone. x may be null where H is definite or n = 0: H⁻¹(a + Dᵀλ) is used then; elsewhere the
+    /// answer is NaN without x.
+    [[nodiscard]] DELASSUS_API double natural(const double* x, const double* lambda) const;
+
+    /// ‖x − reference‖_H / ‖reference‖_H; both n. Zero if n = 0. Where the reference is at rest (below 1e-8 of the
+    /// velocities without reactions, H⁻¹a, in the same norm), relative to those.
+    [[nodiscard]] DELASSUS_API double velocity(std::span<const double> x, std::span<const double> reference) const;
+
+    /// x = H⁻¹(a + Dᵀλ); throws InputError where H is not definite.
+    [[nodiscard]] DELASSUS_API std::vector<double> velocity_of(std::span<const double> lambda) const;
+
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace delassus

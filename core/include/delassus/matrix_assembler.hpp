@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Sparse matrices that are assembled again and again with the same pattern.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/problem.hpp"
+
+namespace delassus {
+
+/// Adds up entries into a SparseMatrix. It remembers the order of the places: as long as the next assembly adds to the
+/// same places in the same order, whatever the values, nothing is sorted and nothing is allocated.
+class MatrixAssembler {
+public:
+    /// Starts an assembly of rows × columns; the values of the last one are dropped.
+    DELASSUS_API void begin(std::int32_t rows, std::int32_t columns);
+
+    /// Adds value at a place, 0 ≤ row < rows and 0 ≤ column < columns (not checked). Zeros make entries too: whoever
+    /// wants a pattern that lasts adds them.
+    void add(std::int32_t row, std::int32_t column, double value) {
+        const Place place{row, column};
+        if (count_ == places_.size()) {
+            places_.push_back(place);
+            values_.push_back(value);
+            repeats_ = false;
+        } else {
+            if (!(places_[count_] == place)) {
+                places_[count_] = place;
+                repeats_ = false;
+            }
+            values_[count_] = value;
+        }
+        ++count_;
+    }
+
+    /// Adds factor · block at (row, column); block is row-major, rows × columns.
+    void add_block(std::int32_t row, std::int32_t column, std::int32_t rows, std::int32_t columns, const double* block,
+                   double factor = 1.0) {
+        for (std::int32_t i = 0; i < rows; ++i)
+            for (std::int32_t j = 0; j < columns; ++j) add(row + i, column + j, factor * block[i * columns + j]);
+    }
+
+    /// The matrix; valid until the next begin(). Throws InputError if a place lies outside.
+    [[nodiscard]] DELASSUS_API const SparseMatrix& finish();
+
+    /// How often a pattern was built: grows by one whenever finish() met new places.
+    [[nodiscard]] std::int64_t patterns() const { return patterns_; }
+
+private:
+    struct Place {
+        std::int32_t row, column;
+        bool operator==(const Place&) const = default;
+    };
+    std::vector<Place> places_;
+    std::vector<double> values_;
+    std::vector<std::int32_t> slot_;  // of each place in the matrix's values
+    std::size_t count_ = 0;
+    bool repeats_ = false;  // all places so far are those of the last assembly
+    std::int64_t patterns_ = 0;
+    SparseMatrix matrix_;
+};
+
+}  // namespace delassus

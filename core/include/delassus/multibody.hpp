@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Multibody systems: rigid bodies, point nodes, joints, motors, springs, elements, contact. SI units.
+//
+// A moving body has 7 positions (mass centre, unit quaternion w x y z) and 6 velocities (of the mass centre in the
+// world frame, angular velocity in the body frame). A node has 3 and 3. Fixed ones have none.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "delassus/collision.hpp"
+#include "delassus/dynamical_system.hpp"
+#include "delassus/export.hpp"
+
+namespace delassus {
+
+/// Number of a body, −1 for the world.
+using BodyIndex = std::int32_t;
+inline constexpr BodyIndex world_body = -1;
+
+/// The inertia tensor about the mass centre in the body frame: xx, yy, zz, xy, xz, yz, kg m².
+struct Inertia {
+    double xx = 1.0, yy = 1.0, zz = 1.0, xy = 0.0, xz = 0.0, yz = 0.0;
+
+    DELASSUS_API static Inertia sphere(double mass, double radius);
+    /// edges: full lengths along x, y, z.
+    DELASSUS_API static Inertia box(double mass, const Vector3& edges);
+    /// Along z, with half length.
+    DELASSUS_API static Inertia cylinder(double mass, double radius, double half_length);
+    /// A thin rod along x.
+    DELASSUS_API static Inertia rod(double mass, double length);
+};
+
+struct BodyParameters {
+    std::string name;
+    double mass = 1.0;  ///< > 0
+    Inertia inertia;    ///< positive definite, principal moments with the triangle inequality
+    Pose pose;
+    Vector3 velocity{};          ///< of the mass centre, world frame
+    Vector3 angular_velocity{};  ///< body frame
+    bool fixed = false;
+};
+
+struct NodeParameters {
+    std::string name;
+    double mass = 0.0;  ///< ≥ 0, in addition to what elements give it; together > 0
+    Vector3 position{};
+    Vector3 velocity{};
+    bool fixed = false;
+};
+
+enum class JointKind {
+    Spherical,     ///< 3 rows: the points coincide
+    Revolute,      ///< 5 rows: rotation about the axis
+    Prismatic,     ///< 5 rows: translation along the axis
+    Cylindrical,   ///< 4 rows: both along one axis
+    Universal,     ///< 4 rows: axis of the first body normal to second_axis of the second
+    Fixed,         ///< 6 rows
+    PointOnPlane,  ///< 1 row: the point of the second body stays in the plane through the point, normal to the axis, of
+                   ///< the first
+    Distance,      ///< 1 row: the points keep their initial distance
+    Gear           ///< 1 row: the relative rotations of two revolute joints keep a ratio
+};
+
+/// A prescribed function of time with two derivatives and its integral from zero. An empty one is zero.
+struct Motion {
+    std::function<double(double)> value, rate, acceleration;
+    std::function<double(double)> integral;  ///< needed of the speed of a motor without force limit
+    DELASSUS_API static Motion constant(double value);
+    DELASSUS_API static Motion linear(double start, double rate);
+    /// offset + amplitude sin(2π frequency t + phase)
+    DELASSUS_API static Motion sine(double amplitude, double frequency, double phase = 0.0, double offset = 0.0);
+};
+
+/// A joint holds from the initial configuration on: its frames are given once, in the world frame at t = 0.
+struct JointParameters {
+    std::string name;
+    JointKind kind = JointKind::Spherical;
+    BodyIndex first = world_body, second = world_body;
+    Vector3 point{};                                 ///< world frame at t = 0; of the first body for Distance
+    Vector3 second_point{};                          ///< of the second body, Distance only
+    Vector3 axis{0.0, 0.0, 1.0};                     ///< need not be a unit vector
+    Vector3 second_axis{1.0, 0.0, 0.0};              ///< Universal only
+    std::int32_t gear_first = -1, gear_second = -1;  ///< indices of two revolute joints; Gear only
+    double gear_ratio = 1.0;  ///< angle of the second = ratio · angle of the first; a fraction with terms below 1000
+    /// Limits of the coordinate of a revolute (rad, in (−π, π)) or prismatic (m) joint; not a number: none.
+    double lower, upper;
+    DELASSUS_API JointParameters();
+};
+
+/// Drives the coordinate of a revolute or prismatic joint.
+struct MotorParameters {
+    std::string name;
+    std::int32_t joint = -1;
+    bool speed = false;  ///< motion is the speed; else the position
+    Motion motion;
+    double force_limit;  ///< N or Nm, speed motors only; infinity: a bilateral constraint
+    DELASSUS_API MotorParameters();
+};
+
+/// A spring and damper between two points: force k (ℓ − ℓ₀) + c dℓ/dt along the line.
+struct SpringParameters {
+    std::string name;
+    BodyIndex first = world_body, second = world_body;
+    Vector3 first_point{}, second_point{};  ///< world frame at t = 0
+    double stiffness = 0.0, damping = 0.0;  ///< N/m, N s/m; ≥ 0
+    double rest_length;                     ///< m; not a number: the initial distance
+    DELASSUS_API SpringParameters();
+};
+
+/// A linear spring and damper for all six relative motions of two bodies at a point, in the axes of the first body.
+struct BushingParameters {
+    std::string name;
+    BodyIndex first = world_body, second = world_body;
+    Vector3 point{};
+    Vector3 stiffness{}, damping{};            ///< along x, y, z: N/m, N s/m
+    Vector3 turn_stiffness{}, turn_damping{};  ///< about x, y, z: Nm/rad, Nms/rad
+};
+
+/// A force and a torque on a body, given in time.
+struct LoadParameters {
+    std::string name;
+    BodyIndex body = world_body;
+    std::array<Motion, 3> force;   ///< at the point, world frame, N
+    std::array<Motion, 3> torque;  ///< world frame, Nm
+    Vector3 point{};               ///< world frame at t = 0; moves with the body
+};
+
+struct ElasticMaterial {
+    double young = 1e6;         ///< Pa, > 0
+    double poisson = 0.3;       ///< in (−1, ½)
+    double density = 1000.0;    ///< kg/m³, > 0
+    double damping_time = 0.0;  ///< τ of Kelvin–Voigt damping, s: viscosity = τ × elasticity
+};
+
+enum class ElementModel {
+    Corotational,      ///< linear strain in a frame that turns with the element
+    StVenantKirchhoff  ///< Green's strain with Hooke's law; weak under strong compression
+};
+
+/// A block of bricks, each of six tetrahedra around a diagonal (Kuhn's division, which fits from brick to brick).
+struct ElasticBlockParameters {
+    std::string name;
+    Vector3 corner{};                            ///< of the least coordinates, m
+    Vector3 edges{1.0, 1.0, 1.0};                ///< m, > 0
+    std::array<std::int32_t, 3> cells{1, 1, 1};  ///< bricks along x, y, z
+    ElasticMaterial material;
+    ElementModel model = ElementModel::Corotational;
+    std::array<bool, 6> fixed_faces{};  ///< x_min, x_max, y_min, y_max, z_min, z_max: their nodes do not move
+    Vector3 velocity{};                 ///< m/s
+    double contact_radius = 0.0;  ///< m; nodes of the surface touch bodies as spheres of this radius; 0: not at all
+    std::int32_t contact_material = -1;
+};
+
+struct CableParameters {
+    std::string name;
+    std::array<std::int32_t, 2> nodes{-1, -1};
+    double young = 1e9;         ///< Pa
+    double area = 1e-4;         ///< m²
+    double density = 1000.0;    ///< kg/m³
+    double damping_time = 0.0;  ///< s
+    double rest_length;         ///< m; not a number: the initial distance
+    bool slack = true;          ///< carries no compression
+    DELASSUS_API CableParameters();
+};
+
+struct ContactMaterial {
+    double friction = 0.0;     ///< μ ≥ 0
+    double restitution = 0.0;  ///< in [0, 1]
+};
+
+/// Builds up by add_…(), which check their input (InputError with one sentence), then serves as a DynamicalSystem.
+/// finish() must come between.
+class DELASSUS_API MultibodySystem : public DynamicalSystem {
+public:
+    MultibodySystem();
+    ~MultibodySystem() override;
+
+    void set_gravity(const Vector3& gravity);  ///< m/s²; (0, 0, −9.81) unless set
+    BodyIndex add_body(const BodyParameters& body);
+    /// Returns the node's number, which counts apart from bodies.
+    std::int32_t add_node(const NodeParameters& node);
+    std::int32_t add_joint(const JointParameters& joint);
+    void add_motor(const MotorParameters& motor);
+    void add_spring(const SpringParameters& spring);
+    void add_bushing(const BushingParameters& bushing);
+    void add_load(const LoadParameters& load);
+    /// A tetrahedron of four nodes, its mass shared among them. Throws InputError if it is inverted.
+    void add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
+                         ElementModel model = ElementModel::Corotational);
+    /// Returns the number of its first node, at the corner; nodes are numbered with z fastest and x slowest.
+    std::int32_t add_elastic_block(const ElasticBlockParameters& block);
+    void add_cable(const CableParameters& cable);
+    /// shape.body names the body; material indexes what add_material() returned.
+    void add_shape(const Shape& shape, std::int32_t material);
+    /// A node touches shapes of bodies as a small sphere; nodes do not touch one another. radius: m, > 0.
+    void add_node_contact(std::int32_t node, double radius, std::int32_t material);
+    std::int32_t add_material(const ContactMaterial& material);
+    /// Contacts of these two materials. Unless set: the geometric mean of μ, the larger restitution.
+    void set_material_pair(std::int32_t first, std::int32_t second, const ContactMaterial& material);
+    /// m; how near shapes must be for a contact to be made. Unless set: a twentieth of the median shape's size.
+    void set_envelope(double envelope);
+    /// These two bodies never touch. Joined bodies do not in any case.
+    void keep_apart(BodyIndex first, BodyIndex second);
+    /// Numbers what moves; call it once, after the last add_…().
+    void finish();
+
+    // ---- Reading states ----
+    [[nodiscard]] std::int32_t body_count() const;
+    [[nodiscard]] std::int32_t node_count() const;
+    [[nodiscard]] Vector3 node_position(const State& state, std::int32_t node) const;
+    /// Triangles of nodes that bound the tetrahedra, counter-clockwise from outside.
+    [[nodiscard]] std::vector<std::array<std::int32_t, 3>> element_surface() const;
+    /// First entry of a node in v, −1 if it is fixed; of a body likewise.
+    [[nodiscard]] std::int32_t node_column(std::int32_t node) const;
+    [[nodiscard]] std::int32_t body_column(BodyIndex index) const;
+    [[nodiscard]] const BodyParameters& body(BodyIndex index) const;
+    [[nodiscard]] BodyIndex find_body(const std::string& name) const;  ///< world_body if there is none
+    [[nodiscard]] Pose pose(const State& state, BodyIndex index) const;
+    /// Velocity of the mass centre (world frame) and angular velocity (body frame).
+    [[nodiscard]] std::array<Vector3, 2> velocities(const State& state, BodyIndex index) const;
+    /// Of bodies; the spheres of nodes are not among them.
+    [[nodiscard]] const std::vector<Shape>& shapes() const;
+    /// Rows of joint `index` within C and λ: first row and count.
+    [[nodiscard]] std::array<std::int32_t, 2> joint_rows(std::int32_t index) const;
+    /// The spheres of nodes have the numbers from shapes().size() on, in the order of add_node_contact().
+    /// Contacts of the last collect_unilateral(), in the order of its blocks after those of limits and motors.
+    [[nodiscard]] const std::vector<ContactPoint>& contacts() const;
+    [[nodiscard]] double kinetic_energy(const State& state) const;
+    /// Linear momentum (kg m/s), and angular momentum about the origin (kg m²/s), world frame.
+    [[nodiscard]] std::array<Vector3, 2> momentum(const State& state) const;
+
+    // ---- DynamicalSystem ----
+    [[nodiscard]] std::int32_t n() const override;
+    [[nodiscard]] std::int32_t position_size() const override;
+    [[nodiscard]] std::vector<std::int32_t> constraint_blocks() const override;
+    [[nodiscard]] State initial_state() const override;
+    void increment(const double* q, const double* delta, double* result) const override;
+    void difference(const double* from, const double* to, double* delta) const override;
+    void inverse_tangent(const double* delta, std::vector<DiagonalBlock3>& blocks) const override;
+    void add_mass(const State& state, double factor, MatrixAssembler& M) const override;
+    void multiply_mass(const State& state, double factor, const double* x, double* result) const override;
+    void add_force(const State& state, double factor, double* result) const override;
+    void add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
+    void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
+    [[nodiscard]] bool has_stiffness() const override;
+    void constraint(const State& state, double* C) const override;
+    void add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const override;
+    void constraint_rate(const State& state, double* C_t) const override;
+    void constraint_curvature(const State& state, double* c) const override;
+    void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
+                                  MatrixAssembler& H) const override;
+    [[nodiscard]] bool has_unilateral() const override;
+    void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
+    [[nodiscard]] double energy(const State& state) const override;
+
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace delassus

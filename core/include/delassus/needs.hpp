@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a problem needs of a solver, and a problem made ready to be shown to one.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/plugin.h"
+#include "delassus/problem.hpp"
+
+namespace delassus {
+
+/// What H was found to be. Detected from its values, never declared.
+enum class Structure {
+    Reduced,       ///< n = 0
+    Diagonal,      ///< positive diagonal
+    Blocks,        ///< definite diagonal blocks of at most 16 rows (connected components of the pattern)
+    Definite,      ///< sparse symmetric positive definite
+    Semidefinite,  ///< symmetric, singular to working precision, no negative curvature
+    Indefinite,    ///< symmetric with negative curvature
+    Unsymmetric
+};
+
+[[nodiscard]] DELASSUS_API std::string_view name_of(Structure structure);
+
+/// The names of the DELASSUS_CAN_* bits that are set, as used in sidecars and by `delassus plugins info`.
+[[nodiscard]] DELASSUS_API std::vector<std::string> capability_names(std::uint64_t bits);
+/// The inverse; throws InputError on an unknown name.
+[[nodiscard]] DELASSUS_API std::uint64_t capabilities_of(const std::vector<std::string>& names);
+
+/// A validated problem with its structure, needs and identity, laid out for the plugin border. Owns everything that
+/// raw() points to; cheap to move, not to be copied by accident.
+class PreparedProblem {
+public:
+    /// Throws InputError if the problem is not valid. Factors H once if it is neither diagonal nor block-diagonal, to
+    /// learn whether it is definite.
+    DELASSUS_API explicit PreparedProblem(Problem problem);
+    DELASSUS_API ~PreparedProblem();
+    DELASSUS_API PreparedProblem(PreparedProblem&&) noexcept;
+    DELASSUS_API PreparedProblem& operator=(PreparedProblem&&) noexcept;
+
+    [[nodiscard]] DELASSUS_API const Problem& problem() const;
+    [[nodiscard]] DELASSUS_API Structure structure() const;
+    /// DELASSUS_CAN_* bits that a solver must have for this problem, whatever is asked of the solve.
+    [[nodiscard]] DELASSUS_API std::uint64_t needs() const;
+    /// What crosses the border; valid as long as this object.
+    [[nodiscard]] DELASSUS_API const delassus_problem& raw() const;
+
+    /// Replaces a (n) and b (m); everything analysed or factorised stays valid. Throws InputError on a wrong size or a
+    /// value that is not finite.
+    DELASSUS_API void set_right_hand_side(std::vector<double> a, std::vector<double> b);
+
+    /// The missing needs as a person would say them, e.g. "1421 friction cones, the exact Coulomb law".
+    [[nodiscard]] DELASSUS_API std::string describe(std::uint64_t missing) const;
+
+private:
+    friend class ErrorMeter;
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace delassus

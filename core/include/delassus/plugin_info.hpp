@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What is known of a plugin without loading it: its sidecar, and the option table in it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/plugin.h"
+
+namespace delassus {
+
+/// One row of a plugin's option table; see delassus_option.
+struct OptionInfo {
+    std::string key;
+    delassus_option_type type = DELASSUS_OPTION_TEXT;
+    std::string default_value;
+    double minimum = 0.0, maximum = 0.0;
+    std::vector<std::string> choices;
+    std::string unit, doc;
+
+    /// "real in [0, 2]", "one of a, b": for messages, help and docs.
+    [[nodiscard]] DELASSUS_API std::string domain() const;
+};
+
+/// Option values as a user writes them, by key.
+using OptionTexts = std::map<std::string, std::string>;
+
+/// A value checked against its row of the table.
+struct OptionValue {
+    std::string key;
+    delassus_option_type type = DELASSUS_OPTION_TEXT;
+    std::int64_t integer = 0;
+    double real = 0.0;
+    std::string text;
+};
+
+/// Every row of the table with the chosen or the default value. Throws InputError on an unknown key (naming the
+/// nearest) or a value outside its domain; solver names the plugin in the sentence.
+[[nodiscard]] DELASSUS_API std::vector<OptionValue> resolve_options(std::string_view solver,
+                                                                    const std::vector<OptionInfo>& table,
+                                                                    const OptionTexts& chosen);
+
+/// A JSON Schema of the "options" object of a configuration, from the table.
+[[nodiscard]] DELASSUS_API std::string options_schema(std::string_view solver, const std::vector<OptionInfo>& table);
+
+/// What the descriptor says, copied.
+struct PluginInfo {
+    std::string name, version, description, licence;
+    std::uint16_t abi_major = 0, abi_minor = 0;
+    std::uint32_t flags = 0;         ///< DELASSUS_FLAG_*
+    std::uint64_t capabilities = 0;  ///< DELASSUS_CAN_*
+    std::vector<OptionInfo> options;
+    std::filesystem::path library;  ///< absolute path of the shared library
+
+    /// The needs that this plugin does not meet.
+    [[nodiscard]] std::uint64_t missing(std::uint64_t needs) const { return needs & ~capabilities; }
+};
+
+/// The sidecar's text (JSON) for a plugin, and back. reading throws PluginError with a sentence.
+[[nodiscard]] DELASSUS_API std::string sidecar_text(const PluginInfo& info);
+[[nodiscard]] DELASSUS_API PluginInfo read_sidecar(const std::filesystem::path& sidecar);
+
+}  // namespace delassus

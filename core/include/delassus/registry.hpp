@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Finding and loading plugins.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/plugin_info.hpp"
+
+namespace delassus {
+
+/// A loaded plugin. The library stays loaded until the process ends: PETSc and MPI are not safe to unload.
+class Plugin {
+public:
+    /// Loads the shared library at this path (made absolute) and checks its handshake. Throws PluginError.
+    [[nodiscard]] DELASSUS_API static std::shared_ptr<const Plugin> load(const std::filesystem::path& library);
+
+    [[nodiscard]] const PluginInfo& info() const { return info_; }
+    [[nodiscard]] const delassus_plugin_descriptor& descriptor() const { return *descriptor_; }
+
+private:
+    Plugin() = default;
+    PluginInfo info_;
+    const delassus_plugin_descriptor* descriptor_ = nullptr;
+};
+
+/// A plugin, or what was meant to be one, that cannot be used.
+struct RejectedPlugin {
+    std::filesystem::path path;
+    std::string reason;
+};
+
+/// A solver of this project that the build left out.
+struct UnbuiltPlugin {
+    std::string name, reason;
+};
+
+/// The plugins that can be chosen by name. Folders are searched in order, the first plugin of a name wins:
+/// the folders given, then those of DELASSUS_PLUGIN_PATH (separated by colons), then the plugin folder beside
+/// libdelassus. Never the working directory. Reads sidecars only; nothing is loaded before it is chosen.
+class Registry {
+public:
+    DELASSUS_API explicit Registry(std::vector<std::filesystem::path> folders = {});
+
+    /// By name, in alphabetical order.
+    [[nodiscard]] const std::vector<PluginInfo>& plugins() const { return plugins_; }
+    [[nodiscard]] const std::vector<RejectedPlugin>& rejected() const { return rejected_; }
+    [[nodiscard]] const std::vector<UnbuiltPlugin>& unbuilt() const { return unbuilt_; }
+    [[nodiscard]] const std::vector<std::filesystem::path>& folders() const { return folders_; }
+
+    /// Throws InputError naming the nearest and all names if there is none.
+    [[nodiscard]] DELASSUS_API const PluginInfo& find(const std::string& name) const;
+
+    /// Loads a plugin by name, or by path if the text has a slash or ends in .so. Throws InputError or PluginError.
+    [[nodiscard]] DELASSUS_API std::shared_ptr<const Plugin> load(const std::string& name_or_path) const;
+
+    /// The names of the plugins that meet the needs.
+    [[nodiscard]] DELASSUS_API std::vector<std::string> capable(std::uint64_t needs) const;
+
+private:
+    void scan(const std::filesystem::path& folder);
+
+    std::vector<std::filesystem::path> folders_;
+    std::vector<PluginInfo> plugins_;
+    std::vector<RejectedPlugin> rejected_;
+    std::vector<UnbuiltPlugin> unbuilt_;
+};
+
+}  // namespace delassus

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Scene files (docs/scenes.md): YAML that describes one or several multibody systems, each with its timestepper and its
+// solver.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/config.hpp"
+#include "delassus/export.hpp"
+#include "delassus/multibody.hpp"
+
+namespace delassus {
+
+/// Something of the scene that the system does without, since it has no effect.
+struct LeftOut {
+    std::string what;    ///< "joint \"frame\""
+    std::string reason;  ///< "both bodies are fixed"
+};
+
+/// A contact material with its name.
+struct SceneMaterial {
+    std::string name;
+    ContactMaterial contact;
+};
+
+/// A pair of materials with values of its own; indices into SceneSystem::materials.
+struct SceneMaterialPair {
+    std::int32_t first = 0, second = 0;
+    ContactMaterial contact;
+};
+
+/// A system, finished and ready to be simulated, with what the file says about how.
+struct SceneSystem {
+    std::string name;  ///< "main" in a file without `systems`
+    std::unique_ptr<MultibodySystem> system;
+
+    std::string integrator = "euler_implicit_linearized";
+    OptionTexts integrator_options;
+    SolverConfig solver;  ///< an empty name: by need
+    double step = 0.0;    ///< s, > 0
+    double end = 0.0;     ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
+
+    // What a plan and a report name things by.
+    std::vector<BodyParameters> bodies;  ///< by BodyIndex
+    std::vector<NodeParameters> nodes;   ///< by number
+    std::vector<ElasticBlockParameters> elastic_blocks;
+    std::vector<JointParameters> joints;    ///< by joint index
+    std::vector<MotorParameters> motors;    ///< in the order of the file
+    std::vector<SpringParameters> springs;  ///< likewise, as the next two
+    std::vector<BushingParameters> bushings;
+    std::vector<LoadParameters> loads;
+    std::vector<SceneMaterial> materials;
+    std::vector<SceneMaterialPair> material_pairs;
+    std::vector<std::int32_t> shape_material;     ///< of each of system->shapes()
+    std::vector<std::array<BodyIndex, 2>> apart;  ///< pairs of bodies that never touch, the smaller index first
+    std::vector<LeftOut> left_out;
+};
+
+struct Scene {
+    std::string title;  ///< may be empty
+    std::vector<SceneSystem> systems;
+    /// What the systems were made of, written in one canonical way without `end`: two scenes with equal text take equal
+    /// steps.
+    std::string canonical;
+};
+
+/// What a command line puts in place of values of the file.
+struct SceneOverrides {
+    /// Paths of keys and list positions or names, "bodies.ball.mass", with values in YAML.
+    std::vector<std::pair<std::string, std::string>> values;
+    std::string solver;               ///< "name" or "name(key=value,…)" for every system; empty: the file's
+    std::string integrator;           ///< likewise
+    std::optional<double> step, end;  ///< s, for every system
+};
+
+/// Reads the whole scene and builds its systems. Throws InputError with file, line, key and the nearest valid key.
+[[nodiscard]] DELASSUS_API Scene read_scene(const std::filesystem::path& file, const SceneOverrides& overrides = {});
+
+/// The same from text; where names it in messages.
+[[nodiscard]] DELASSUS_API Scene parse_scene(const std::string& yaml, std::string_view where,
+                                             const SceneOverrides& overrides = {});
+
+}  // namespace delassus

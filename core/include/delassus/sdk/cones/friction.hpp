@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "delassus/plugin.h"
+
+namespace delassus::sdk {
+
+/// The friction cone ‖λ_t‖ ≤ μ λ_n, its dual μ‖u_t‖ ≤ u_n; normal first, one or two tangents.
+struct FrictionCone {
+    static double tangent_norm(const delassus_cone& cone, const double* v) {
+        return cone.rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
+    }
+
+    /// Euclidean projection onto {‖v_t‖ ≤ slope · v_n}. With t = ‖v_t‖:
+    ///   inside (t ≤ slope v_n): v;
+    ///   in the polar cone (slope t ≤ −v_n): 0;
+    ///   else the nearest point of the generator (1, slope v_t/t): v_n' = (v_n + slope t)/(1 + slope²), v_t' = slope
+    ///   v_n' v_t/t.
+    static void project_with_slope(double slope, int rows, double* v) {
+        const double t = rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
+        if (t <= slope * v[0]) return;
+        if (slope * t <= -v[0]) {
+            std::fill_n(v, rows, 0.0);
+            return;
+        }
+        v[0] = (v[0] + slope * t) / (1.0 + slope * slope);
+        const double factor = slope * v[0] / t;
+        for (int i = 1; i < rows; ++i) v[i] *= factor;
+    }
+
+    static void project(const delassus_cone& cone, double* lambda) { project_with_slope(cone.mu, cone.rows, lambda); }
+
+    /// μ‖u_t‖ ≤ u_n is the cone of slope 1/μ; for μ = 0 it is the half space u_n ≥ 0.
+    static void project_dual(const delassus_cone& cone, double* u) {
+        if (cone.mu > 0.0) {
+            project_with_slope(1.0 / cone.mu, cone.rows, u);
+        } else {
+            u[0] = std::max(0.0, u[0]);
+        }
+    }
+
+    static double gap(const delassus_cone& cone, const double* lambda, const double* u) {
+        double sum = 0.0;
+        for (int i = 0; i < cone.rows; ++i) sum += lambda[i] * u[i];
+        return sum;
+    }
+
+    /// The De Saxcé term of the exact Coulomb law (seed, eq. 72): u_n grows by μ‖u_t‖.
+    static double de_saxce(const delassus_cone& cone, const double* u) { return cone.mu * tangent_norm(cone, u); }
+};
+
+}  // namespace delassus::sdk

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The Delassus operator N = D H⁻¹ Dᵀ + E (seed, eq. 116), never formed unless asked.
+#pragma once
+
+#include <vector>
+
+#include "delassus/sdk/h_inverse.hpp"
+
+namespace delassus::sdk {
+
+/// Products with N, its diagonal blocks, r = D H⁻¹ a + b, and the velocities that go with given reactions.
+/// analyze, factorize and the rest are called with the same problem (new a and b are fine).
+class DelassusOperator {
+public:
+    void analyze(const ProblemView& problem) { inverse_.analyze(problem); }
+
+    /// Factors H and computes the diagonal blocks of N. Throws NumericalFailure if H is not positive definite.
+    void factorize(const ProblemView& problem) {
+        inverse_.factorize(problem);
+        compute_blocks(problem);
+    }
+
+    /// result ← N λ; both m.
+    void apply(const ProblemView& problem, const Vector& lambda, Vector& result) const {
+        if (problem.n > 0) {
+            work_.noalias() = problem.D.transpose() * lambda;
+            inverse_.apply(work_);
+            result.noalias() = problem.D * work_;
+        } else {
+            result.setZero(problem.m);
+        }
+        if (problem.E.nonZeros() > 0) result.noalias() += problem.E * lambda;
+    }
+
+    /// r = D H⁻¹ a + b: the constraint velocities without reactions; m.
+    [[nodiscard]] Vector free_velocity(const ProblemView& problem) const {
+        Vector r = problem.b;
+        if (problem.n > 0) {
+            work_ = problem.a;
+            inverse_.apply(work_);
+            r.noalias() += problem.D * work_;
+        }
+        return r;
+    }
+
+    /// x = H⁻¹ (a + Dᵀ λ); n.
+    template <class Lambda>
+    [[nodiscard]] Vector velocity(const ProblemView& problem, const Lambda& lambda) const {
+        Vector x = problem.a;
+        if (problem.n > 0) {
+            x.noalias() += problem.D.transpose() * lambda;
+            inverse_.apply(x);
+        }
+        return x;
+    }
+
+    /// The diagonal of N; m.
+    [[nodiscard]] const Vector& diagonal() const { return diagonal_; }
+
+    /// N_cc of a block of at most `largest_block` rows, row-major = column-major; null for larger blocks.
+    [[nodiscard]] const double* block(std::size_t cone) const {
+        return block_offset_[cone] < 0 ? nullptr : blocks_.data() + block_offset_[cone];
+    }
+    static constexpr int largest_block = 8;
+
+    /// N as a sparse matrix. Costs memory of its fill: dense where H couples everything.
+    [[nodiscard]] SparseRows formed(const ProblemView& problem) const {
+        SparseRows N(problem.m, problem.m);
+        if (problem.n > 0) {
+            const SparseColumns Z = inverse_.half_solved(problem.D);
+            N = SparseColumns(Z.transpose() * Z);
+        }
+        if (problem.E.nonZeros() > 0) N += problem.E;
+        N.makeCompressed();
+        return N;
+    }
+
+    [[nodiscard]] const HInverse& inverse() const { return inverse_; }
+
+private:
+    void compute_blocks(const ProblemView& problem) {
+        diagonal_.setZero(problem.m);
+        block_offset_.assign(problem.cones.size(), -1);
+        std::ptrdiff_t size = 0;
+        for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+            if (problem.cones[c].rows > largest_block) continue;
+            block_offset_[c] = size;
+            size += static_cast<std::ptrdiff_t>(problem.cones[c].rows) * problem.cones[c].rows;
+        }
+        blocks_.assign(static_cast<std::size_t>(size), 0.0);
+        if (problem.n > 0) add_inertia(problem);
+        if (problem.E.nonZeros() > 0) add_compliance(problem);
+    }
+
+    // D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
+    void add_inertia(const ProblemView& problem) {
+        std::vector<std::vector<std::pair<std::int32_t, double>>> rows;
+        std::size_t c = 0;
+        inverse_.for_each_half_solved_row(
+            problem.D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
+                while (row >= problem.cones[c].first_row + problem.cones[c].rows) ++c;
+                const delassus_cone& cone = problem.cones[c];
+                if (row == cone.first_row) rows.clear();
+                double square = 0.0;
+                for (const auto i : reach) square += work[i] * work[i];
+                diagonal_[row] += square;
+                if (block_offset_[c] < 0) return;
+                double* block = blocks_.data() + block_offset_[c];
+                const auto local = static_cast<std::size_t>(row - cone.first_row);
+                const auto width = static_cast<std::size_t>(cone.rows);
+                block[local * width + local] += square;
+                for (std::size_t other = 0; other < local; ++other) {
+                    double product = 0.0;
+                    for (const auto& [i, value] : rows[other]) product += value * work[i];
+                    block[local * width + other] += product;
+                    block[other * width + local] += product;
+                }
+                auto& kept = rows.emplace_back();
+                kept.reserve(reach.size());
+                for (const auto i : reach) kept.emplace_back(i, work[i]);
+            });
+    }
+
+    void add_compliance(const ProblemView& problem) {
+        for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+            const delassus_cone& cone = problem.cones[c];
+            for (std::int32_t i = 0; i < cone.rows; ++i) {
+                for (SparseRowsView::InnerIterator entry(problem.E, cone.first_row + i); entry; ++entry) {
+                    const Eigen::Index j = entry.col() - cone.first_row;
+                    if (j < 0 || j >= cone.rows) continue;
+                    if (i == j) diagonal_[entry.col()] += entry.value();
+                    if (block_offset_[c] >= 0)
+                        blocks_[static_cast<std::size_t>(block_offset_[c] + static_cast<std::ptrdiff_t>(i) * cone.rows +
+                                                         j)] += entry.value();
+                }
+            }
+        }
+    }
+
+    HInverse inverse_;
+    Vector diagonal_;
+    std::vector<double> blocks_;
+    std::vector<std::ptrdiff_t> block_offset_;
+    mutable Vector work_;
+};
+
+}  // namespace delassus::sdk

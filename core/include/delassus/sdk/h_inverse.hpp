@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// H⁻¹ for a symmetric positive definite H of any structure: diagonal, small blocks, or sparse (finite elements).
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "delassus/sdk/problem_view.hpp"
+
+namespace delassus::sdk {
+
+/// Thrown by factorize and solve; the host sees DELASSUS_NUMERICAL_FAILURE with this sentence.
+class NumericalFailure : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+/// Applies H⁻¹. With H = L Lᵀ (up to the permutation P of the sparse case), it also gives the columns of
+/// Z = L⁻¹ P Dᵀ, by which D H⁻¹ Dᵀ = Zᵀ Z.
+class HInverse {
+public:
+    enum class Kind { None, Diagonal, Blocks, Sparse };
+
+    /// Reads the structure from the needs that the host derived. Throws std::invalid_argument unless H is definite.
+    void analyze(const ProblemView& problem) {
+        n_ = problem.n;
+        if (problem.needs_any(DELASSUS_CAN_REDUCED) || n_ == 0) {
+            kind_ = Kind::None;
+        } else if (problem.needs_any(DELASSUS_CAN_H_DIAGONAL)) {
+            kind_ = Kind::Diagonal;
+        } else if (problem.needs_any(DELASSUS_CAN_H_BLOCKS)) {
+            kind_ = Kind::Blocks;
+        } else if (problem.needs_any(DELASSUS_CAN_H_DEFINITE)) {
+            kind_ = Kind::Sparse;
+            if (!sparse_) sparse_ = std::make_unique<Factor>();
+            sparse_->analyzePattern(columns_of(problem));
+            ++analyses_;
+        } else {
+            throw std::invalid_argument("H must be symmetric positive definite for this method");
+        }
+        start_.assign(problem.h_block_start.begin(), problem.h_block_start.end());
+        index_.assign(problem.h_block_index.begin(), problem.h_block_index.end());
+    }
+
+    /// Throws NumericalFailure if H is not positive definite.
+    void factorize(const ProblemView& problem) {
+        smallest_relative_pivot_ = 1.0;
+        switch (kind_) {
+            case Kind::None:
+                return;
+            case Kind::Diagonal:
+                root_.setZero(n_);
+                for (Eigen::Index i = 0; i < n_; ++i)
+                    for (SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
+                        if (entry.col() == i) root_[i] = entry.value();
+                if (!(root_.minCoeff() > 0.0)) throw NumericalFailure("H has a diagonal entry that is not positive");
+                inverse_ = root_.cwiseInverse();
+                root_ = root_.cwiseSqrt();
+                return;
+            case Kind::Blocks:
+                factorize_blocks(problem);
+                break;
+            case Kind::Sparse:
+                sparse_->factorize(columns_of(problem));
+                if (sparse_->info() != Eigen::Success)
+                    throw NumericalFailure("the Cholesky factorisation of H failed: H is not positive definite");
+                measure_sparse_pivots(problem);
+                break;
+        }
+        ++factorizations_;
+    }
+
+    /// v ← H⁻¹ v; n entries.
+    void apply(Vector& v) const {
+        switch (kind_) {
+            case Kind::None:
+                return;
+            case Kind::Diagonal:
+                v.array() *= inverse_.array();
+                return;
+            case Kind::Blocks:
+                apply_blocks(v);
+                return;
+            case Kind::Sparse:
+                v = sparse_->solve(v).eval();
+                return;
+        }
+    }
+
+    /// Sparse columns of Z = L⁻¹ P Dᵀ (n × m, in the order of the factor's own rows): D H⁻¹ Dᵀ = Zᵀ Z.
+    /// The sparse case costs, per row of D, the entries of L in the columns that the row reaches in the elimination
+    /// tree.
+    [[nodiscard]] SparseColumns half_solved(const SparseRowsView& D) const {
+        SparseColumns Z(n_, D.rows());
+        std::vector<Eigen::Triplet<double, std::int32_t>> entries;
+        for_each_half_solved_row(D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
+            for (const auto i : reach)
+                if (work[i] != 0.0) entries.emplace_back(i, static_cast<std::int32_t>(row), work[i]);
+        });
+        Z.setFromTriplets(entries.begin(), entries.end());
+        return Z;
+    }
+
+    /// Visits L⁻¹ P Dᵀ row by row of D without storing it: visit(row, reach, work), where work (n) is zero but for the
+    /// indices in reach.
+    template <class Visitor>
+    void for_each_half_solved_row(const SparseRowsView& D, Visitor&& visit) const {
+        Vector work = Vector::Zero(n_);
+        std::vector<std::int32_t> reach;
+        std::vector<std::int32_t> mark(static_cast<std::size_t>(n_), -1);
+        for (Eigen::Index row = 0; row < D.rows(); ++row) {
+            half_solve_row(D, row, work, reach, mark);
+            visit(row, reach, work);
+            for (const auto i : reach) work[i] = 0.0;
+        }
+    }
+
+    /// The smallest L_jj² / H_jj of the Cholesky factor, at most 1: how far each freedom keeps clear of depending on
+    /// the others, whatever its units. At rounding level H is singular to working precision.
+    [[nodiscard]] double smallest_relative_pivot() const { return smallest_relative_pivot_; }
+
+    [[nodiscard]] Kind kind() const { return kind_; }
+    /// Entries of L in the sparse case, else 0; a product with H⁻¹ costs twice as many multiplications.
+    [[nodiscard]] std::int64_t factor_entries() const {
+        return kind_ == Kind::Sparse ? sparse_->matrixL().nestedExpression().nonZeros() : 0;
+    }
+    [[nodiscard]] std::int64_t analyses() const { return analyses_; }
+    [[nodiscard]] std::int64_t factorizations() const { return factorizations_; }
+
+private:
+    using Factor = Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>>;
+
+    // H is symmetric, so its compressed rows are its compressed columns.
+    static Eigen::Map<const SparseColumns> columns_of(const ProblemView& problem) {
+        const delassus_matrix& H = problem.raw->H;
+        return {H.rows, H.columns, H.entries, H.row_start, H.column, H.value};
+    }
+
+    [[nodiscard]] std::size_t block_count() const { return start_.empty() ? 0 : start_.size() - 1; }
+
+    void factorize_blocks(const ProblemView& problem) {
+        position_.resize(static_cast<std::size_t>(n_));
+        block_of_.resize(static_cast<std::size_t>(n_));
+        offset_.resize(block_count() + 1);
+        offset_[0] = 0;
+        for (std::size_t k = 0; k < block_count(); ++k) {
+            const auto size = static_cast<std::size_t>(start_[k + 1] - start_[k]);
+            offset_[k + 1] = offset_[k] + size * size;
+            for (std::size_t i = 0; i < size; ++i) {
+                position_[static_cast<std::size_t>(index_[static_cast<std::size_t>(start_[k]) + i])] =
+                    static_cast<std::int32_t>(i);
+                block_of_[static_cast<std::size_t>(index_[static_cast<std::size_t>(start_[k]) + i])] =
+                    static_cast<std::int32_t>(k);
+            }
+        }
+        inverse_.resize(static_cast<Eigen::Index>(offset_.back()));
+        root_.resize(static_cast<Eigen::Index>(offset_.back()));
+        Eigen::MatrixXd block;
+        for (std::size_t k = 0; k < block_count(); ++k) {
+            const Eigen::Index size = start_[k + 1] - start_[k];
+            block.setZero(size, size);
+            for (Eigen::Index i = 0; i < size; ++i) {
+                for (SparseRowsView::InnerIterator entry(problem.H, index_[static_cast<std::size_t>(start_[k] + i)]);
+                     entry; ++entry)
+                    block(i, position_[static_cast<std::size_t>(entry.col())]) = entry.value();
+            }
+            const Eigen::LLT<Eigen::MatrixXd> factor(block);
+            if (factor.info() != Eigen::Success)
+                throw NumericalFailure("block " + std::to_string(k) + " of H is not positive definite");
+            for (Eigen::Index i = 0; i < size; ++i) record_pivot(factor.matrixLLT()(i, i), block(i, i));
+            const auto offset = static_cast<Eigen::Index>(offset_[k]);
+            const Eigen::MatrixXd inverse_of_root = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
+            Eigen::Map<Eigen::MatrixXd>(root_.data() + offset, size, size) = inverse_of_root;
+            Eigen::Map<Eigen::MatrixXd>(inverse_.data() + offset, size, size).noalias() =
+                inverse_of_root.transpose() * inverse_of_root;
+        }
+    }
+
+    void record_pivot(double root, double diagonal) {
+        smallest_relative_pivot_ = std::min(smallest_relative_pivot_, root * root / diagonal);
+    }
+
+    void measure_sparse_pivots(const ProblemView& problem) {
+        const auto& L = sparse_->matrixL().nestedExpression();
+        const auto& permutation = sparse_->permutationP().indices();
+        for (Eigen::Index i = 0; i < n_; ++i) {
+            const Eigen::Index j = permutation.size() > 0 ? permutation[i] : i;
+            const double root = L.valuePtr()[L.outerIndexPtr()[j]];
+            for (SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
+                if (entry.col() == i) record_pivot(root, entry.value());
+        }
+    }
+
+    void apply_blocks(Vector& v) const {
+        Vector gathered;
+        for (std::size_t k = 0; k < block_count(); ++k) {
+            const Eigen::Index size = start_[k + 1] - start_[k];
+            const std::int32_t* index = index_.data() + start_[k];
+            gathered.resize(size);
+            for (Eigen::Index i = 0; i < size; ++i) gathered[i] = v[index[i]];
+            const Eigen::Map<const Eigen::MatrixXd> inverse(inverse_.data() + offset_[k], size, size);
+            for (Eigen::Index i = 0; i < size; ++i) v[index[i]] = inverse.col(i).dot(gathered);
+        }
+    }
+
+    // One row of D through L⁻¹ P: leaves the result in work and the touched indices, ascending, in reach.
+    void half_solve_row(const SparseRowsView& D, Eigen::Index row, Vector& work, std::vector<std::int32_t>& reach,
+                        std::vector<std::int32_t>& mark) const {
+        reach.clear();
+        const auto stamp = static_cast<std::int32_t>(row);
+        const auto touch = [&](std::int32_t i) {
+            if (mark[static_cast<std::size_t>(i)] == stamp) return false;
+            mark[static_cast<std::size_t>(i)] = stamp;
+            reach.push_back(i);
+            return true;
+        };
+        switch (kind_) {
+            case Kind::None:
+                return;
+            case Kind::Diagonal:
+                for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
+                    touch(static_cast<std::int32_t>(entry.col()));
+                    work[entry.col()] = entry.value() / root_[entry.col()];
+                }
+                return;
+            case Kind::Blocks:
+                for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
+                    const auto j = static_cast<std::size_t>(entry.col());
+                    const auto k = static_cast<std::size_t>(block_of_[j]);
+                    const Eigen::Index size = start_[k + 1] - start_[k];
+                    const Eigen::Map<const Eigen::MatrixXd> inverse_of_root(root_.data() + offset_[k], size, size);
+                    for (Eigen::Index i = position_[j]; i < size; ++i) {
+                        const std::int32_t target = index_[static_cast<std::size_t>(start_[k] + i)];
+                        touch(target);
+                        work[target] += inverse_of_root(i, position_[j]) * entry.value();
+                    }
+                }
+                return;
+            case Kind::Sparse: {
+                const auto& L = sparse_->matrixL().nestedExpression();
+                const auto& permutation = sparse_->permutationP().indices();
+                const auto permuted = [&](Eigen::Index j) {
+                    return permutation.size() > 0 ? permutation[j] : static_cast<std::int32_t>(j);
+                };
+                // The elimination tree's parent of j is the first row below the diagonal of column j.
+                for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
+                    std::int32_t j = permuted(entry.col());
+                    work[j] += entry.value();
+                    while (j >= 0 && touch(j)) j = parent_in_tree(L, j);
+                }
+                std::sort(reach.begin(), reach.end());
+                for (const auto j : reach) {
+                    const auto begin = L.outerIndexPtr()[j];
+                    const auto end = L.outerIndexPtr()[j + 1];
+                    const double value = work[j] / L.valuePtr()[begin];
+                    work[j] = value;
+                    for (auto k = begin + 1; k < end; ++k) work[L.innerIndexPtr()[k]] -= L.valuePtr()[k] * value;
+                }
+                return;
+            }
+        }
+    }
+
+    template <class Matrix>
+    static std::int32_t parent_in_tree(const Matrix& L, std::int32_t j) {
+        const auto second = L.outerIndexPtr()[j] + 1;
+        return second < L.outerIndexPtr()[j + 1] ? L.innerIndexPtr()[second] : -1;
+    }
+
+    Kind kind_ = Kind::None;
+    Eigen::Index n_ = 0;
+    Vector inverse_;  // diagonal: 1/H_ii; blocks: the inverses, column-major, one after another
+    Vector root_;     // diagonal: √H_ii; blocks: the inverses of the lower Cholesky factors
+    std::vector<std::int32_t> start_, index_, position_, block_of_;
+    std::vector<std::size_t> offset_;
+    std::unique_ptr<Factor> sparse_;
+    double smallest_relative_pivot_ = 1.0;
+    std::int64_t analyses_ = 0, factorizations_ = 0;
+};
+
+}  // namespace delassus::sdk

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The convex problem behind the associated law, scaled so that its operator has a unit diagonal on the average:
+//
+//     minimise  f(λ) = ½ λᵀ N λ + rᵀ λ   over Υ,     ∇f(λ) = N λ + r = u           (seed, eq. 120–122, with the ½)
+//
+// With λ = P λ̂, P diagonal and positive, f is ½ λ̂ᵀ N̂ λ̂ + r̂ᵀ λ̂ with N̂ = P N P, r̂ = P r, û = P u, and the set becomes
+// Υ̂ = P⁻¹Υ. P has one scalar for a friction block, p = (tr N_cc / rows)^(−½), so that Υ̂ is the same cone; a row of any
+// other kind has its own p = N_ii^(−½), and Υ̂ is the interval [lo/p, hi/p]. λ̂ and û are both in √energy: the iterates
+// of a method that works on λ̂ do not depend on the units of length, time or mass.
+//
+// N̂ = Ŵ Ŵᵀ + Ê with Ŵ = P D L⁻ᵀ, H = L Lᵀ and Ê = P E P: where Ŵ has few entries a product with N̂ needs no H⁻¹.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "delassus/sdk/block_rows.hpp"
+#include "delassus/sdk/cones.hpp"
+#include "delassus/sdk/delassus_operator.hpp"
+#include "delassus/sdk/residual.hpp"
+
+namespace delassus::sdk {
+
+class ScaledProblem {
+public:
+    /// A block that is projected as a whole (friction).
+    struct Block {
+        delassus_cone cone;
+        std::int32_t first, rows;
+    };
+    /// Rows that are projected one by one onto [lower, upper].
+    struct Interval {
+        std::int32_t first, rows;
+    };
+
+    void analyze(const ProblemView& problem) { operator_.analyze(problem); }
+
+    /// Factors H and builds N̂. Throws NumericalFailure if H is not positive definite.
+    void factorize(const ProblemView& problem) {
+        operator_.factorize(problem);
+        scale_rows(problem);
+        build_operator(problem);
+    }
+
+    /// Takes a, b, μ and the bounds for the solves that follow.
+    void load(const ProblemView& problem) {
+        r_ = operator_.free_velocity(problem);
+        residual_ = NaturalResidual(problem, operator_.diagonal(), r_);
+        r_.array() *= p_.array();
+        blocks_.clear();
+        intervals_.clear();
+        lower_.setConstant(problem.m, -unbounded_value);
+        upper_.setConstant(problem.m, unbounded_value);
+        for (const delassus_cone& cone : problem.cones) {
+            if (!is_separable(cone)) {
+                blocks_.push_back({cone, cone.first_row, cone.rows});
+                continue;
+            }
+            if (cone.kind == DELASSUS_CONE_NONNEGATIVE) lower_.segment(cone.first_row, cone.rows).setZero();
+            if (cone.kind == DELASSUS_CONE_BOX) {
+                for (std::int32_t i = 0; i < cone.rows; ++i) {
+                    lower_[cone.first_row + i] = cone.lo[i] / p_[cone.first_row + i];
+                    upper_[cone.first_row + i] = cone.hi[i] / p_[cone.first_row + i];
+                }
+            }
+            intervals_.push_back({cone.first_row, cone.rows});
+        }
+    }
+
+    /// result ← N̂ λ̂; both m. Allocates nothing (but in Eigen's solve with a sparse factor).
+    void multiply(const Vector& lambda, Vector& result) const {
+        result.setZero(lambda.size());
+        if (rows_.entries() > 0) {
+            work_.setZero();
+            rows_.transpose_multiply_add(lambda.data(), work_.data());
+            if (!whitened_) operator_.inverse().apply(work_);
+            rows_.multiply_add(work_.data(), result.data());
+        }
+        if (square_.entries() > 0) square_.multiply_add(lambda.data(), result.data());
+    }
+
+    /// gradient ← N̂ λ̂ + r̂ = û; both m.
+    void gradient(const Vector& lambda, Vector& result) const {
+        multiply(lambda, result);
+        result += r_;
+    }
+
+    /// λ̂ ← its Euclidean projection onto Υ̂; m.
+    void project(Vector& lambda) const {
+        for (const Block& block : blocks_) sdk::project(block.cone, lambda.data() + block.first);
+        for (const Interval& run : intervals_)
+            for (std::int32_t i = run.first; i < run.first + run.rows; ++i)
+                lambda[i] = std::min(upper_[i], std::max(lower_[i], lambda[i]));
+    }
+
+    /// The natural error of λ̂ with û; both m. A row whose p differs from its block's s has the unit step (s/p)² of û.
+    [[nodiscard]] double natural(const Vector& lambda, const Vector& velocity) const {
+        double sum = 0.0;
+        std::array<double, largest_block> trial;
+        for (const Block& block : blocks_) {
+            const double* l = lambda.data() + block.first;
+            const double* u = velocity.data() + block.first;
+            for (std::int32_t i = 0; i < block.rows; ++i) trial[i] = l[i] - u[i];
+            sdk::project(block.cone, trial.data());
+            for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - trial[i]) * (l[i] - trial[i]);
+        }
+        for (const Interval& run : intervals_) {
+            for (std::int32_t i = run.first; i < run.first + run.rows; ++i) {
+                const double w = ratio_[i];
+                const double change =
+                    std::min(lambda[i] - lower_[i], std::max(lambda[i] - upper_[i], w * w * velocity[i]));
+                sum += change * change / (w * w);
+            }
+        }
+        return std::sqrt(sum) / residual_.reference();
+    }
+
+    /// The natural error as the host will measure it: x = H⁻¹(a + Dᵀλ) and u = D x + E λ + b computed anew from λ (m,
+    /// in the problem's own units). Leaves x (n) in velocity.
+    [[nodiscard]] double measured(const ProblemView& problem, const Vector& lambda, Vector& velocity) const {
+        velocity = operator_.velocity(problem, lambda);
+        Vector u = problem.b;
+        if (problem.n > 0) u.noalias() += problem.D * velocity;
+        if (problem.E.nonZeros() > 0) u.noalias() += problem.E * lambda;
+        return residual_.natural(lambda, u);
+    }
+
+    [[nodiscard]] const Vector& r() const { return r_; }          ///< r̂; m
+    [[nodiscard]] const Vector& scaling() const { return p_; }    ///< the diagonal of P; m
+    [[nodiscard]] const Vector& lower() const { return lower_; }  ///< of the rows in intervals(); m
+    [[nodiscard]] const Vector& upper() const { return upper_; }  ///< of the rows in intervals(); m
+    [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+    [[nodiscard]] const std::vector<Interval>& intervals() const { return intervals_; }
+    [[nodiscard]] const DelassusOperator& unscaled() const { return operator_; }
+
+private:
+    static constexpr std::size_t largest_block = 16;  // rows of a block that is projected as a whole
+    static constexpr double unbounded_value = std::numeric_limits<double>::infinity();
+
+    void scale_rows(const ProblemView& problem) {
+        const Vector& diagonal = operator_.diagonal();
+        const std::vector<double> block = block_scaling(problem.cones, diagonal);
+        p_.resize(problem.m);
+        ratio_.resize(problem.m);
+        groups_.clear();
+        for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+            const delassus_cone& cone = problem.cones[c];
+            const bool whole = !is_separable(cone);
+            if (whole) groups_.push_back({cone.first_row, cone.rows});
+            for (std::int32_t i = cone.first_row; i < cone.first_row + cone.rows; ++i) {
+                p_[i] = whole || !(diagonal[i] > 0.0) ? block[c] : 1.0 / std::sqrt(diagonal[i]);
+                ratio_[i] = block[c] / p_[i];
+                if (!whole) groups_.push_back({i, 1});
+            }
+        }
+    }
+
+    // Takes the cheapest form of N̂. With a diagonal or block-diagonal H, Ŵ has about as many entries as D. With a
+    // sparse H a row of Ŵ reaches up the elimination tree: then the alternatives are D̂ with two triangular solves a
+    // product, or for few rows N̂ itself. Costs are counted in multiplications.
+    void build_operator(const ProblemView& problem) {
+        rows_ = {};
+        square_ = {};
+        work_.setZero(problem.n);
+        whitened_ = true;
+        const HInverse& inverse = operator_.inverse();
+        if (inverse.kind() == HInverse::Kind::Sparse) {
+            double whitened = 0.0;
+            inverse.for_each_half_solved_row(problem.D, [&](Eigen::Index, const auto& reach, const Vector&) {
+                whitened += 2.0 * static_cast<double>(reach.size());
+            });
+            const double solved = 2.0 * static_cast<double>(problem.D.nonZeros() + inverse.factor_entries());
+            const double formed = static_cast<double>(problem.m) * static_cast<double>(problem.m);
+            if (formed <= std::min(whitened, solved)) {
+                square_ = BlockRows(operator_.formed(problem), groups_, p_.data(), p_.data());
+                return;
+            }
+            whitened_ = whitened <= solved;
+        }
+        if (problem.n > 0 && whitened_) {
+            const SparseColumns Z = inverse.half_solved(problem.D);
+            const SparseRowsView W(Z.cols(), Z.rows(), Z.nonZeros(), Z.outerIndexPtr(), Z.innerIndexPtr(),
+                                   Z.valuePtr());  // the columns of Z are the rows of W = Zᵀ
+            rows_ = BlockRows(W, groups_, p_.data(), nullptr);
+        } else if (problem.n > 0) {
+            rows_ = BlockRows(problem.D, groups_, p_.data(), nullptr);
+        }
+        if (problem.E.nonZeros() > 0) square_ = BlockRows(problem.E, groups_, p_.data(), p_.data());
+    }
+
+    DelassusOperator operator_;
+    NaturalResidual residual_;
+    Vector p_, ratio_;  // ratio: s of the row's block over p of the row
+    Vector r_, lower_, upper_;
+    std::vector<Block> blocks_;
+    std::vector<Interval> intervals_;
+    std::vector<RowGroup> groups_;
+    BlockRows rows_;    // Ŵ, or D̂ = P D
+    BlockRows square_;  // Ê, or all of N̂
+    bool whitened_ = true;
+    mutable Vector work_;
+};
+
+}  // namespace delassus::sdk

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Running a system of a scene step by step.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/registry.hpp"
+#include "delassus/scene.hpp"
+#include "delassus/step_solver.hpp"
+#include "delassus/timestepper.hpp"
+
+namespace delassus {
+
+/// What is known after a step. Contacts are those that the step's problem was made of: found where the step began.
+struct StepRecord {
+    std::int64_t step = 0;       ///< steps taken so far
+    double t = 0.0;              ///< s
+    double energy = 0.0;         ///< J; NaN where the system does not know it
+    Vector3 momentum{};          ///< kg m/s
+    Vector3 angular_momentum{};  ///< about the origin, kg m²/s
+    double drift = 0.0;          ///< largest |C| of the bilateral constraints, in their own units (m, rad)
+    double penetration = 0.0;    ///< of the deepest contact, m; ≥ 0
+    std::int64_t contacts = 0;   ///< and other unilateral blocks in the problem
+    std::int64_t newton_iterations = 0;
+    std::int64_t solver_iterations = 0;
+    double natural = 0.0;  ///< largest natural error of the step's solves by a plugin
+    double seconds = 0.0;  ///< of wall time, everything included
+    bool solved = true;    ///< every solve reached its tolerance
+};
+
+/// Sums and extremes since the start.
+struct SimulationTotals {
+    double start_energy = 0.0, energy = 0.0;  ///< J
+    double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
+    std::int64_t most_contacts = 0;
+    std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
+    double seconds = 0.0, solver_seconds = 0.0;
+    std::int64_t unsolved_steps = 0;  ///< steps with a solve that missed its tolerance
+    std::string first_unsolved;       ///< when and why the first did
+};
+
+/// All that a simulation carries from step to step: with equal scenes, going on from it gives the same bits.
+struct SimulationState {
+    std::int64_t step = 0;
+    State state;
+    std::vector<double> memory;  ///< Timestepper::save(), warm starts included
+    SimulationTotals totals;
+};
+
+class Simulation {
+public:
+    /// system and registry outlive the simulation. Throws InputError or Unsupported for an integrator or a solver that
+    /// is not there, cannot take the system, or has other options.
+    DELASSUS_API Simulation(SceneSystem& system, const Registry& registry);
+    DELASSUS_API ~Simulation();
+    Simulation(Simulation&&) noexcept = default;
+
+    /// Whether `end` is reached. The last step is shorter where `end` is no multiple of the step.
+    [[nodiscard]] DELASSUS_API bool finished() const;
+
+    /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence; everything is then
+    /// as it was before the step.
+    DELASSUS_API const StepRecord& step();
+
+    /// Of the last step; of the initial state before the first.
+    [[nodiscard]] const StepRecord& record() const { return record_; }
+    [[nodiscard]] const State& state() const { return now_.state; }
+    [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
+    [[nodiscard]] const SceneSystem& system() const { return *system_; }
+    [[nodiscard]] StepSolver& solver() { return *solver_; }
+
+    [[nodiscard]] DELASSUS_API SimulationState save() const;
+    /// Throws InputError if the sizes are not the system's.
+    DELASSUS_API void load(SimulationState state);
+
+private:
+    void measure();
+
+    SceneSystem* system_;
+    std::unique_ptr<StepSolver> solver_;
+    std::unique_ptr<Timestepper> timestepper_;
+    SimulationState now_;
+    StepRecord record_;
+    std::vector<double> constraint_;
+};
+
+}  // namespace delassus

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Solving a problem with a plugin, from the host's side.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/errors.hpp"
+#include "delassus/export.hpp"
+#include "delassus/needs.hpp"
+#include "delassus/registry.hpp"
+
+namespace delassus {
+
+/// How a solve ended, as judged by the host.
+enum class Status {
+    Solved,  ///< the solver said so, and the measured errors agree
+    IterationLimit,
+    TimeLimit,
+    Stalled,
+    Infeasible,
+    NumericalFailure,
+    Cancelled,
+    Error,
+    FalseClaim  ///< the solver claimed convergence; the measured error is above the tolerance
+};
+
+[[nodiscard]] DELASSUS_API std::string_view name_of(Status status);
+
+/// A point of an error-against-time curve.
+struct CurveSample {
+    std::int64_t iteration = 0;
+    double seconds = 0.0;  ///< of the solver's own time, setup included, measuring excluded
+    double natural = 0.0;
+};
+
+/// What one solve may take.
+struct SolveSettings {
+    double tolerance = 1e-8;  ///< natural error, > 0
+    std::int64_t max_iterations = 1000000;
+    double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
+    bool warm_start = false;                                      ///< start from the Solution given
+
+    /// Measure the natural error along the way and keep the curve in the report. Samples are spaced by 2 % in time.
+    bool record_curve = false;
+    /// Called now and then (at most ten times a second), with the latest sample if the curve is recorded; iteration and
+    /// seconds always. May be empty.
+    std::function<void(const CurveSample&)> on_progress;
+    /// Called for each sample of the curve as it is taken. May be empty.
+    std::function<void(const CurveSample&)> on_sample;
+    /// Asked at every progress call; true cancels the solve. May be empty.
+    std::function<bool()> cancelled;
+};
+
+/// What happened. Every number in `error` was computed by the core.
+struct SolveReport {
+    std::string problem, solver, version;
+    OptionTexts options;  ///< those that were chosen
+    Law law = Law::Associated;
+    double tolerance = 0.0;
+    Status status = Status::Error;
+    std::string message;  ///< what a person should know; may be empty
+    std::int64_t iterations = 0;
+    double seconds_setup = 0.0;  ///< analyze and factorize
+    double seconds_solve = 0.0;
+    std::int64_t analyses = 0, factorizations = 0;  ///< by the solver's own count, since it was made
+    double claimed_residual = std::numeric_limits<double>::quiet_NaN();
+    Errors error;
+    std::vector<CurveSample> curve;
+};
+
+/// The report as JSON text, with the fields' names as a user of --json sees them (docs/report.md).
+[[nodiscard]] DELASSUS_API std::string to_json(const SolveReport& report);
+
+/// A solver made from a plugin, for its whole life: it keeps its analysis and factorisation from one solve to the next
+/// and renews what the problem's identity says has changed. Used by one thread at a time.
+class Solver {
+public:
+    /// Throws InputError on a bad option, PluginError if the plugin cannot make a solver. With a registry, refusals
+    /// name the solvers that could; it must outlive the solver.
+    DELASSUS_API explicit Solver(std::shared_ptr<const Plugin> plugin, OptionTexts options = {},
+                                 const Registry* registry = nullptr);
+    DELASSUS_API ~Solver();
+    DELASSUS_API Solver(Solver&&) noexcept;
+    DELASSUS_API Solver& operator=(Solver&&) noexcept;
+
+    [[nodiscard]] DELASSUS_API const PluginInfo& info() const;
+
+    /// Empty if the solver can take the problem with these settings; else the sentence of the refusal.
+    [[nodiscard]] DELASSUS_API std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) const;
+
+    /// Solves. solution is the starting point if settings.warm_start, and holds the result: always of the right size
+    /// and finite. Throws Unsupported with the refusal, or InputError on a bad setting. Everything else is a status.
+    DELASSUS_API SolveReport solve(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings);
+
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace delassus

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One step of a dynamical system in time, and the table of the methods that can take it (integrators/, one file each).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/dynamical_system.hpp"
+#include "delassus/error.hpp"
+#include "delassus/export.hpp"
+#include "delassus/plugin_info.hpp"
+#include "delassus/step_solver.hpp"
+
+namespace delassus {
+
+/// What a step did.
+struct StepReport {
+    std::int32_t newton_iterations = 0;  ///< linear or cone problems solved
+    std::int32_t unilateral_blocks = 0;  ///< contacts and other unilateral blocks that were in the problem
+    bool solved = true;                  ///< false if the step rests on a solve that missed its tolerance; it is taken
+    std::string message;                 ///< why not
+};
+
+/// A step that cannot be taken: Newton's method does not converge, a state is not finite. The state is as before it.
+class DELASSUS_API StepFailure : public Error {
+public:
+    using Error::Error;
+};
+
+/// A method, made for one system. It keeps what belongs to the method (accelerations, multipliers) from step to step.
+class DELASSUS_API Timestepper {
+public:
+    virtual ~Timestepper();
+
+    /// Advances state (in the system's sizes) from t to t + h, h > 0. Throws StepFailure, or Unsupported if the solver
+    /// cannot take the step's problems.
+    virtual StepReport step(State& state, double h, StepSolver& solver) = 0;
+
+    /// Forgets what was kept from step to step: call it when the state was changed from outside.
+    virtual void restart() = 0;
+
+    /// Reaction forces λ of the bilateral constraints at the end of the last step; m. Empty before the first step.
+    [[nodiscard]] const std::vector<double>& multipliers() const { return multipliers_; }
+
+    /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
+    [[nodiscard]] virtual std::vector<double> save() const;
+    virtual void load(const std::vector<double>& memory);
+
+protected:
+    std::vector<double> multipliers_;
+};
+
+/// A row of the table of methods.
+struct TimestepperInfo {
+    std::string name;         ///< lower_snake_case
+    std::string description;  ///< one line
+    std::vector<OptionInfo> options;
+    bool constraints = false;  ///< takes bilateral constraints
+    bool unilateral = false;   ///< takes contacts, stops and bounded motors
+    int order = 1;             ///< of convergence, for smooth systems
+    /// system outlives the stepper; the values are checked, one for each option.
+    std::unique_ptr<Timestepper> (*make)(DynamicalSystem& system, const std::vector<OptionValue>& values) = nullptr;
+};
+
+/// All methods, by name.
+[[nodiscard]] DELASSUS_API const std::vector<TimestepperInfo>& timesteppers();
+
+/// Makes the method of that name. Throws InputError on an unknown name or option (with the nearest), Unsupported if the
+/// method cannot take the system's constraints or contacts, naming those that can.
+[[nodiscard]] DELASSUS_API std::unique_ptr<Timestepper> make_timestepper(std::string_view name, DynamicalSystem& system,
+                                                                         const OptionTexts& options = {});
+
+/// Adds a row to the table; for a static object in the file of a method:
+///     const RegisterTimestepper row{{.name = "rk4", …}};
+struct RegisterTimestepper {
+    DELASSUS_API explicit RegisterTimestepper(TimestepperInfo info);
+};
+
+}  // namespace delassus

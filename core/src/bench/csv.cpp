@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "bench/writers.hpp"
+
+namespace delassus::bench {
+
+namespace {
+
+std::string quoted(const std::string& text) {
+    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+    std::string field = "\"";
+    for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return field + '"';
+}
+
+/// The shortest digits that read back as the same number.
+std::string number_text(double value) {
+    return std::isfinite(value) ? fmt::format("{}", value) : "";
+}
+
+}  // namespace
+
+std::string csv_text(const Comparison& comparison) {
+    std::string text =
+        "problem,n,m,law,structure,solver,status,iterations,setup_s,solve_s,slowest_solve_s,natural,balance,cone,dual,"
+        "gap,siconos,velocity,peak_memory_bytes,message\r\n";
+    for (const auto& problem : comparison.problems)
+        for (const auto& row : problem.results) {
+            double slowest = row.solve;
+            for (const auto& repeat : row.repeats) slowest = std::max(slowest, repeat.solve);
+            const Errors none{unknown, unknown, unknown, unknown, unknown, unknown};
+            const Errors& error = row.error ? *row.error : none;
+            text += fmt::format("{},{},{},{},{},{},{},{}", quoted(problem.facts.name), problem.facts.n, problem.facts.m,
+                                problem.facts.law, problem.facts.structure, quoted(row.label), row.status,
+                                row.iterations ? std::to_string(*row.iterations) : "");
+            for (const double value : {row.setup, row.solve, slowest, error.natural, error.balance, error.cone,
+                                       error.dual, error.gap, error.siconos, row.velocity})
+                (text += ',') += number_text(value);
+            text += fmt::format(",{},{}\r\n", row.peak_memory, quoted(row.message));
+        }
+    return text;
+}
+
+}  // namespace delassus::bench

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/measurement.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bench/json_text.hpp"
+#include "delassus/error.hpp"
+#include "process/child_process.hpp"
+
+namespace delassus::bench {
+
+namespace {
+
+/// Seconds for reading a problem, and for everything else that is not a solver's run.
+constexpr double loading_limit = 600.0;
+/// Seconds for the process to end after its last word.
+constexpr double exit_limit = 10.0;
+
+/// Cuts the output into lines of JSON.
+class Lines {
+public:
+    explicit Lines(std::function<void(const Json&)> on_line) : on_line_(std::move(on_line)) {}
+
+    void add(std::string_view piece) {
+        rest_ += piece;
+        std::size_t begin = 0;
+        for (std::size_t end; (end = rest_.find('\n', begin)) != std::string::npos; begin = end + 1) {
+            const Json line = Json::parse(rest_.substr(begin, end - begin), nullptr, false);
+            // Anything else comes from a plugin that found our channel: the row must not depend on it.
+            if (line.is_object() && line.contains("event")) on_line_(line);
+        }
+        rest_.erase(0, begin);
+    }
+
+private:
+    std::function<void(const Json&)> on_line_;
+    std::string rest_;
+};
+
+/// hear: takes a line, and returns the seconds until the next one must have come.
+ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear) {
+    double allowed = loading_limit;
+    Lines lines([&](const Json& line) { allowed = hear(line); });
+    ChildSettings child;
+    child.program = worker.command;
+    child.arguments = {"worker"};
+    child.input = text_of(request);
+    // One core, one thread: the libraries behind some plugins would otherwise start threads that share that core.
+    child.environment = {{"OMP_NUM_THREADS", "1"}, {"OPENBLAS_NUM_THREADS", "1"}, {"MKL_NUM_THREADS", "1"}};
+    const auto cores = allowed_cores();
+    if (!cores.empty()) child.core = cores.back();
+    child.timeout = allowed;
+    child.memory_limit = worker.memory_limit;
+    child.cancelled = worker.cancelled;
+    child.on_output = [&](std::string_view piece) {
+        lines.add(piece);
+        return allowed;
+    };
+    return run_child(child);
+}
+
+Json problem_fields(const char* task, const std::filesystem::path& problem, const std::string& law) {
+    return {{"do", task}, {"problem", std::filesystem::absolute(problem).string()}, {"law", law}};
+}
+
+/// The last line of what was written to standard error: often the cause.
+std::string last_line(std::string text) {
+    while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
+    const auto begin = text.find_last_of('\n');
+    std::string line = begin == std::string::npos ? text : text.substr(begin + 1);
+    return line.size() > 300 ? line.substr(0, 300) : line;
+}
+
+std::string reached(const Measurement& row) {
+    if (row.curve.empty()) return "before its first iterate";
+    const CurveSample& last = row.curve.back();
+    return fmt::format("after iteration {}, natural error {:.2e}, {:.3g} s", last.iteration, last.natural,
+                       last.seconds);
+}
+
+void append(std::string& message, const std::string& sentence) {
+    if (!message.empty()) message += "; ";
+    message += sentence;
+}
+
+/// How the process ended, where that tells more than what it said.
+void judge_end(Measurement& row, const ChildResult& child, double time_limit, bool done) {
+    const bool has_result = !row.status.empty();
+    std::string sentence;
+    std::string status;
+    if (child.timed_out) {
+        status = "hung";
+        sentence = has_result && done ? "did not end after its last run and was killed"
+                                      : fmt::format("gave no sign for {:.3g} s (time limit and grace) {}; killed",
+                                                    time_limit + grace_of(time_limit), reached(row));
+    } else if (child.cancelled && !has_result) {
+        row.status = "cancelled";
+        row.message = "interrupted " + reached(row);
+        return;
+    } else if (child.signal != 0 && !child.cancelled) {
+        status = "crashed";
+        sentence = fmt::format("{} {}", signal_name(child.signal), done ? "when its process ended" : reached(row));
+    } else if (!done && !child.cancelled) {
+        status = "crashed";
+        sentence = fmt::format("left its process with exit code {} {}", child.exit_code.value_or(0), reached(row));
+    }
+    if (status.empty()) return;
+    if (const auto line = last_line(child.errors); !line.empty() && status == "crashed") sentence += ": " + line;
+    append(row.message, sentence);
+    // A result that was complete stays one, and says what happened afterwards.
+    if (!has_result || !done) row.status = status;
+}
+
+}  // namespace
+
+double grace_of(double time_limit) {
+    return 2.0 + 0.2 * time_limit;
+}
+
+std::string label_of(const SolverConfig& solver) {
+    const std::string name = solver.name.find('/') == std::string::npos
+                                 ? solver.name
+                                 : std::filesystem::path(solver.name).filename().string();
+    std::string options;
+    for (const auto& [key, value] : solver.options)
+        options += fmt::format("{}{}={}", options.empty() ? "" : ",", key, value);
+    return options.empty() ? name : fmt::format("{}({})", name, options);
+}
+
+Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
+                    const std::function<void(const CurveSample&)>& on_sample) {
+    const ComparisonSettings& settings = request.settings;
+    Measurement row;
+    row.label = label_of(request.solver);
+    row.solver = request.solver.name;
+    row.options = request.solver.options;
+
+    Json question = problem_fields("measure", request.problem, settings.law);
+    question["solver"] = request.solver.name;
+    question["options"] = request.solver.options;
+    question["tolerance"] = settings.tolerance;
+    question["max_iterations"] = settings.max_iterations;
+    question["time_limit"] = settings.time_limit;
+    question["repeats"] = settings.repeats;
+    question["solution"] = request.solution.string();
+    question["plugin_path"] = Json::array();
+    for (const auto& folder : worker.plugin_path) question["plugin_path"].push_back(folder.string());
+
+    const double run_limit = settings.time_limit + grace_of(settings.time_limit);
+    bool done = false;
+    const auto hear = [&](const Json& line) -> double {
+        const std::string event = line.at("event");
+        if (event == "begin") return run_limit;
+        if (event == "sample") {
+            const CurveSample sample{line.at("iteration").get<std::int64_t>(), number_of(line.at("seconds")),
+                                     number_of(line.at("natural"))};
+            row.curve.push_back(sample);
+            if (on_sample) on_sample(sample);
+            return run_limit;
+        }
+        if (event == "refused") {
+            row.status = "unsupported";
+            row.message = line.at("message");
+        } else if (event == "recorded") {
+            row.solver = line.at("solver");
+            row.version = line.at("version");
+            row.status = line.at("status");
+            row.message = line.at("message");
+            row.iterations = line.at("iterations").get<std::int64_t>();
+            row.setup = number_of(line.at("setup"));
+            row.solve = number_of(line.at("solve"));
+            row.analyses = line.at("analyses");
+            row.factorizations = line.at("factorizations");
+            row.error = errors_of(line.at("error"));
+            const Json& last = line.at("last");
+            row.curve.push_back({last[0].get<std::int64_t>(), number_of(last[1]), number_of(last[2])});
+        } else if (event == "repeat") {
+            if (line.at("status") != row.status)
+                append(row.message, fmt::format("a repeat ended with {}", line.at("status").get<std::string>()));
+            row.repeats.push_back({number_of(line.at("setup")), number_of(line.at("solve"))});
+        } else if (event == "failed") {
+            if (row.status.empty()) row.status = "error";
+            append(row.message, line.at("message").get<std::string>());
+            done = true;
+            return exit_limit;
+        } else if (event == "done") {
+            done = true;
+            if (const auto printed = line.at("printed").get<std::int64_t>(); printed > 0)
+                append(row.message, fmt::format("wrote {} bytes to standard output; they were dropped", printed));
+            return exit_limit;
+        }
+        return loading_limit;
+    };
+    const ChildResult child = ask(worker, question, hear);
+    judge_end(row, child, settings.time_limit, done);
+    row.peak_memory = child.peak_memory;
+    for (const Repeat& repeat : row.repeats) {
+        const bool first = &repeat == &row.repeats.front();
+        row.setup = first ? repeat.setup : std::min(row.setup, repeat.setup);
+        row.solve = first ? repeat.solve : std::min(row.solve, repeat.solve);
+    }
+    return row;
+}
+
+ProblemFacts describe(const WorkerSettings& worker, const std::filesystem::path& problem, const std::string& law) {
+    ProblemFacts facts;
+    std::string failure;
+    bool done = false;
+    const auto child = ask(worker, problem_fields("describe", problem, law), [&](const Json& line) {
+        const std::string event = line.at("event");
+        if (event == "problem") {
+            facts = {line.at("name"), line.at("law"), line.at("structure"), line.at("n"), line.at("m"), {}};
+            for (const auto& [kind, count] : line.at("cones").items()) facts.cones.emplace_back(kind, count);
+        }
+        if (event == "failed") failure = line.at("message");
+        done = done || event == "done";
+        return loading_limit;
+    });
+    if (!failure.empty()) throw InputError(failure);
+    if (child.cancelled) throw Error("interrupted while reading " + problem.string());
+    if (!done) throw InputError(fmt::format("{} could not be read: the process that read it ended", problem.string()));
+    return facts;
+}
+
+std::vector<double> velocity_errors(const WorkerSettings& worker, const std::filesystem::path& problem,
+                                    const std::filesystem::path& reference,
+                                    const std::vector<std::filesystem::path>& solutions) {
+    std::vector<double> errors(solutions.size(), unknown);
+    Json question = problem_fields("velocity", problem, {});
+    question["reference"] = reference.string();
+    question["solutions"] = Json::array();
+    for (const auto& folder : solutions) question["solutions"].push_back(folder.string());
+    static_cast<void>(ask(worker, question, [&](const Json& line) {
+        if (line.at("event") == "velocity")
+            for (std::size_t k = 0; k < errors.size(); ++k) errors[k] = number_of(line.at("errors").at(k));
+        return loading_limit;
+    }));
+    return errors;
+}
+
+}  // namespace delassus::bench

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The worker: a process of its own for each solver, so that a crash or a hang is a row in a table.
+//
+// It reads one request (a JSON object) from standard input and answers with lines of JSON on standard output, each with
+// an "event". What the solver itself prints is kept away from there. The requests:
+//
+//   {"do": "describe", "problem", "law"}
+//       problem   name, law, structure, n, m, cones
+//   {"do": "measure", "problem", "law", "solver", "options", "tolerance", "max_iterations", "time_limit", "repeats",
+//    "plugin_path", "solution"}
+//       problem   as above
+//       refused   message
+//       begin     a run begins: the solver has its time limit from now
+//       sample    iteration, seconds, natural: as the recorded run goes
+//       recorded  the report of the run with the curve; x and λ are in the folder `solution` then
+//       repeat    status, setup, solve: a run without recording
+//   {"do": "velocity", "problem", "law", "reference", "solutions"}
+//       velocity  errors: ‖x − x*‖_H / ‖x*‖_H for each solution folder, null where there is none
+//
+// and for all of them
+//       failed    kind ("input" or "error"), message: nothing more comes
+//       done      printed: bytes that the solver wrote to standard output
+#pragma once
+
+#include <string>
+
+namespace delassus::bench {
+
+/// Does what the request asks for, writing to the file descriptor. Returns the exit code: 0, or 2 after "failed".
+int run_worker(const std::string& request, int channel);
+
+}  // namespace delassus::bench

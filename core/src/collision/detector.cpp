@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "collision/detector.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "delassus/error.hpp"
+
+namespace delassus::collision {
+namespace {
+
+Vector3d vector(const Vector3& v) {
+    return {v[0], v[1], v[2]};
+}
+
+/// Normalises: a quaternion drifts from unit length by rounding. False if it is zero or not finite.
+bool rotation_of(const Quaternion& orientation, Matrix3d& rotation) {
+    const Eigen::Quaterniond q(orientation[0], orientation[1], orientation[2], orientation[3]);
+    const double norm = q.norm();
+    rotation = q.normalized().toRotationMatrix();
+    return std::isfinite(norm) && norm > 0.0;
+}
+
+/// Half of the extent of a solid along the axes of the world.
+Vector3d half_extent(const Placed& placed) {
+    const Solid& solid = *placed.solid;
+    const Matrix3d magnitude = placed.rotation.cwiseAbs();
+    Vector3d half = Vector3d::Constant(solid.radius);
+    switch (solid.kind) {
+        case ShapeKind::Box:
+            return half + magnitude * solid.half;
+        case ShapeKind::Capsule:
+            return half + solid.half_length * magnitude.col(2);
+        case ShapeKind::Cylinder:
+            for (Eigen::Index i = 0; i < 3; ++i) {
+                const double cosine = std::min(1.0, magnitude(i, 2));
+                half[i] += solid.half_length * cosine + solid.cylinder_radius * std::sqrt(1.0 - cosine * cosine);
+            }
+            return half;
+        case ShapeKind::Convex:
+            return Vector3d::Constant(solid.reach);
+        default:
+            return half;
+    }
+}
+
+}  // namespace
+
+Detector::Detector(CollisionSetup setup)
+    : setup_(std::move(setup)),
+      broad_phase_([this](std::int32_t shape_a, std::int32_t shape_b) { return may_touch(shape_a, shape_b); }) {
+    for (auto& [first, second] : setup_.apart) {
+        if (first > second) std::swap(first, second);
+    }
+    std::sort(setup_.apart.begin(), setup_.apart.end());
+    const auto count = static_cast<std::int32_t>(setup_.shapes.size());
+    solids_.reserve(setup_.shapes.size());
+    placed_.resize(setup_.shapes.size());
+    local_rotations_.resize(setup_.shapes.size());
+    body_rotations_.resize(setup_.fixed.size());
+    for (std::int32_t i = 0; i < count; ++i) {
+        const Shape& shape = setup_.shapes[i];
+        solids_.push_back(make_solid(shape, i));
+        placed_[i].solid = &solids_[i];
+        rotation_of(shape.pose.orientation, local_rotations_[i]);
+        if (shape.kind == ShapeKind::Plane) {
+            planes_.push_back(i);
+        } else {
+            bounded_.push_back(i);
+            slack_ += 0.1 * solids_[i].reach;
+        }
+    }
+    if (!bounded_.empty()) slack_ /= static_cast<double>(bounded_.size());
+    boxes_.resize(bounded_.size());
+}
+
+bool Detector::is_fixed(std::int32_t body) const {
+    return body < 0 || setup_.fixed[body];
+}
+
+bool Detector::may_touch(std::int32_t shape_a, std::int32_t shape_b) const {
+    const std::int32_t a = setup_.shapes[shape_a].body, b = setup_.shapes[shape_b].body;
+    if (a == b || (is_fixed(a) && is_fixed(b))) return false;
+    if (!setup_.group.empty() && a >= 0 && b >= 0 && setup_.group[a] >= 0 && setup_.group[a] == setup_.group[b])
+        return false;
+    return !std::binary_search(setup_.apart.begin(), setup_.apart.end(), std::pair(std::min(a, b), std::max(a, b)));
+}
+
+void Detector::place(std::span<const Pose> poses) {
+    if (poses.size() != setup_.fixed.size()) {
+        throw InputError(fmt::format("Collision detection got the poses of {} bodies; there are {}.", poses.size(),
+                                     setup_.fixed.size()));
+    }
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+        if (!rotation_of(poses[i].orientation, body_rotations_[i]) || !vector(poses[i].position).allFinite())
+            throw InputError(fmt::format("The pose of body {} is not finite, or its quaternion is zero.", i));
+    }
+    for (std::size_t i = 0; i < placed_.size(); ++i) {
+        const Shape& shape = setup_.shapes[i];
+        Placed& placed = placed_[i];
+        placed.rotated = false;
+        if (shape.body < 0) {
+            placed.rotation = local_rotations_[i];
+            placed.position = vector(shape.pose.position);
+        } else {
+            const Matrix3d& rotation = body_rotations_[shape.body];
+            placed.rotation.noalias() = rotation * local_rotations_[i];
+            placed.position = vector(poses[shape.body].position) + rotation * vector(shape.pose.position);
+        }
+    }
+}
+
+// Cost: linear in shapes, pairs of overlapping boxes and points, but for the tree's logarithm; planes are tried against
+// every shape.
+void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) {
+    contacts.clear();
+    if (!(envelope >= 0.0) || !std::isfinite(envelope))
+        throw InputError(
+            fmt::format("The envelope of contacts is {} m; it should be finite and not negative.", envelope));
+    place(poses);
+    pairs_.clear();
+    for (std::size_t i = 0; i < bounded_.size(); ++i) {
+        const Placed& placed = placed_[bounded_[i]];
+        const Vector3d half = half_extent(placed) + Vector3d::Constant(0.5 * envelope);
+        boxes_[i].min_ = placed.position - half;
+        boxes_[i].max_ = placed.position + half;
+    }
+    broad_phase_.overlaps(bounded_, boxes_, slack_, pairs_);
+    for (const std::int32_t plane : planes_) {
+        const Vector3d normal = placed_[plane].axis();
+        for (const std::int32_t shape : bounded_) {
+            const Placed& placed = placed_[shape];
+            if (normal.dot(placed.position - placed_[plane].position) - placed.solid->reach >= envelope) continue;
+            if (may_touch(plane, shape)) pairs_.emplace_back(std::min(plane, shape), std::max(plane, shape));
+        }
+    }
+    std::sort(pairs_.begin(), pairs_.end());
+    for (const auto& [a, b] : pairs_) {
+        const std::size_t first = contacts.size();
+        narrow_phase_.collide(placed_[a], placed_[b], envelope, contacts);
+        for (std::size_t i = first; i < contacts.size(); ++i) {
+            contacts[i].shape_a = a;
+            contacts[i].shape_b = b;
+        }
+    }
+}
+
+}  // namespace delassus::collision

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "collision/broad_phase.hpp"
+#include "collision/narrow_phase.hpp"
+
+namespace delassus::collision {
+
+class Detector : public CollisionDetector {
+public:
+    explicit Detector(CollisionSetup setup);
+    void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) override;
+
+private:
+    void place(std::span<const Pose> poses);
+    [[nodiscard]] bool may_touch(std::int32_t shape_a, std::int32_t shape_b) const;
+    [[nodiscard]] bool is_fixed(std::int32_t body) const;
+
+    CollisionSetup setup_;
+    std::vector<Solid> solids_;
+    std::vector<Matrix3d> local_rotations_;
+    std::vector<Placed> placed_;
+    std::vector<Matrix3d> body_rotations_;
+    std::vector<std::int32_t> bounded_;  ///< shapes that are not planes
+    std::vector<std::int32_t> planes_;
+    std::vector<BroadPhase::Box> boxes_;  ///< of bounded_
+    double slack_ = 0.0;                  ///< a tenth of the mean reach, m
+    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_;
+    BroadPhase broad_phase_;
+    NarrowPhase narrow_phase_;
+};
+
+}  // namespace delassus::collision

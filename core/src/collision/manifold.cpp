@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "collision/manifold.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "collision/feature.hpp"
+
+namespace delassus::collision {
+namespace {
+
+// A normal within this angle of a face's counts as the face's. The distances of a manifold are measured along the
+// face's own normal and are exact for it; against another normal they differ by half of the square of the angle.
+constexpr double kFlatAngle = 1e-3;
+// Features of a cylinder that its prism does not have: the ends of the generator (or rim points) that supports a
+// direction, and the generator.
+constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc;
+
+struct Edge {
+    Vector3d tail, head;
+    std::int32_t tail_vertex, head_vertex;
+};
+
+Vector3d rim_point(const Placed& placed, const Vector3d& direction, bool upper) {
+    const Vector3d axis = placed.axis();
+    Vector3d across = direction - axis.dot(direction) * axis;
+    across -= axis.dot(across) * axis;
+    return placed.solid->cylinder_radius * across.normalized() +
+           (upper ? placed.solid->half_length : -placed.solid->half_length) * axis;
+}
+
+/// The edges whose points all nearly support a direction.
+void edges_towards(const Placed& placed, const Vector3d& direction, std::vector<Edge>& edges) {
+    if (placed.is_cylinder()) {
+        if (std::abs(placed.axis().dot(direction)) < kFlatAngle)
+            edges.push_back(
+                {rim_point(placed, direction, false), rim_point(placed, direction, true), kLowerRim, kUpperRim});
+        return;
+    }
+    const double most = placed.support(direction).dot(direction);
+    for (std::size_t e = 0; e < placed.directions.size(); ++e) {
+        if (std::abs(placed.directions[e].dot(direction)) > kFlatAngle) continue;
+        const Polytope::Edge& edge = placed.solid->core.edges[e];
+        const Vector3d& tail = placed.vertices[edge.tail];
+        const Vector3d& head = placed.vertices[edge.head];
+        if (std::min(tail.dot(direction), head.dot(direction)) < most - kFlatAngle * (head - tail).norm()) continue;
+        edges.push_back({tail, head, edge.tail, edge.head});
+    }
+}
+
+}  // namespace
+
+std::uint32_t Manifold::feature(const Corner& corner, bool incident_is_a) {
+    const auto name = [&](FeatureKind of_a, FeatureKind of_b, std::int32_t vertex) {
+        return incident_is_a ? feature_id(of_a, static_cast<std::size_t>(vertex), 0)
+                             : feature_id(of_b, static_cast<std::size_t>(vertex), 0);
+    };
+    if (corner.vertex >= 0) return name(FeatureKind::VertexOfA, FeatureKind::VertexOfB, corner.vertex);
+    if (corner.other >= 0) return name(FeatureKind::VertexOfB, FeatureKind::VertexOfA, corner.other);
+    const auto edge = static_cast<std::size_t>(corner.edge), cut = static_cast<std::size_t>(corner.cut);
+    return feature_id(FeatureKind::Edges, incident_is_a ? edge : cut, incident_is_a ? cut : edge);
+}
+
+/// The face whose normal is a direction up to kFlatAngle, or −1.
+std::int32_t Manifold::face_towards(const Placed& placed, const Vector3d& direction) {
+    const auto count = static_cast<std::int32_t>(placed.normals.size());
+    std::int32_t best = -1;
+    double most = 1.0 - 0.5 * kFlatAngle * kFlatAngle;
+    for (std::int32_t f = placed.is_cylinder() ? count - 2 : 0; f < count; ++f) {
+        const double cosine = placed.normals[f].dot(direction);
+        if (cosine > most) {
+            most = cosine;
+            best = f;
+        }
+    }
+    return best;
+}
+
+/// The polygon, edge or vertex that faces a direction: of the faces at the vertices that support it, the most aligned.
+void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction) {
+    polygon_.clear();
+    const Polytope& core = placed.solid->core;
+    const auto put = [&](const Vector3d& point, std::int32_t vertex, std::int32_t leaving) {
+        polygon_.push_back({point, vertex, -1, -1, -1, leaving, -1});
+    };
+    if (placed.is_cylinder()) {
+        const double along = placed.axis().dot(direction);
+        if (std::abs(along) < std::sqrt(0.5)) {
+            put(rim_point(placed, direction, false), kLowerRim, kGenerator);
+            put(rim_point(placed, direction, true), kUpperRim, kGenerator);
+            return;
+        }
+        // Every third vertex of the cap, and among them the rim point furthest along the direction.
+        const Polytope::Face& cap = core.faces[core.faces.size() - (along > 0.0 ? 2 : 1)];
+        for (std::size_t i = 0; i < cap.loop.size(); i += 3)
+            put(placed.vertices[cap.loop[i]], cap.loop[i], cap.edges[i]);
+        if (placed.axis().cross(direction).norm() < 1e-12) return;
+        const Vector3d lowest = rim_point(placed, direction, along > 0.0);
+        std::size_t nearest = 0;
+        const auto to = [&](std::size_t i) { return (polygon_[i].point - lowest).squaredNorm(); };
+        for (std::size_t i = 1; i < polygon_.size(); ++i) {
+            if (to(i) < to(nearest)) nearest = i;
+        }
+        // It lies on the arc to the nearer neighbour of the nearest vertex.
+        const std::size_t count = polygon_.size();
+        const bool after = to((nearest + 1) % count) < to((nearest + count - 1) % count);
+        polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)),
+                        {lowest, along > 0.0 ? kUpperRim : kLowerRim, -1, -1, -1, kGenerator, -1});
+        return;
+    }
+    if (core.faces.empty()) {
+        for (std::int32_t i = 0; i < static_cast<std::int32_t>(placed.vertices.size()); ++i)
+            put(placed.vertices[i], i, 0);
+        return;
+    }
+    const double least = placed.support(direction).dot(direction) - 1e-9 * placed.solid->reach;
+    std::int32_t best = -1;
+    for (std::int32_t f = 0; f < static_cast<std::int32_t>(core.faces.size()); ++f) {
+        if (best >= 0 && placed.normals[f].dot(direction) <= placed.normals[best].dot(direction)) continue;
+        const auto& loop = core.faces[f].loop;
+        if (std::any_of(loop.begin(), loop.end(),
+                        [&](std::int32_t v) { return placed.vertices[v].dot(direction) >= least; }))
+            best = f;
+    }
+    const Polytope::Face& face = core.faces[best];
+    for (std::size_t i = 0; i < face.loop.size(); ++i) put(placed.vertices[face.loop[i]], face.loop[i], face.edges[i]);
+}
+
+/// Clips the polygon (Sutherland, Hodgman) against the sides of a face, which is at to_reference from the polygon's
+/// origin. Corners up to tolerance (m) outside are kept, so that flush faces keep their vertices.
+void Manifold::clip(const Placed& reference, std::int32_t face, const Vector3d& to_reference, double tolerance) {
+    const Polytope::Face& sides = reference.solid->core.faces[face];
+    const auto count = static_cast<std::int32_t>(sides.loop.size());
+    for (std::int32_t side = 0; side < count && !polygon_.empty(); ++side) {
+        const Vector3d tail = to_reference + reference.vertices[sides.loop[side]];
+        const Vector3d head = to_reference + reference.vertices[sides.loop[(side + 1) % count]];
+        const Vector3d outward = (head - tail).cross(reference.normals[face]).normalized();
+        clipped_.clear();
+        const std::size_t corners = polygon_.size();
+        for (std::size_t i = 0; i < corners; ++i) {
+            const Corner& from = polygon_[i];
+            const Corner& to = polygon_[(i + 1) % corners];
+            const double from_outside = outward.dot(from.point - tail);
+            const double to_outside = outward.dot(to.point - tail);
+            const bool from_in = from_outside <= tolerance, to_in = to_outside <= tolerance;
+            if (from_in) clipped_.push_back(from);
+            // A segment is not a closed polygon: it has one edge.
+            if (from_in == to_in || (corners == 2 && i == 1)) continue;
+            Corner corner;
+            corner.point = from.point + from_outside / (from_outside - to_outside) * (to.point - from.point);
+            if (from.leaving >= 0) {
+                corner.edge = from.leaving;
+                corner.cut = sides.edges[side];
+            } else {
+                // Two sides of the face meet at the vertex between them.
+                const bool first_and_last = side == count - 1 && from.leaving_cut == 0;
+                corner.other = sides.loop[first_and_last ? 0 : side];
+            }
+            if (to_in) {
+                corner.leaving = from.leaving;
+                corner.leaving_cut = from.leaving_cut;
+            } else {
+                corner.leaving_cut = side;
+            }
+            clipped_.push_back(corner);
+        }
+        polygon_.swap(clipped_);
+    }
+}
+
+bool Manifold::from_face(const Placed& reference, std::int32_t face, const Placed& incident,
+                         const Vector3d& to_incident, bool reference_is_a, double limit,
+                         std::vector<CorePoint>& points) {
+    const Vector3d& normal = reference.normals[face];
+    const double offset = reference.solid->core.faces[face].offset;
+    incident_polygon(incident, -normal);
+    clip(reference, face, -to_incident, 1e-7 * std::min(reference.solid->reach, incident.solid->reach));
+    const Vector3d origin = reference_is_a ? Vector3d::Zero() : Vector3d(-to_incident);
+    for (const Corner& corner : polygon_) {
+        const Vector3d at = to_incident + corner.point;
+        const double distance = normal.dot(at) - offset;
+        if (distance >= limit) continue;
+        CorePoint point;
+        point.distance = distance;
+        point.normal = reference_is_a ? normal : Vector3d(-normal);
+        const Vector3d on_incident = origin + at, on_reference = on_incident - distance * normal;
+        point.point_a = reference_is_a ? on_reference : on_incident;
+        point.point_b = reference_is_a ? on_incident : on_reference;
+        point.feature = feature(corner, !reference_is_a);
+        points.push_back(point);
+    }
+    return !points.empty();
+}
+
+/// Two nearly parallel edges that overlap: the ends of the overlap, both measured along the nearest normal.
+bool Manifold::from_edges(const Placed& a, const Placed& b, const Vector3d& offset, const Separation& nearest,
+                          double limit, std::vector<CorePoint>& points) {
+    std::vector<Edge> edges_a, edges_b;
+    edges_towards(a, nearest.normal, edges_a);
+    if (edges_a.empty()) return false;
+    edges_towards(b, -nearest.normal, edges_b);
+    for (const Edge& ea : edges_a) {
+        const Vector3d along_a = ea.head - ea.tail;
+        const double length = along_a.norm();
+        const Vector3d u = along_a / length;
+        for (const Edge& eb : edges_b) {
+            const Vector3d tail = offset + eb.tail, along_b = eb.head - eb.tail;
+            if (u.cross(along_b).norm() > kFlatAngle * along_b.norm()) continue;
+            // Parameters along u, from the tail of a's edge.
+            const double b_tail = u.dot(tail - ea.tail), slope = u.dot(along_b), b_head = b_tail + slope;
+            const bool forward = slope > 0.0;
+            const double b_low = forward ? b_tail : b_head, b_high = forward ? b_head : b_tail;
+            const double low = std::max(0.0, b_low), high = std::min(length, b_high);
+            if (high - low < kFlatAngle * std::min(length, std::abs(slope))) continue;
+            for (const bool lower : {true, false}) {
+                const double at = lower ? low : high;
+                const bool of_a = lower ? b_low <= 0.0 : b_high >= length;
+                CorePoint point;
+                point.normal = nearest.normal;
+                point.point_a = ea.tail + at * u;
+                point.point_b = tail + (at - b_tail) / slope * along_b;
+                point.distance = point.normal.dot(point.point_b - point.point_a);
+                const std::int32_t vertex_a = lower ? ea.tail_vertex : ea.head_vertex;
+                const std::int32_t vertex_b = lower == forward ? eb.tail_vertex : eb.head_vertex;
+                point.feature = of_a ? feature_id(FeatureKind::VertexOfA, static_cast<std::size_t>(vertex_a), 0)
+                                     : feature_id(FeatureKind::VertexOfB, static_cast<std::size_t>(vertex_b), 0);
+                if (point.distance < limit) points.push_back(point);
+            }
+            return !points.empty();
+        }
+    }
+    return false;
+}
+
+// Points nearer to each other than a thousandth of the patch say the same: the one with the lower feature stays. Of too
+// many, the deepest is taken first, then always the one furthest from those taken; of equals the lower feature.
+void Manifold::reduce(std::vector<CorePoint>& points) {
+    std::sort(points.begin(), points.end(),
+              [](const CorePoint& p, const CorePoint& q) { return p.feature < q.feature; });
+    double patch = 0.0;
+    for (const CorePoint& point : points) patch = std::max(patch, (point.point_a - points[0].point_a).norm());
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        bool near = false;
+        for (std::size_t j = 0; j < kept; ++j) {
+            near = near || points[i].feature == points[j].feature ||
+                   (points[i].point_a - points[j].point_a).norm() <= 1e-3 * patch;
+        }
+        if (!near) points[kept++] = points[i];
+    }
+    points.resize(kept);
+    if (kept <= kMostPoints) return;
+    std::vector<double> far(kept, std::numeric_limits<double>::infinity());
+    std::vector<CorePoint> chosen;
+    std::size_t next = 0;
+    for (std::size_t i = 1; i < kept; ++i) {
+        if (points[i].distance < points[next].distance) next = i;
+    }
+    while (chosen.size() < kMostPoints) {
+        chosen.push_back(points[next]);
+        for (std::size_t i = 0; i < kept; ++i)
+            far[i] = std::min(far[i], (points[i].point_a - chosen.back().point_a).squaredNorm());
+        next = static_cast<std::size_t>(std::max_element(far.begin(), far.end()) - far.begin());
+    }
+    std::sort(chosen.begin(), chosen.end(),
+              [](const CorePoint& p, const CorePoint& q) { return p.feature < q.feature; });
+    points.swap(chosen);
+}
+
+void Manifold::between(Placed& a, Placed& b, const Vector3d& offset, const Separation& nearest, double limit,
+                       std::vector<CorePoint>& points) {
+    points.clear();
+    const std::int32_t face_a = face_towards(a, nearest.normal);
+    const std::int32_t face_b = face_towards(b, -nearest.normal);
+    bool found = false;
+    // The face that is more aligned is the reference, up to rounding that of a.
+    if (face_b >= 0 &&
+        (face_a < 0 || -b.normals[face_b].dot(nearest.normal) > a.normals[face_a].dot(nearest.normal) + 1e-14)) {
+        found = from_face(b, face_b, a, -offset, false, limit, points);
+    } else if (face_a >= 0) {
+        found = from_face(a, face_a, b, offset, true, limit, points);
+    }
+    if (!found) found = from_edges(a, b, offset, nearest, limit, points);
+    const auto deeper = [&](const CorePoint& point) {
+        return point.distance <= nearest.distance + 1e-10 * (a.solid->reach + b.solid->reach);
+    };
+    // The sampled cap of a cylinder may miss the nearest point.
+    const bool sampled = a.is_cylinder() || b.is_cylinder();
+    if (!found || (sampled && std::none_of(points.begin(), points.end(), deeper))) points.push_back(nearest);
+    reduce(points);
+}
+
+void Manifold::on_plane(Placed& other, const Vector3d& point, const Vector3d& normal, bool plane_is_a, double limit,
+                        std::vector<CorePoint>& points) {
+    points.clear();
+    other.rotate_core();
+    incident_polygon(other, -normal);
+    for (const Corner& corner : polygon_) {
+        const double distance = normal.dot(corner.point - point);
+        if (distance >= limit) continue;
+        CorePoint result;
+        result.distance = distance;
+        result.normal = plane_is_a ? normal : Vector3d(-normal);
+        const Vector3d foot = corner.point - distance * normal;
+        result.point_a = plane_is_a ? foot : corner.point;
+        result.point_b = plane_is_a ? corner.point : foot;
+        result.feature = feature(corner, !plane_is_a);
+        points.push_back(result);
+    }
+    reduce(points);
+}
+
+}  // namespace delassus::collision

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+
+#include "collision/feature.hpp"
+#include "collision/separation.hpp"
+
+namespace delassus::collision {
+namespace {
+
+/// The best face of first against second; sign −1 if first is b.
+void face_axes(const Placed& first, const Placed& second, const Vector3d& to_second, double sign, double preference,
+               Separation& best) {
+    for (std::size_t f = 0; f < first.normals.size(); ++f) {
+        const Vector3d& normal = first.normals[f];
+        double least = std::numeric_limits<double>::infinity();
+        std::size_t nearest = 0;
+        for (std::size_t i = 0; i < second.vertices.size(); ++i) {
+            const double value = normal.dot(second.vertices[i]);
+            if (value < least) {
+                least = value;
+                nearest = i;
+            }
+        }
+        const double distance = least + normal.dot(to_second) - first.solid->core.faces[f].offset;
+        if (distance <= best.distance + preference) continue;
+        best.distance = distance;
+        best.normal = sign * normal;
+        const Vector3d vertex = second.vertices[nearest];
+        if (sign > 0.0) {
+            best.point_b = to_second + vertex;
+            best.point_a = best.point_b - distance * normal;
+            best.feature = feature_id(FeatureKind::VertexOfB, nearest, 0);
+        } else {
+            best.point_a = vertex;
+            best.point_b = vertex - to_second - distance * normal;
+            best.point_b += to_second;
+            best.feature = feature_id(FeatureKind::VertexOfA, nearest, 0);
+        }
+    }
+}
+
+// Two edges make a face of the difference of the polytopes where their arcs on the sphere of normals cross: the arc of
+// an edge of A joins the normals of its faces, that of B the opposite normals. A segment's arc is the full circle.
+bool arcs_cross(const Placed& a, const Polytope::Edge& edge_a, const Vector3d& direction_a, const Placed& b,
+                const Polytope::Edge& edge_b, const Vector3d& direction_b) {
+    double m1 = 0.0, m2 = 0.0, n1 = 0.0, n2 = 0.0;
+    if (edge_b.left >= 0) {
+        m1 = b.normals[edge_b.left].dot(direction_a);
+        m2 = b.normals[edge_b.right].dot(direction_a);
+        if (m1 * m2 >= 0.0) return false;
+    }
+    if (edge_a.left >= 0) {
+        n1 = -a.normals[edge_a.left].dot(direction_b);
+        n2 = -a.normals[edge_a.right].dot(direction_b);
+        if (n1 * n2 >= 0.0) return false;
+    }
+    return edge_a.left < 0 || edge_b.left < 0 || m1 * n2 > 0.0;
+}
+
+void edge_axes(const Placed& a, const Placed& b, const Vector3d& offset, double preference, Separation& best) {
+    const Polytope& core_a = a.solid->core;
+    const Polytope& core_b = b.solid->core;
+    for (std::size_t i = 0; i < core_a.edges.size(); ++i) {
+        const Polytope::Edge& edge_a = core_a.edges[i];
+        for (std::size_t j = 0; j < core_b.edges.size(); ++j) {
+            const Polytope::Edge& edge_b = core_b.edges[j];
+            if (!arcs_cross(a, edge_a, a.directions[i], b, edge_b, b.directions[j])) continue;
+            Vector3d normal = a.directions[i].cross(b.directions[j]);
+            const double sine = normal.norm();
+            if (sine < 1e-8) continue;
+            normal /= sine;
+            const Vector3d between = offset + b.vertices[edge_b.tail] - a.vertices[edge_a.tail];
+            double side = normal.dot(between);
+            if (edge_a.left >= 0) {
+                side = normal.dot(a.normals[edge_a.left] + a.normals[edge_a.right]);
+            } else if (edge_b.left >= 0) {
+                side = -normal.dot(b.normals[edge_b.left] + b.normals[edge_b.right]);
+            }
+            if (side < 0.0) normal = -normal;
+            const double distance = normal.dot(between);
+            if (distance <= best.distance + preference) continue;
+            best.distance = distance;
+            best.normal = normal;
+            nearest_of_segments(a.vertices[edge_a.tail], a.vertices[edge_a.head] - a.vertices[edge_a.tail],
+                                offset + b.vertices[edge_b.tail], b.vertices[edge_b.head] - b.vertices[edge_b.tail],
+                                best.point_a, best.point_b);
+            best.feature = feature_id(FeatureKind::Edges, i, j);
+        }
+    }
+}
+
+}  // namespace
+
+// The faces of the difference B − A are those of A, those of B, and the pairs of edges whose arcs cross. In penetration
+// the best of them is the answer. Apart, it is the answer unless the nearest features are vertices, or a vertex and an
+// edge; then it is less than the distance, which GJK finds.
+std::optional<Separation> polytope_separation(Placed& a, Placed& b, const Vector3d& offset, double limit) {
+    a.rotate_core();
+    b.rotate_core();
+    // Equal up to rounding, faces go before edges and those of a before those of b.
+    const double rounding = 1e-14 * (a.solid->reach + b.solid->reach);
+    Separation best;
+    best.distance = -std::numeric_limits<double>::infinity();
+    face_axes(a, b, offset, 1.0, rounding, best);
+    if (best.distance > limit) return std::nullopt;
+    face_axes(b, a, -offset, -1.0, rounding, best);
+    if (best.distance > limit) return std::nullopt;
+    edge_axes(a, b, offset, rounding, best);
+    if (best.distance > limit) return std::nullopt;
+    if (best.distance <= 0.0 && !(a.normals.empty() && b.normals.empty())) return best;
+    if (auto apart = gjk(a, b, offset); apart && apart->distance > best.distance + 10.0 * rounding) {
+        if (apart->distance > limit) return std::nullopt;
+        apart->feature = feature_id(FeatureKind::Nearest, 0, 0);
+        return apart;
+    }
+    return best;
+}
+
+}  // namespace delassus::collision

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Sections that a configuration and a scene have in common.
+#pragma once
+
+#include "config/yaml_reader.hpp"
+#include "delassus/config.hpp"
+#include "delassus/export.hpp"
+
+namespace delassus {
+
+/// The "options" map of a solver or an integrator.
+DELASSUS_API OptionTexts read_options(const Source& source, const YAML::Node& node);
+
+/// The "solver" section: a name, or a map.
+DELASSUS_API SolverConfig read_solver(const Source& source, const YAML::Node& node);
+
+/// "name" or "name(key=value,key=value)"; what names the thing in messages. Throws InputError.
+struct NameWithOptions {
+    std::string name;
+    OptionTexts options;
+};
+DELASSUS_API NameWithOptions parse_name_with_options(std::string_view text, std::string_view what);
+
+}  // namespace delassus

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/dynamical_system.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "delassus/error.hpp"
+
+namespace delassus {
+
+void UnilateralRows::clear() {
+    blocks_.clear();
+    rows_.clear();
+    entries_.clear();
+    row_start_.assign(1, 0);
+    rows_in_blocks_ = 0;
+}
+
+void UnilateralRows::end_row(double gap, double rate) {
+    rows_.push_back({gap, rate});
+    row_start_.push_back(static_cast<std::int32_t>(entries_.size()));
+}
+
+void UnilateralRows::end_block(Cone cone, std::uint64_t key, double restitution) {
+    const auto given = static_cast<std::int32_t>(rows_.size() - rows_in_blocks_);
+    if (given != cone.rows)
+        throw InputError(fmt::format("a block of {} rows was given a cone of {}", given, cone.rows));
+    rows_in_blocks_ = rows_.size();
+    blocks_.push_back({std::move(cone), restitution, key});
+}
+
+DynamicalSystem::~DynamicalSystem() = default;
+
+std::int32_t DynamicalSystem::position_size() const {
+    return n();
+}
+std::vector<std::int32_t> DynamicalSystem::constraint_blocks() const {
+    return {};
+}
+std::int32_t DynamicalSystem::m() const {
+    const auto blocks = constraint_blocks();
+    return std::accumulate(blocks.begin(), blocks.end(), 0);
+}
+
+void DynamicalSystem::increment(const double* q, const double* delta, double* result) const {
+    for (std::int32_t i = 0; i < n(); ++i) result[i] = q[i] + delta[i];
+}
+void DynamicalSystem::difference(const double* from, const double* to, double* delta) const {
+    for (std::int32_t i = 0; i < n(); ++i) delta[i] = to[i] - from[i];
+}
+void DynamicalSystem::inverse_tangent(const double*, std::vector<DiagonalBlock3>& blocks) const {
+    blocks.clear();
+}
+
+void DynamicalSystem::add_stiffness(const State&, double, Tangent, MatrixAssembler&) const {}
+void DynamicalSystem::add_damping(const State&, double, Tangent, MatrixAssembler&) const {}
+void DynamicalSystem::add_inertial_stiffness(const State&, const double*, double, Tangent, MatrixAssembler&) const {}
+bool DynamicalSystem::has_stiffness() const {
+    return true;
+}
+
+void DynamicalSystem::constraint(const State&, double*) const {}
+void DynamicalSystem::add_constraint_jacobian(const State&, std::int32_t, MatrixAssembler&) const {}
+void DynamicalSystem::constraint_rate(const State&, double* C_t) const {
+    std::fill_n(C_t, m(), 0.0);
+}
+void DynamicalSystem::constraint_curvature(const State&, double* c) const {
+    std::fill_n(c, m(), 0.0);
+}
+void DynamicalSystem::add_constraint_stiffness(const State&, const double*, double, Tangent, MatrixAssembler&) const {}
+
+bool DynamicalSystem::has_unilateral() const {
+    return false;
+}
+void DynamicalSystem::collect_unilateral(const State&, double, UnilateralRows& rows) {
+    rows.clear();
+}
+double DynamicalSystem::energy(const State&) const {
+    return std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace delassus

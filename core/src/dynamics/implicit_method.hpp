@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The implicit one-step methods of integrators/ have one form, and differ in six numbers (internal).
+#pragma once
+
+#include "dynamics/newton.hpp"
+
+namespace delassus {
+
+/// An implicit method for M v̇ = f + C_qᵀ λ, C = 0, all of it at the end of the step:
+///
+///     Δ = h v_n + h² (position_old a_n + position_new a_{n+1}),          q_{n+1} = q_n ∘ exp(Δ)
+///     v_{n+1} = v_n + h (velocity_old a_n + velocity_new a_{n+1})
+///     (1 − alpha_m) a_{n+1} + alpha_m a_n = (1 − alpha_f) v̇_{n+1} + alpha_f v̇_n
+///
+/// a is the algorithmic acceleration, v̇ the one that fits the forces. velocity_new, position_new, 1 − alpha_m and
+/// 1 − alpha_f are positive.
+struct ImplicitCoefficients {
+    double position_old = 0.0, position_new = 1.0;
+    double velocity_old = 0.0, velocity_new = 1.0;
+    double alpha_m = 0.0, alpha_f = 0.0;
+
+    /// Newmark's two: β and γ.
+    static ImplicitCoefficients newmark(double gamma, double beta) {
+        return {0.5 - beta, beta, 1.0 - gamma, gamma, 0.0, 0.0};
+    }
+
+    /// Whether accelerations of the step before enter: the first step then needs consistent ones.
+    [[nodiscard]] bool remembers() const {
+        return position_old != 0.0 || velocity_old != 0.0 || alpha_m != 0.0 || alpha_f != 0.0;
+    }
+};
+
+class ImplicitMethod : public Timestepper {
+public:
+    /// system outlives it.
+    ImplicitMethod(DynamicalSystem& system, ImplicitCoefficients coefficients, NewtonSettings settings);
+
+    StepReport step(State& state, double h, StepSolver& solver) override;
+    void restart() override;
+    [[nodiscard]] std::vector<double> save() const override;
+    void load(const std::vector<double>& memory) override;
+
+private:
+    [[nodiscard]] StepPoint steady(const State& begin, double h, const Vector& lambda) const;
+    [[nodiscard]] StepPoint resting(const State& begin, double h, StepSlopes slopes, const Vector& lambda) const;
+
+    DynamicalSystem& system_;
+    std::string method_;
+    ImplicitCoefficients c_;
+    Accelerations accelerations_;
+    Newton newton_;
+    std::int32_t n_, m_;
+    bool started_ = false;
+    Vector v_dot_, a_;  // v̇_n and a_n
+};
+
+}  // namespace delassus

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/matrix_assembler.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "delassus/error.hpp"
+
+namespace delassus {
+
+void MatrixAssembler::begin(std::int32_t rows, std::int32_t columns) {
+    repeats_ = matrix_.rows == rows && matrix_.columns == columns;
+    matrix_.rows = rows;
+    matrix_.columns = columns;
+    count_ = 0;
+}
+
+const SparseMatrix& MatrixAssembler::finish() {
+    if (repeats_ && count_ == slot_.size()) {
+        std::fill(matrix_.value.begin(), matrix_.value.end(), 0.0);
+        for (std::size_t k = 0; k < count_; ++k) matrix_.value[static_cast<std::size_t>(slot_[k])] += values_[k];
+        return matrix_;
+    }
+    places_.resize(count_);
+    values_.resize(count_);
+    for (const Place& place : places_)
+        if (place.row < 0 || place.row >= matrix_.rows || place.column < 0 || place.column >= matrix_.columns)
+            throw InputError(fmt::format("a matrix of {} x {} was given an entry at ({}, {})", matrix_.rows,
+                                         matrix_.columns, place.row, place.column));
+    std::vector<std::int32_t> order(count_);
+    std::iota(order.begin(), order.end(), 0);
+    const auto at = [&](std::int32_t k) -> const Place& { return places_[static_cast<std::size_t>(k)]; };
+    std::stable_sort(order.begin(), order.end(), [&](std::int32_t first, std::int32_t second) {
+        return at(first).row != at(second).row ? at(first).row < at(second).row : at(first).column < at(second).column;
+    });
+    slot_.resize(count_);
+    matrix_.row_start.assign(static_cast<std::size_t>(matrix_.rows) + 1, 0);
+    matrix_.column.clear();
+    matrix_.value.clear();
+    for (std::size_t k = 0; k < count_; ++k) {
+        if (k == 0 || !(at(order[k]) == at(order[k - 1]))) {
+            matrix_.column.push_back(at(order[k]).column);
+            matrix_.value.push_back(0.0);
+            ++matrix_.row_start[static_cast<std::size_t>(at(order[k]).row) + 1];
+        }
+        slot_[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(matrix_.value.size()) - 1;
+        matrix_.value.back() += values_[static_cast<std::size_t>(order[k])];
+    }
+    std::partial_sum(matrix_.row_start.begin(), matrix_.row_start.end(), matrix_.row_start.begin());
+    ++patterns_;
+    return matrix_;
+}
+
+}  // namespace delassus

@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/newton.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace delassus {
+
+// ---- The equations ----
+//
+// At the end of a step the position is q = q_n ∘ exp(Δ), and velocity and acceleration are affine in Δ,
+// v = v₀ + γ′Δ, v̇ = v̇₀ + β′Δ. Sought are Δ and λ with
+//
+//     r = M(q) v̇ − f(q, v, t) − C_q(q)ᵀ λ = 0,      C(q, t) = 0
+//
+// Newton's unknown x is an increment of the position itself, q ← q ∘ exp(x). Then C changes by C_q x, and D = C_q is
+// the Jacobian that carries λ too. As exp(Δ + T⁻¹(Δ)x) = exp(Δ) ∘ exp(x) to first order, Δ changes by T⁻¹x, v by
+// γ′T⁻¹x, v̇ by β′T⁻¹x, and with K = −∂f/∂q, R = −∂f/∂v
+//
+//     H x − Dᵀ δλ = −r,   D x = −C,      H = K + ∂(M v̇)/∂q − ∂(C_qᵀ λ)/∂q + (γ′ R + β′ M) T⁻¹
+//
+// (seed eq. 197 ff., whose sign of λ is the opposite one). H grows like β′ ~ 1/h², and the condition of the matrix
+// like h⁻⁴. Multiplied by s = 1/β′,
+//
+//     [s H  −Dᵀ; D  0] {x; s δλ} = {−s r; −C}
+//
+// tends to [M −Dᵀ; D 0] as h → 0 (Bottasso, Dopico, Trainelli, Multibody System Dynamics 19, 2008: optimal scaling of
+// index-3 problems).
+
+Newton::Newton(DynamicalSystem& system, NewtonSettings settings)
+    : system_(system), settings_(std::move(settings)), cones_(free_cones(system)), n_(system.n()), m_(system.m()) {}
+
+const SparseMatrix& Newton::jacobian(const State& state) {
+    D_.begin(m_, n_);
+    if (m_ > 0) system_.add_constraint_jacobian(state, 0, D_);
+    return D_.finish();
+}
+
+bool Newton::evaluate(const State& begin, StepPoint& point, StepResidual& residual) {
+    system_.increment(begin.q.data(), point.delta.data(), point.state.q.data());
+    residual.inertia.setZero(n_);
+    residual.force.setZero(n_);
+    residual.reaction.setZero(n_);
+    residual.constraint.setZero(m_);
+    system_.multiply_mass(point.state, 1.0, point.acceleration.data(), residual.inertia.data());
+    system_.add_force(point.state, 1.0, residual.force.data());
+    if (m_ > 0) {
+        jacobian(point.state).transpose_multiply_add(1.0, point.lambda.data(), residual.reaction.data());
+        system_.constraint(point.state, residual.constraint.data());
+    }
+    residual.balance = residual.inertia - residual.force - residual.reaction;
+    return residual.balance.allFinite() && residual.constraint.allFinite();
+}
+
+namespace {
+
+/// target += matrix · T⁻¹, T⁻¹ being the identity but for the blocks.
+void add_product(const SparseMatrix& matrix, const std::vector<DiagonalBlock3>& blocks, MatrixAssembler& target) {
+    std::vector<std::int32_t> block_of(static_cast<std::size_t>(matrix.columns), -1);
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+        for (std::int32_t k = 0; k < 3; ++k)
+            block_of[static_cast<std::size_t>(blocks[b].first + k)] = static_cast<std::int32_t>(b);
+    for (std::int32_t row = 0; row < matrix.rows; ++row) {
+        const auto end = static_cast<std::size_t>(matrix.row_start[static_cast<std::size_t>(row) + 1]);
+        for (auto e = static_cast<std::size_t>(matrix.row_start[static_cast<std::size_t>(row)]); e < end; ++e) {
+            const auto column = matrix.column[e];
+            const auto b = block_of[static_cast<std::size_t>(column)];
+            if (b < 0) {
+                target.add(row, column, matrix.value[e]);
+                continue;
+            }
+            const auto& block = blocks[static_cast<std::size_t>(b)];
+            const double* factors = block.value + 3 * (column - block.first);
+            for (std::int32_t k = 0; k < 3; ++k) target.add(row, block.first + k, matrix.value[e] * factors[k]);
+        }
+    }
+}
+
+bool finite(const SparseMatrix& A) {
+    return std::all_of(A.value.begin(), A.value.end(), [](double value) { return std::isfinite(value); });
+}
+
+/// ½(A + Aᵀ)
+SparseMatrix symmetric_part(const SparseMatrix& A) {
+    std::vector<Triplet> triplets;
+    triplets.reserve(2 * A.value.size());
+    for (std::int32_t row = 0; row < A.rows; ++row) {
+        const auto end = static_cast<std::size_t>(A.row_start[static_cast<std::size_t>(row) + 1]);
+        for (auto e = static_cast<std::size_t>(A.row_start[static_cast<std::size_t>(row)]); e < end; ++e) {
+            triplets.push_back({row, A.column[e], 0.5 * A.value[e]});
+            triplets.push_back({A.column[e], row, 0.5 * A.value[e]});
+        }
+    }
+    return SparseMatrix::from_triplets(A.rows, A.columns, std::move(triplets));
+}
+
+}  // namespace
+
+const SparseMatrix& Newton::matrix(const StepPoint& point, StepSlopes slopes) {
+    const Tangent tangent = settings_.exact ? Tangent::Exact : Tangent::Symmetric;
+    const double s = 1.0 / slopes.beta;
+    rates_.begin(n_, n_);
+    system_.add_mass(point.state, 1.0, rates_);
+    if (system_.has_stiffness()) system_.add_damping(point.state, s * slopes.gamma, tangent, rates_);
+    system_.inverse_tangent(point.delta.data(), blocks_);
+    H_.begin(n_, n_);
+    add_product(rates_.finish(), blocks_, H_);
+    if (system_.has_stiffness()) system_.add_stiffness(point.state, s, tangent, H_);
+    system_.add_inertial_stiffness(point.state, point.acceleration.data(), s, tangent, H_);
+    if (m_ > 0) system_.add_constraint_stiffness(point.state, point.lambda.data(), -s, tangent, H_);
+    return H_.finish();
+}
+
+void Newton::assemble(const StepPoint& point, StepSlopes slopes) {
+    const SparseMatrix& H = matrix(point, slopes);
+    kept_.H = settings_.exact ? H : symmetric_part(H);
+    kept_.D = jacobian(point.state);
+    kept_.slopes = slopes;
+    kept_.valid = true;
+    scale();
+}
+
+// ---- Norms ----
+//
+// With the rows scaled by 1/√H_ii, the columns by √H_ii, and a constraint's row by 1/√(D diag(H)⁻¹ Dᵀ)_jj, all parts of
+// residual and increment are in one unit, √mass · length, whatever units the coordinates have; and where H is nearly
+// diagonal, the norm of the residual is that of the increment that removes it. The measure for both is the way σ that
+// the step goes: the largest of ‖Δ‖, h‖v_n‖, s‖M v̇‖, s‖f‖, s‖C_qᵀλ‖ in this norm. An iteration that takes the residual
+// from ρ₋ to ρ by an increment x contracts by θ = ρ/ρ₋, and leaves an error of about θ/(1 − θ) ‖x‖. Converged is
+//
+//     ρ ≤ tolerance · σ + 10 ε ‖q‖_∞ ‖√diag H‖    and    min(1, θ/(1 − θ)) ‖x‖ ≤ the same
+//
+// where the second term is the change of an increment by the last digits of the positions.
+
+void Newton::scale() {
+    root_.setZero(n_);
+    const auto& H = kept_.H;
+    for (std::int32_t i = 0; i < n_; ++i) {
+        double diagonal = 0.0, largest = 0.0;
+        for (auto e = H.row_start[static_cast<std::size_t>(i)]; e < H.row_start[static_cast<std::size_t>(i) + 1]; ++e) {
+            const double value = std::abs(H.value[static_cast<std::size_t>(e)]);
+            if (H.column[static_cast<std::size_t>(e)] == i) diagonal = value;
+            largest = std::max(largest, value);
+        }
+        // A diagonal that is lost in its row (a saddle in H) says nothing about the size of the row.
+        const double size = diagonal > 1e-8 * largest ? diagonal : largest;
+        root_[i] = size > 0.0 ? std::sqrt(size) : 1.0;
+    }
+    row_scale_.setOnes(m_);
+    const auto& D = kept_.D;
+    for (std::int32_t j = 0; j < m_; ++j) {
+        double sum = 0.0;
+        for (auto e = D.row_start[static_cast<std::size_t>(j)]; e < D.row_start[static_cast<std::size_t>(j) + 1]; ++e) {
+            const double value = D.value[static_cast<std::size_t>(e)] / root_[D.column[static_cast<std::size_t>(e)]];
+            sum += value * value;
+        }
+        if (sum > 0.0) row_scale_[j] = 1.0 / std::sqrt(sum);
+    }
+}
+
+double Newton::merit(const StepResidual& residual, double s) const {
+    return std::hypot(s * residual.balance.cwiseQuotient(root_).norm(),
+                      residual.constraint.cwiseProduct(row_scale_).norm());
+}
+
+// ---- The iteration ----
+
+void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
+                   StepSolver& solver, StepReport& report) {
+    const double s = 1.0 / slopes.beta;
+    const auto fail = [&](const std::string& why) {
+        kept_.valid = false;
+        throw StepFailure(fmt::format("{} cannot take the step from t = {:.9g} with h = {:.9g}: {}", settings_.method,
+                                      begin.t, h, why));
+    };
+    bool renew = !(kept_.valid && settings_.reuse == Reuse::Adaptive && kept_.slopes.beta == slopes.beta &&
+                   kept_.slopes.gamma == slopes.gamma);
+    if (!renew) scale();
+    // What a solver says of an increment is settled by Newton's own convergence. Constraints that repeat each other,
+    // for one, contradict each other in an increment by terms of second order, which a solver calls infeasible.
+    const bool solved_before = report.solved;
+    const std::string message_before = report.message;
+    StepPoint trial = point;
+    StepResidual trial_residual;
+    double rho = 0.0, threshold = 0.0;
+    for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
+        if (renew) assemble(point, slopes);
+        const bool fresh = renew;
+        rho = merit(residual, s);
+        if (!std::isfinite(rho) || !finite(kept_.H) || !finite(kept_.D))
+            fail("the residual or its Jacobian is not finite");
+
+        Problem problem;
+        problem.H = kept_.H;
+        problem.D = kept_.D;
+        problem.a.resize(static_cast<std::size_t>(n_));
+        Eigen::Map<Vector>(problem.a.data(), n_) = -s * residual.balance;
+        problem.b.assign(residual.constraint.begin(), residual.constraint.end());
+        problem.cones = cones_;
+        const LinearSolution increment = solve_linear(std::move(problem), solver, report);
+        const Vector &x = increment.x, &lambda = increment.lambda;
+        if (!x.allFinite() || !lambda.allFinite()) fail("the increment is not finite");
+        system_.inverse_tangent(point.delta.data(), blocks_);
+        const Vector direction = multiply_blocks(blocks_, x);
+
+        // The full step as a rule; halved while the residual would not fall.
+        double part = 1.0, trial_rho = 0.0;
+        const auto move = [&] {
+            trial.delta = point.delta + part * direction;
+            trial.acceleration = point.acceleration + part * slopes.beta * direction;
+            Eigen::Map<Vector>(trial.state.v.data(), n_) =
+                Eigen::Map<const Vector>(point.state.v.data(), n_) + part * slopes.gamma * direction;
+            trial.lambda = point.lambda + part / s * lambda;
+            trial_rho = evaluate(begin, trial, trial_residual) ? merit(trial_residual, s)
+                                                               : std::numeric_limits<double>::infinity();
+        };
+        move();
+        const auto size = [&](const Vector& motion) { return motion.cwiseProduct(root_).norm(); };
+        const auto force_size = [&](const Vector& force) { return s * force.cwiseQuotient(root_).norm(); };
+        const Eigen::Map<const Vector> q(trial.state.q.data(), static_cast<Eigen::Index>(trial.state.q.size()));
+        const double sigma = std::max({size(trial.delta), h * size(Eigen::Map<const Vector>(begin.v.data(), n_)),
+                                       force_size(trial_residual.inertia), force_size(trial_residual.force),
+                                       force_size(trial_residual.reaction)});
+        const double digits =
+            n_ > 0 ? 10.0 * std::numeric_limits<double>::epsilon() * q.lpNorm<Eigen::Infinity>() * root_.norm() : 0.0;
+        threshold = settings_.tolerance * sigma + digits;
+        if (settings_.linearized) {
+            if (!std::isfinite(trial_rho)) fail("the end of the step is not finite");
+            point = trial;
+            return;
+        }
+        constexpr double shortest = 1.0 / 64.0;
+        const auto falls = [&] { return trial_rho <= threshold || trial_rho <= (1.0 - 1e-4 * part) * rho; };
+        while (!falls() && part > shortest) {
+            part *= 0.5;
+            move();
+        }
+        if (!falls()) {
+            // A direction from an old or a symmetric matrix need not be one of descent. With an old one try again with
+            // a new one; else go the whole way, as Newton's method without a search would.
+            if (!fresh) {
+                renew = true;
+                continue;
+            }
+            part = 1.0;
+            move();
+            if (!std::isfinite(trial_rho)) fail("no part of Newton's increment leads to a finite residual");
+        }
+        std::swap(point, trial);
+        std::swap(residual, trial_residual);
+        const double theta = trial_rho / rho;
+        const double rest = (theta < 0.5 ? theta / (1.0 - theta) : 1.0) * part * size(x);
+        rho = trial_rho;
+        if (rho <= threshold && rest <= threshold) {
+            report.solved = solved_before;
+            report.message = message_before;
+            return;
+        }
+        renew = settings_.reuse == Reuse::Full || theta > (settings_.reuse == Reuse::Modified ? 0.5 : 0.1);
+    }
+    fail(
+        fmt::format("after {} iterations of Newton's method the scaled residual is {:.1e}, where {:.1e} is asked for; "
+                    "a smaller step{} may help",
+                    settings_.max_iterations, rho, threshold, settings_.exact ? "" : " or jacobian: exact"));
+}
+
+// ---- Memory ----
+
+namespace {
+
+void put(std::vector<double>& memory, const SparseMatrix& matrix) {
+    memory.insert(memory.end(), {static_cast<double>(matrix.rows), static_cast<double>(matrix.columns),
+                                 static_cast<double>(matrix.entries())});
+    memory.insert(memory.end(), matrix.row_start.begin(), matrix.row_start.end());
+    memory.insert(memory.end(), matrix.column.begin(), matrix.column.end());
+    memory.insert(memory.end(), matrix.value.begin(), matrix.value.end());
+}
+
+const double* get(const double* next, const double* end, SparseMatrix& matrix) {
+    const auto take = [&](std::size_t count) {
+        if (static_cast<std::size_t>(end - next) < count) throw InputError("a timestepper's memory is too short");
+        next += count;
+        return next - count;
+    };
+    const auto integer = [](double value) { return static_cast<std::int32_t>(value); };
+    const double* sizes = take(3);
+    matrix.rows = integer(sizes[0]);
+    matrix.columns = integer(sizes[1]);
+    const auto rows = static_cast<std::size_t>(matrix.rows) + 1, entries = static_cast<std::size_t>(sizes[2]);
+    matrix.row_start.resize(rows);
+    const double* starts = take(rows);
+    std::transform(starts, starts + rows, matrix.row_start.begin(), integer);
+    matrix.column.resize(entries);
+    const double* columns = take(entries);
+    std::transform(columns, columns + entries, matrix.column.begin(), integer);
+    const double* values = take(entries);
+    matrix.value.assign(values, values + entries);
+    return next;
+}
+
+}  // namespace
+
+void Newton::save(std::vector<double>& memory) const {
+    const bool needed = kept_.valid && settings_.reuse == Reuse::Adaptive;
+    memory.push_back(needed ? 1.0 : 0.0);
+    if (!needed) return;
+    memory.insert(memory.end(), {kept_.slopes.gamma, kept_.slopes.beta});
+    put(memory, kept_.H);
+    put(memory, kept_.D);
+}
+
+const double* Newton::load(const double* next, const double* end) {
+    kept_.valid = false;
+    if (next == end) throw InputError("a timestepper's memory is too short");
+    if (*next++ == 0.0) return next;
+    if (end - next < 2) throw InputError("a timestepper's memory is too short");
+    kept_.slopes = {next[0], next[1]};
+    next = get(next + 2, end, kept_.H);
+    next = get(next, end, kept_.D);
+    if (kept_.H.rows != n_ || kept_.D.rows != m_ || kept_.D.columns != n_)
+        throw InputError("a timestepper's memory does not fit the system");
+    kept_.valid = true;
+    return next;
+}
+
+// ---- Options ----
+
+OptionInfo jacobian_option(std::string default_value) {
+    return {.key = "jacobian",
+            .type = DELASSUS_OPTION_CHOICE,
+            .default_value = std::move(default_value),
+            .minimum = 0.0,
+            .maximum = 0.0,
+            .choices = {"symmetric", "exact"},
+            .unit = "",
+            .doc = "matrix of Newton's method: the derivative, or its symmetric part, which more solvers take"};
+}
+
+std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
+    std::vector<OptionInfo> options = {
+        jacobian_option("symmetric"),
+        {.key = "reuse",
+         .type = DELASSUS_OPTION_CHOICE,
+         .default_value = "full",
+         .minimum = 0.0,
+         .maximum = 0.0,
+         .choices = {"full", "modified", "adaptive"},
+         .unit = "",
+         .doc = "a new matrix in every iteration, once a step, or when the residual falls too slowly"},
+        {.key = "newton_tolerance",
+         .type = DELASSUS_OPTION_REAL,
+         .default_value = "1e-10",
+         .minimum = 0.0,
+         .maximum = 0.1,
+         .choices = {},
+         .unit = "",
+         .doc = "residual and remaining increment, relative to the way that the step goes (docs/integrators.md)"},
+        {.key = "max_newton_iterations",
+         .type = DELASSUS_OPTION_INTEGER,
+         .default_value = "20",
+         .minimum = 1.0,
+         .maximum = 1e6,
+         .choices = {},
+         .unit = "",
+         .doc = "linear problems in a step before it fails"}};
+    options.insert(options.end(), own.begin(), own.end());
+    return options;
+}
+
+NewtonSettings newton_settings(std::string method, const std::vector<OptionValue>& values) {
+    return {.method = std::move(method),
+            .exact = values[0].text == "exact",
+            .reuse = values[1].text == "full"       ? Reuse::Full
+                     : values[1].text == "modified" ? Reuse::Modified
+                                                    : Reuse::Adaptive,
+            .tolerance = values[2].real,
+            .max_iterations = static_cast<int>(values[3].integer),
+            .linearized = false};
+}
+
+}  // namespace delassus

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fclib/hdf5.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <type_traits>
+
+#include "delassus/error.hpp"
+
+namespace delassus::fclib {
+namespace {
+
+/// A dataset may announce more than it stores where chunks are compressed or were never written. So much is believed.
+constexpr std::uint64_t most_compression = 100;
+constexpr std::uint64_t small_bytes = 1 << 20;
+constexpr std::size_t longest_text = 1 << 16;
+
+bool one_of(hid_t type, std::initializer_list<hid_t> known) {
+    return std::any_of(known.begin(), known.end(), [&](hid_t other) { return H5Tequal(type, other) > 0; });
+}
+
+bool is_plain_integer(hid_t type) {
+    return one_of(type, {H5T_STD_I8LE, H5T_STD_I8BE, H5T_STD_I16LE, H5T_STD_I16BE, H5T_STD_I32LE, H5T_STD_I32BE,
+                         H5T_STD_I64LE, H5T_STD_I64BE, H5T_STD_U8LE, H5T_STD_U8BE, H5T_STD_U16LE, H5T_STD_U16BE,
+                         H5T_STD_U32LE, H5T_STD_U32BE, H5T_STD_U64LE, H5T_STD_U64BE});
+}
+
+bool is_plain_number(hid_t type) {
+    return one_of(type, {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64LE, H5T_IEEE_F64BE});
+}
+
+}  // namespace
+
+Silence::Silence() {
+    H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Silence::~Silence() {
+    H5Eset_auto2(H5E_DEFAULT, function_, data_);
+}
+
+Handle::~Handle() {
+    if (id_ >= 0) H5Idec_ref(id_);
+}
+
+std::string last_complaint() {
+    std::string text;
+    // From the innermost failure outwards: the first one says most.
+    const auto keep_first = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
+        auto& kept = *static_cast<std::string*>(data);
+        if (kept.empty() && error->desc != nullptr) kept = error->desc;
+        return 0;
+    };
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
+    return text.substr(0, 200);
+}
+
+void Group::refuse(const std::string& sentence_end) const {
+    throw InputError(fmt::format("{}: {}{}.", file_, place_, sentence_end));
+}
+
+bool Group::has(const char* name) const {
+    return H5Lexists(id_.get(), name, H5P_DEFAULT) > 0;
+}
+
+Group Group::group(const char* name) const {
+    if (!has(name)) refuse(fmt::format("/{} is missing", name));
+    // A soft or external link could lead anywhere, even into another file.
+    H5L_info_t link{};
+    if (H5Lget_info(id_.get(), name, &link, H5P_DEFAULT) < 0 || link.type != H5L_TYPE_HARD) {
+        refuse(fmt::format("/{} is a link; FCLib files have none", name));
+    }
+    Handle id(H5Gopen2(id_.get(), name, H5P_DEFAULT));
+    if (!id.valid()) refuse(fmt::format("/{} must be a group, but cannot be opened ({})", name, last_complaint()));
+    return {std::move(id), file_, place_ + "/" + name, file_bytes_};
+}
+
+Group::Dataset Group::open(const char* name) const {
+    if (!has(name)) refuse(fmt::format("/{} is missing", name));
+    H5L_info_t link{};
+    if (H5Lget_info(id_.get(), name, &link, H5P_DEFAULT) < 0 || link.type != H5L_TYPE_HARD) {
+        refuse(fmt::format("/{} is a link; FCLib files have none", name));
+    }
+    Dataset dataset;
+    dataset.id = Handle(H5Dopen2(id_.get(), name, H5P_DEFAULT));
+    if (!dataset.id.valid()) {
+        refuse(fmt::format("/{} must be a dataset, but cannot be opened ({})", name, last_complaint()));
+    }
+    dataset.type = Handle(H5Dget_type(dataset.id.get()));
+    const Handle space(H5Dget_space(dataset.id.get()));
+    const Handle creation(H5Dget_create_plist(dataset.id.get()));
+    const hssize_t count = space.valid() ? H5Sget_simple_extent_npoints(space.get()) : -1;
+    if (!dataset.type.valid() || !creation.valid() || count < 0) {
+        refuse(fmt::format("/{} has no readable type or size ({})", name, last_complaint()));
+    }
+    const H5D_layout_t layout = H5Pget_layout(creation.get());
+    if (layout == H5D_VIRTUAL || layout == H5D_LAYOUT_ERROR || H5Pget_external_count(creation.get()) != 0) {
+        refuse(fmt::format("/{} is stored outside the file; FCLib files hold their data", name));
+    }
+    dataset.count = count;
+    const std::uint64_t element = std::max<std::uint64_t>(1, H5Tget_size(dataset.type.get()));
+    const auto elements = static_cast<std::uint64_t>(count);
+    const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset.id.get()), file_bytes_);
+    const std::uint64_t believed = std::max(small_bytes, layout == H5D_CHUNKED ? most_compression * stored : stored);
+    if (elements > believed / element) {
+        refuse(fmt::format("/{} announces {} elements, but stores only {} bytes", name, elements, stored));
+    }
+    return dataset;
+}
+
+template <class Number>
+std::vector<Number> Group::read(const char* name, std::int64_t count, bool exactly) const {
+    constexpr bool real = std::is_floating_point_v<Number>;
+    const Dataset dataset = open(name);
+    if (real ? !is_plain_number(dataset.type.get()) : !is_plain_integer(dataset.type.get())) {
+        refuse(fmt::format("/{} must hold {}", name, real ? "floating-point numbers" : "integers"));
+    }
+    if (exactly ? dataset.count != count : dataset.count < count) {
+        refuse(fmt::format("/{} has {} elements, but must have {}{}", name, dataset.count, exactly ? "" : "at least ",
+                           count));
+    }
+    std::vector<Number> values(static_cast<std::size_t>(dataset.count));
+    const hid_t type = real ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT64;
+    if (!values.empty() && H5Dread(dataset.id.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+        refuse(fmt::format("/{} cannot be read ({})", name, last_complaint()));
+    }
+    values.resize(static_cast<std::size_t>(count));
+    return values;
+}
+
+std::int64_t Group::count(const char* name) const {
+    return open(name).count;
+}
+
+std::int32_t Group::integer(const char* name, std::int32_t least, std::int32_t most) const {
+    const std::int64_t value = read<std::int64_t>(name, 1, true)[0];
+    if (value < least || value > most) {
+        refuse(fmt::format("/{} is {}, but must be from {} to {}", name, value, least, most));
+    }
+    return static_cast<std::int32_t>(value);
+}
+
+std::vector<std::int64_t> Group::integers(const char* name, std::int64_t count) const {
+    return read<std::int64_t>(name, count, false);
+}
+
+std::vector<double> Group::numbers(const char* name, std::int64_t count) const {
+    return read<double>(name, count, true);
+}
+
+std::vector<double> Group::first_numbers(const char* name, std::int64_t count) const {
+    return read<double>(name, count, false);
+}
+
+std::string Group::text(const char* name) const {
+    if (!has(name)) return {};
+    const Dataset dataset = open(name);
+    const hid_t type = dataset.type.get();
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || dataset.count != 1) return {};
+    const std::size_t size = H5Tget_size(type);
+    if (size == 0 || size > longest_text) return {};
+    std::string value(size, '\0');
+    if (H5Dread(dataset.id.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, value.data()) < 0) return {};
+    value.resize(std::min(value.find('\0'), value.size()));
+    return value;
+}
+
+}  // namespace delassus::fclib

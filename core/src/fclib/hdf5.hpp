@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// HDF5 for FCLib files: handles that close themselves, and datasets of numbers that are checked before anything of
+// their announced size is allocated. Whatever HDF5 has to say becomes one InputError.
+#pragma once
+
+#include <hdf5.h>
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace delassus::fclib {
+
+/// Keeps HDF5 from printing its errors while it lives.
+class Silence {
+public:
+    Silence();
+    Silence(const Silence&) = delete;
+    Silence& operator=(const Silence&) = delete;
+    ~Silence();
+
+private:
+    H5E_auto2_t function_ = nullptr;
+    void* data_ = nullptr;
+};
+
+/// An HDF5 identifier of any kind; closed with its last owner.
+class Handle {
+public:
+    Handle() = default;
+    explicit Handle(hid_t id) : id_(id) {}
+    Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)) {}
+    Handle& operator=(Handle&& other) noexcept {
+        std::swap(id_, other.id_);
+        return *this;
+    }
+    ~Handle();
+    [[nodiscard]] hid_t get() const { return id_; }
+    [[nodiscard]] bool valid() const { return id_ >= 0; }
+
+private:
+    hid_t id_ = H5I_INVALID_HID;
+};
+
+/// What HDF5 last complained about, in its words; empty if nothing.
+std::string last_complaint();
+
+/// A group of an open file that knows its place for messages.
+class Group {
+public:
+    Group(Handle id, std::string file, std::string place, std::uint64_t file_bytes)
+        : id_(std::move(id)), file_(std::move(file)), place_(std::move(place)), file_bytes_(file_bytes) {}
+
+    [[noreturn]] void refuse(const std::string& sentence_end) const;
+
+    [[nodiscard]] bool has(const char* name) const;
+    [[nodiscard]] Group group(const char* name) const;
+
+    /// Number of elements of the dataset.
+    [[nodiscard]] std::int64_t count(const char* name) const;
+    /// The one integer of a dataset, within least … most.
+    [[nodiscard]] std::int32_t integer(const char* name, std::int32_t least, std::int32_t most) const;
+    /// The first `count` elements of a dataset that has at least as many.
+    [[nodiscard]] std::vector<std::int64_t> integers(const char* name, std::int64_t count) const;
+    /// All elements of a dataset that has exactly `count`.
+    [[nodiscard]] std::vector<double> numbers(const char* name, std::int64_t count) const;
+    /// The first `count` elements of a dataset that has at least as many.
+    [[nodiscard]] std::vector<double> first_numbers(const char* name, std::int64_t count) const;
+    /// A short text of fixed length, empty if there is none.
+    [[nodiscard]] std::string text(const char* name) const;
+
+private:
+    struct Dataset {
+        Handle id;
+        Handle type;
+        std::int64_t count = 0;
+    };
+    [[nodiscard]] Dataset open(const char* name) const;
+    template <class Number>
+    [[nodiscard]] std::vector<Number> read(const char* name, std::int64_t count, bool exactly) const;
+
+    Handle id_;
+    std::string file_;
+    std::string place_;
+    std::uint64_t file_bytes_;
+};
+
+}  // namespace delassus::fclib

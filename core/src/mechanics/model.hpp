@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a multibody system is made of once it is finished: data for the loops of multibody.cpp.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "delassus/multibody.hpp"
+#include "mechanics/angle.hpp"
+#include "mechanics/row.hpp"
+
+namespace delassus::mechanics {
+
+struct Body {
+    BodyParameters parameters;
+    Matrix3d inertia = Matrix3d::Identity();
+    std::int32_t position = -1, column = -1;  ///< first entries in q and v; −1 if fixed
+};
+
+struct Node {
+    NodeParameters parameters;
+    std::int32_t position = -1, column = -1;
+};
+
+/// q₂ θ₂ − p₁ θ₁ = 0 modulo 2π, divided by q₂: the ratio p₁/q₂ of integers makes it a function of the configuration.
+struct Gear {
+    Angle first, second;
+    double numerator = 1.0, denominator = 1.0;
+    double offset = 0.0;  ///< at t = 0
+};
+
+/// A joint's rows, in order; a gear has one of its own.
+struct Joint {
+    JointParameters parameters;
+    std::vector<Row> rows;
+    std::unique_ptr<Gear> gear;
+    Angle angle;  ///< Revolute
+    Row slide;    ///< Prismatic: the coordinate
+    std::int32_t first_row = 0;
+    [[nodiscard]] std::int32_t row_count() const { return gear ? 1 : static_cast<std::int32_t>(rows.size()); }
+};
+
+/// A motor with a force limit: a box row on the speed of the joint's coordinate.
+struct BoundedMotor {
+    std::int32_t joint = -1;
+    Motion speed;
+    double limit = 0.0;
+};
+
+/// Potential ½ k C² and damping force −c Ċ ∇C of a row.
+struct RowSpring {
+    Row row;
+    double stiffness = 0.0, damping = 0.0;
+};
+
+struct Load {
+    LoadParameters parameters;
+    Vector3d point = Vector3d::Zero();  ///< body frame
+};
+
+/// Motions that rows point to; their addresses last.
+using Motions = std::vector<std::unique_ptr<Motion>>;
+
+inline Vector3d vector(const Vector3& v) {
+    return {v[0], v[1], v[2]};
+}
+inline Vector3 array(const Vector3d& v) {
+    return {v.x(), v.y(), v.z()};
+}
+inline Quaterniond quaternion(const Quaternion& q) {
+    return {q[0], q[1], q[2], q[3]};
+}
+
+/// The rows of a joint of bodies at these placements. Throws InputError for an axis of no length, points that coincide
+/// in a distance joint, a gear between joints that are not revolute.
+Joint make_joint(const JointParameters& parameters, const Placements& at, const std::vector<Joint>& others);
+
+/// Adds the rows by which a motor drives its joint.
+void drive_joint(Joint& joint, const MotorParameters& motor, Motions& motions);
+
+/// The springs of a bushing: three along the axes of the first body, three about them.
+std::vector<RowSpring> make_bushing(const BushingParameters& parameters, const Placements& at);
+RowSpring make_spring(const SpringParameters& parameters, const Placements& at);
+
+}  // namespace delassus::mechanics

@@ -1,0 +1,556 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Building a multibody system, and reading its states.
+#include "delassus/multibody.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "mechanics/multibody_implementation.hpp"
+
+namespace delassus {
+
+using mechanics::array;
+using mechanics::Matrix3d;
+using mechanics::quaternion;
+using mechanics::Quaterniond;
+using mechanics::vector;
+using mechanics::Vector3d;
+
+namespace {
+
+bool finite(const Vector3& v) {
+    return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
+void refuse_unless(bool condition, std::string_view what, std::string_view name, std::string_view rule) {
+    if (!condition) throw InputError(fmt::format("{} \"{}\" {}", what, name, rule));
+}
+
+Matrix3d tensor(const Inertia& J) {
+    Matrix3d result;
+    result << J.xx, J.xy, J.xz, J.xy, J.yy, J.yz, J.xz, J.yz, J.zz;
+    return result;
+}
+
+// The moments of a mass distribution are ∫(y² + z²) and so on: none exceeds the sum of the other two.
+void check_inertia(const std::string& name, const Matrix3d& J) {
+    refuse_unless(J.allFinite(), "the inertia of body", name, "is not finite");
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(J, Eigen::EigenvaluesOnly);
+    const Vector3d moments = solver.eigenvalues();
+    refuse_unless(moments[0] > 0.0, "the inertia of body", name, "is not positive definite");
+    refuse_unless(
+        moments[2] <= (moments[0] + moments[1]) * (1.0 + 1e-9), "the inertia of body", name,
+        fmt::format("has the principal moments {}, {}, {}; the largest exceeds the sum of the others, which no mass "
+                    "distribution has",
+                    moments[0], moments[1], moments[2]));
+}
+
+Quaternion normalized(const Quaternion& q, const std::string& name) {
+    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    refuse_unless(norm > 0.0 && std::isfinite(norm), "the orientation of", name,
+                  "is no quaternion of a positive length");
+    return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
+}
+
+}  // namespace
+
+MultibodySystem::MultibodySystem() : implementation_(std::make_unique<Implementation>()) {}
+MultibodySystem::~MultibodySystem() = default;
+
+void MultibodySystem::Implementation::must_be_finished() const {
+    if (!finished) throw InputError("the multibody system was not finished: call finish() after the last add_…()");
+}
+void MultibodySystem::Implementation::must_not_be_finished() const {
+    if (finished) throw InputError("the multibody system is finished; nothing can be added to it any more");
+}
+void MultibodySystem::Implementation::check_body(BodyIndex body, const std::string& name) const {
+    if (body < world_body || body >= static_cast<BodyIndex>(bodies.size()))
+        throw InputError(fmt::format("\"{}\" names the body {}; there are {}", name, body, bodies.size()));
+}
+
+void MultibodySystem::set_gravity(const Vector3& gravity) {
+    refuse_unless(finite(gravity), "the value", "gravity", "is not finite");
+    implementation_->gravity = gravity;
+}
+
+BodyIndex MultibodySystem::add_body(const BodyParameters& parameters) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    const auto& name = parameters.name;
+    refuse_unless(std::isfinite(parameters.mass) && parameters.mass > 0.0, "the mass of body", name,
+                  fmt::format("is {} kg; it must be positive", parameters.mass));
+    refuse_unless(finite(parameters.pose.position), "the position of body", name, "is not finite");
+    refuse_unless(finite(parameters.velocity) && finite(parameters.angular_velocity), "the velocity of body", name,
+                  "is not finite");
+    mechanics::Body body;
+    body.parameters = parameters;
+    body.parameters.pose.orientation = normalized(parameters.pose.orientation, name);
+    body.inertia = tensor(parameters.inertia);
+    if (!parameters.fixed) check_inertia(name, body.inertia);
+    self.bodies.push_back(std::move(body));
+    return static_cast<BodyIndex>(self.bodies.size()) - 1;
+}
+
+std::int32_t MultibodySystem::add_node(const NodeParameters& parameters) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    refuse_unless(std::isfinite(parameters.mass) && parameters.mass >= 0.0, "the mass of node", parameters.name,
+                  fmt::format("is {} kg; it must not be negative", parameters.mass));
+    refuse_unless(finite(parameters.position) && finite(parameters.velocity), "the state of node", parameters.name,
+                  "is not finite");
+    self.nodes.push_back({parameters, -1, -1});
+    return static_cast<std::int32_t>(self.nodes.size()) - 1;
+}
+
+namespace {
+
+/// Placements at t = 0, without columns.
+mechanics::Placements initial_placements(const std::vector<mechanics::Body>& bodies) {
+    mechanics::Placements at(bodies.size());
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+        auto& place = at[static_cast<BodyIndex>(k)];
+        place.x = vector(bodies[k].parameters.pose.position);
+        place.A = quaternion(bodies[k].parameters.pose.orientation).toRotationMatrix();
+    }
+    return at;
+}
+
+}  // namespace
+
+std::int32_t MultibodySystem::add_joint(const JointParameters& parameters) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    const auto& name = parameters.name;
+    if (parameters.kind != JointKind::Gear) {
+        self.check_body(parameters.first, name);
+        self.check_body(parameters.second, name);
+        refuse_unless(parameters.first != parameters.second, "the joint", name, "joins a body to itself");
+        refuse_unless(finite(parameters.point) && finite(parameters.second_point), "the point of the joint", name,
+                      "is not finite");
+    }
+    const bool limited = !std::isnan(parameters.lower) || !std::isnan(parameters.upper);
+    refuse_unless(!limited || parameters.kind == JointKind::Revolute || parameters.kind == JointKind::Prismatic,
+                  "the joint", name, "cannot have limits: only revolute and prismatic joints can");
+    refuse_unless(
+        !(parameters.lower > parameters.upper), "the limits of the joint", name,
+        fmt::format("are {} and {}; the lower must not exceed the upper", parameters.lower, parameters.upper));
+    self.joints.push_back(mechanics::make_joint(parameters, initial_placements(self.bodies), self.joints));
+    if (parameters.kind != JointKind::Gear) keep_apart(parameters.first, parameters.second);
+    return static_cast<std::int32_t>(self.joints.size()) - 1;
+}
+
+void MultibodySystem::add_motor(const MotorParameters& motor) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    const auto& name = motor.name;
+    refuse_unless(motor.joint >= 0 && motor.joint < static_cast<std::int32_t>(self.joints.size()), "the motor", name,
+                  "drives no joint of the system");
+    auto& joint = self.joints[static_cast<std::size_t>(motor.joint)];
+    refuse_unless(joint.parameters.kind == JointKind::Revolute || joint.parameters.kind == JointKind::Prismatic,
+                  "the motor", name, "must drive a revolute or a prismatic joint");
+    refuse_unless(motor.motion.value && motor.motion.rate && motor.motion.acceleration, "the motor", name,
+                  "has no motion");
+    refuse_unless(motor.force_limit >= 0.0, "the force limit of the motor", name, "must not be negative");
+    if (std::isinf(motor.force_limit)) {
+        mechanics::drive_joint(joint, motor, self.motions);
+    } else {
+        refuse_unless(motor.speed, "the motor", name, "has a force limit, so it must be driven by speed");
+        self.bounded_motors.push_back({motor.joint, motor.motion, motor.force_limit});
+    }
+}
+
+void MultibodySystem::add_spring(const SpringParameters& spring) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    self.check_body(spring.first, spring.name);
+    self.check_body(spring.second, spring.name);
+    refuse_unless(spring.first != spring.second, "the spring", spring.name, "joins a body to itself");
+    refuse_unless(spring.stiffness >= 0.0 && spring.damping >= 0.0 && std::isfinite(spring.stiffness + spring.damping),
+                  "the stiffness and damping of the spring", spring.name, "must be finite and not negative");
+    refuse_unless(!(spring.rest_length < 0.0), "the rest length of the spring", spring.name, "must not be negative");
+    self.springs.push_back(mechanics::make_spring(spring, initial_placements(self.bodies)));
+}
+
+void MultibodySystem::add_bushing(const BushingParameters& bushing) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    self.check_body(bushing.first, bushing.name);
+    self.check_body(bushing.second, bushing.name);
+    refuse_unless(bushing.first != bushing.second, "the bushing", bushing.name, "joins a body to itself");
+    for (const auto* values : {&bushing.stiffness, &bushing.damping, &bushing.turn_stiffness, &bushing.turn_damping})
+        for (const double value : *values)
+            refuse_unless(value >= 0.0 && std::isfinite(value), "the stiffness and damping of the bushing",
+                          bushing.name, "must be finite and not negative");
+    for (auto& spring : mechanics::make_bushing(bushing, initial_placements(self.bodies)))
+        self.springs.push_back(spring);
+}
+
+void MultibodySystem::add_load(const LoadParameters& load) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    self.check_body(load.body, load.name);
+    refuse_unless(load.body != world_body, "the load", load.name, "acts on no body");
+    const auto at = initial_placements(self.bodies);
+    self.loads.push_back({load, at[load.body].A.transpose() * (vector(load.point) - at[load.body].x)});
+}
+
+void MultibodySystem::Implementation::check_node(std::int32_t node, std::string_view what) const {
+    if (node < 0 || node >= static_cast<std::int32_t>(nodes.size()))
+        throw InputError(fmt::format("{} names the node {}; there are {}", what, node, nodes.size()));
+}
+
+void MultibodySystem::add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
+                                      ElementModel model) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    if (!(material.young > 0.0 && std::isfinite(material.young)) ||
+        !(material.density > 0.0 && std::isfinite(material.density)))
+        throw InputError(fmt::format("Young's modulus is {} Pa and the density {} kg/m³; both must be positive",
+                                     material.young, material.density));
+    if (!(material.poisson > -1.0 && material.poisson < 0.5))
+        throw InputError(fmt::format("Poisson's ratio is {}; it must lie between -1 and 0.5", material.poisson));
+    if (!(material.damping_time >= 0.0))
+        throw InputError(fmt::format("the damping time is {} s; it must not be negative", material.damping_time));
+    std::array<Vector3d, 4> positions;
+    for (std::size_t k = 0; k < 4; ++k) {
+        self.check_node(nodes[k], "a tetrahedron");
+        positions[k] = vector(self.nodes[static_cast<std::size_t>(nodes[k])].parameters.position);
+    }
+    self.tetrahedra.emplace_back(nodes, positions, material, model);
+    for (const auto node : nodes)
+        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.25 * self.tetrahedra.back().mass();
+}
+
+void MultibodySystem::add_cable(const CableParameters& cable) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    std::array<Vector3d, 2> positions;
+    for (std::size_t k = 0; k < 2; ++k) {
+        self.check_node(cable.nodes[k], fmt::format("the cable \"{}\"", cable.name));
+        positions[k] = vector(self.nodes[static_cast<std::size_t>(cable.nodes[k])].parameters.position);
+    }
+    const double distance = (positions[1] - positions[0]).norm();
+    refuse_unless(distance > 0.0, "the nodes of the cable", cable.name, "coincide");
+    refuse_unless(!(cable.rest_length <= 0.0), "the rest length of the cable", cable.name, "must be positive");
+    refuse_unless(cable.young > 0.0 && cable.area > 0.0 && cable.density >= 0.0 && cable.damping_time >= 0.0 &&
+                      std::isfinite(cable.young * cable.area * cable.density * cable.damping_time),
+                  "the modulus, area, density and damping of the cable", cable.name, "must be positive and finite");
+    self.cables.emplace_back(cable.nodes, positions, cable);
+    for (const auto node : cable.nodes)
+        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.5 * self.cables.back().mass();
+}
+
+std::int32_t MultibodySystem::add_material(const ContactMaterial& material) {
+    auto& self = *implementation_;
+    if (!(material.friction >= 0.0) || !std::isfinite(material.friction))
+        throw InputError(
+            fmt::format("the friction coefficient is {}; it must be finite and not negative", material.friction));
+    if (!(material.restitution >= 0.0 && material.restitution <= 1.0))
+        throw InputError(fmt::format("the restitution is {}; it must lie between 0 and 1", material.restitution));
+    self.materials.push_back(material);
+    return static_cast<std::int32_t>(self.materials.size()) - 1;
+}
+
+void MultibodySystem::set_material_pair(std::int32_t first, std::int32_t second, const ContactMaterial& material) {
+    auto& self = *implementation_;
+    const auto count = static_cast<std::int32_t>(self.materials.size());
+    if (first < 0 || second < 0 || first >= count || second >= count)
+        throw InputError(fmt::format("a material pair names {} and {}; there are {} materials", first, second, count));
+    add_material(material);  // checks it
+    self.materials.pop_back();
+    self.material_pairs[std::minmax(first, second)] = material;
+}
+
+void MultibodySystem::add_shape(const Shape& shape, std::int32_t material) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    self.check_body(shape.body, "a shape");
+    if (material < 0 || material >= static_cast<std::int32_t>(self.materials.size()))
+        throw InputError(fmt::format("a shape has the material {}; there are {}", material, self.materials.size()));
+    self.shapes.push_back(shape);
+    self.shape_material.push_back(material);
+}
+
+void MultibodySystem::add_node_contact(std::int32_t node, double radius, std::int32_t material) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    self.check_node(node, "a contact");
+    if (!(radius > 0.0) || !std::isfinite(radius))
+        throw InputError(fmt::format("the contact radius of node {} is {} m; it must be positive", node, radius));
+    if (material < 0 || material >= static_cast<std::int32_t>(self.materials.size()))
+        throw InputError(fmt::format("the contact of node {} has the material {}; there are {}", node, material,
+                                     self.materials.size()));
+    self.node_contacts.push_back({node, radius, material});
+}
+
+void MultibodySystem::set_envelope(double envelope) {
+    if (!(envelope > 0.0) || !std::isfinite(envelope))
+        throw InputError(fmt::format("the contact envelope is {} m; it must be positive", envelope));
+    implementation_->envelope = envelope;
+}
+
+void MultibodySystem::keep_apart(BodyIndex first, BodyIndex second) {
+    auto& self = *implementation_;
+    self.check_body(first, "keep_apart");
+    self.check_body(second, "keep_apart");
+    self.apart.insert(std::minmax(first, second));
+}
+
+void MultibodySystem::finish() {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    for (auto& body : self.bodies) {
+        if (body.parameters.fixed) continue;
+        body.position = self.position_size;
+        body.column = self.n;
+        self.position_size += 7;
+        self.n += 6;
+        const Matrix3d& J = body.inertia;
+        if (!J.isApprox(J(0, 0) * Matrix3d::Identity(), 1e-14)) self.gyroscopic = true;
+    }
+    for (auto& node : self.nodes) {
+        if (node.parameters.fixed) continue;
+        refuse_unless(node.parameters.mass > 0.0, "the node", node.parameters.name,
+                      "has no mass and no element gives it any");
+        node.position = self.position_size;
+        node.column = self.n;
+        self.position_size += 3;
+        self.n += 3;
+    }
+    self.initial = initial_placements(self.bodies);
+    for (std::size_t k = 0; k < self.bodies.size(); ++k) {
+        auto& place = self.initial[static_cast<BodyIndex>(k)];
+        place.column = self.bodies[k].column;
+    }
+    self.at = self.initial;
+    for (auto& joint : self.joints) {
+        joint.first_row = self.m;
+        self.m += joint.row_count();
+    }
+    self.finished = true;
+    self.make_detector();
+}
+
+// ---- Reading states ----
+
+void MultibodySystem::Implementation::place(const double* q, const double* v) const {
+    must_be_finished();
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+        const auto& body = bodies[k];
+        if (body.column < 0) continue;
+        auto& place = at[static_cast<BodyIndex>(k)];
+        const double* from = q + body.position;
+        place.x = Eigen::Map<const Vector3d>(from);
+        place.A = Quaterniond(from[3], from[4], from[5], from[6]).toRotationMatrix();
+        if (v) {
+            place.v = Eigen::Map<const Vector3d>(v + body.column);
+            place.omega = Eigen::Map<const Vector3d>(v + body.column + 3);
+        }
+    }
+}
+
+mechanics::NodePlacement MultibodySystem::Implementation::node_at(std::int32_t index, const double* q,
+                                                                  const double* v) const {
+    const auto& node = nodes[static_cast<std::size_t>(index)];
+    if (node.column < 0) return {vector(node.parameters.position), Vector3d::Zero(), -1};
+    return {Eigen::Map<const Vector3d>(q + node.position), Eigen::Map<const Vector3d>(v + node.column), node.column};
+}
+
+std::int32_t MultibodySystem::node_count() const {
+    return static_cast<std::int32_t>(implementation_->nodes.size());
+}
+Vector3 MultibodySystem::node_position(const State& state, std::int32_t node) const {
+    implementation_->check_node(node, "node_position()");
+    return array(implementation_->node_at(node, state.q.data(), state.v.data()).x);
+}
+std::int32_t MultibodySystem::node_column(std::int32_t node) const {
+    implementation_->check_node(node, "node_column()");
+    return implementation_->nodes[static_cast<std::size_t>(node)].column;
+}
+std::int32_t MultibodySystem::body_column(BodyIndex index) const {
+    if (index == world_body) return -1;
+    implementation_->check_body(index, "body_column()");
+    return implementation_->bodies[static_cast<std::size_t>(index)].column;
+}
+
+std::int32_t MultibodySystem::body_count() const {
+    return static_cast<std::int32_t>(implementation_->bodies.size());
+}
+const BodyParameters& MultibodySystem::body(BodyIndex index) const {
+    implementation_->check_body(index, "body()");
+    if (index == world_body) throw InputError("the world has no parameters");
+    return implementation_->bodies[static_cast<std::size_t>(index)].parameters;
+}
+BodyIndex MultibodySystem::find_body(const std::string& name) const {
+    const auto& bodies = implementation_->bodies;
+    const auto found =
+        std::find_if(bodies.begin(), bodies.end(), [&](const auto& body) { return body.parameters.name == name; });
+    return found == bodies.end() ? world_body : static_cast<BodyIndex>(found - bodies.begin());
+}
+
+Pose MultibodySystem::pose(const State& state, BodyIndex index) const {
+    if (index == world_body) return {};
+    implementation_->check_body(index, "pose()");
+    const auto& body = implementation_->bodies[static_cast<std::size_t>(index)];
+    if (body.column < 0) return body.parameters.pose;
+    const double* q = state.q.data() + body.position;
+    return {{q[0], q[1], q[2]}, {q[3], q[4], q[5], q[6]}};
+}
+
+std::array<Vector3, 2> MultibodySystem::velocities(const State& state, BodyIndex index) const {
+    if (index == world_body) return {};
+    implementation_->check_body(index, "velocities()");
+    const auto& body = implementation_->bodies[static_cast<std::size_t>(index)];
+    if (body.column < 0) return {};
+    const double* v = state.v.data() + body.column;
+    return {Vector3{v[0], v[1], v[2]}, Vector3{v[3], v[4], v[5]}};
+}
+
+const std::vector<Shape>& MultibodySystem::shapes() const {
+    return implementation_->shapes;
+}
+std::array<std::int32_t, 2> MultibodySystem::joint_rows(std::int32_t index) const {
+    const auto& self = *implementation_;
+    self.must_be_finished();
+    if (index < 0 || index >= static_cast<std::int32_t>(self.joints.size()))
+        throw InputError(fmt::format("there is no joint {}; there are {}", index, self.joints.size()));
+    const auto& joint = self.joints[static_cast<std::size_t>(index)];
+    return {joint.first_row, joint.row_count()};
+}
+const std::vector<ContactPoint>& MultibodySystem::contacts() const {
+    return implementation_->contacts;
+}
+
+std::int32_t MultibodySystem::n() const {
+    implementation_->must_be_finished();
+    return implementation_->n;
+}
+std::int32_t MultibodySystem::position_size() const {
+    implementation_->must_be_finished();
+    return implementation_->position_size;
+}
+
+State MultibodySystem::initial_state() const {
+    const auto& self = *implementation_;
+    self.must_be_finished();
+    State state;
+    for (const auto& body : self.bodies) {
+        if (body.column < 0) continue;
+        const auto& pose = body.parameters.pose;
+        state.q.insert(state.q.end(), pose.position.begin(), pose.position.end());
+        state.q.insert(state.q.end(), pose.orientation.begin(), pose.orientation.end());
+        for (const auto* part : {&body.parameters.velocity, &body.parameters.angular_velocity})
+            state.v.insert(state.v.end(), part->begin(), part->end());
+    }
+    for (const auto& node : self.nodes) {
+        if (node.column < 0) continue;
+        state.q.insert(state.q.end(), node.parameters.position.begin(), node.parameters.position.end());
+        state.v.insert(state.v.end(), node.parameters.velocity.begin(), node.parameters.velocity.end());
+    }
+    return state;
+}
+
+void MultibodySystem::increment(const double* q, const double* delta, double* result) const {
+    const auto& self = *implementation_;
+    for (const auto& body : self.bodies) {
+        if (body.column < 0) continue;
+        const double *from = q + body.position, *by = delta + body.column;
+        double* to = result + body.position;
+        const Quaterniond turned =
+            mechanics::rotated({from[3], from[4], from[5], from[6]}, Eigen::Map<const Vector3d>(by + 3));
+        for (int i = 0; i < 3; ++i) to[i] = from[i] + by[i];
+        to[3] = turned.w();
+        to[4] = turned.x();
+        to[5] = turned.y();
+        to[6] = turned.z();
+    }
+    for (const auto& node : self.nodes)
+        if (node.column >= 0)
+            for (int i = 0; i < 3; ++i) result[node.position + i] = q[node.position + i] + delta[node.column + i];
+}
+
+void MultibodySystem::difference(const double* from, const double* to, double* delta) const {
+    const auto& self = *implementation_;
+    for (const auto& body : self.bodies) {
+        if (body.column < 0) continue;
+        const double *a = from + body.position, *b = to + body.position;
+        for (int i = 0; i < 3; ++i) delta[body.column + i] = b[i] - a[i];
+        const Quaterniond first(a[3], a[4], a[5], a[6]), second(b[3], b[4], b[5], b[6]);
+        Eigen::Map<Vector3d>(delta + body.column + 3) = mechanics::logarithm(first.conjugate() * second);
+    }
+    for (const auto& node : self.nodes)
+        if (node.column >= 0)
+            for (int i = 0; i < 3; ++i) delta[node.column + i] = to[node.position + i] - from[node.position + i];
+}
+
+void MultibodySystem::inverse_tangent(const double* delta, std::vector<DiagonalBlock3>& blocks) const {
+    blocks.clear();
+    for (const auto& body : implementation_->bodies) {
+        if (body.column < 0) continue;
+        DiagonalBlock3 block;
+        block.first = body.column + 3;
+        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(block.value) =
+            mechanics::inverse_tangent_of(Eigen::Map<const Vector3d>(delta + body.column + 3));
+        blocks.push_back(block);
+    }
+}
+
+double MultibodySystem::kinetic_energy(const State& state) const {
+    const auto& self = *implementation_;
+    double energy = 0.0;
+    for (const auto& body : self.bodies) {
+        if (body.column < 0) continue;
+        const Eigen::Map<const Vector3d> v(state.v.data() + body.column), omega(state.v.data() + body.column + 3);
+        energy += 0.5 * body.parameters.mass * v.squaredNorm() + 0.5 * omega.dot(body.inertia * omega);
+    }
+    for (const auto& node : self.nodes)
+        if (node.column >= 0)
+            energy +=
+                0.5 * node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column).squaredNorm();
+    return energy;
+}
+
+std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), state.v.data());
+    Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
+    for (std::size_t k = 0; k < self.bodies.size(); ++k) {
+        if (self.bodies[k].column < 0) continue;
+        const auto& place = self.at[static_cast<BodyIndex>(k)];
+        const Vector3d p = self.bodies[k].parameters.mass * place.v;
+        linear += p;
+        angular += place.x.cross(p) + place.A * (self.bodies[k].inertia * place.omega);
+    }
+    for (const auto& node : self.nodes) {
+        if (node.column < 0) continue;
+        const Vector3d p = node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column);
+        linear += p;
+        angular += Eigen::Map<const Vector3d>(state.q.data() + node.position).cross(p);
+    }
+    return {array(linear), array(angular)};
+}
+
+double MultibodySystem::energy(const State& state) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), state.v.data());
+    const Vector3d gravity = vector(self.gravity);
+    double energy = kinetic_energy(state);
+    for (std::size_t k = 0; k < self.bodies.size(); ++k)
+        if (self.bodies[k].column >= 0)
+            energy -= self.bodies[k].parameters.mass * gravity.dot(self.at[static_cast<BodyIndex>(k)].x);
+    for (const auto& node : self.nodes)
+        if (node.column >= 0)
+            energy -= node.parameters.mass * gravity.dot(Eigen::Map<const Vector3d>(state.q.data() + node.position));
+    self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
+    for (const auto& spring : self.springs) {
+        const double stretch = spring.row.value(self.at, state.t);
+        energy += 0.5 * spring.stiffness * stretch * stretch;
+    }
+    return energy;
+}
+
+}  // namespace delassus

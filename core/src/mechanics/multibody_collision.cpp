@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The shapes of a multibody system as the collision detector sees them.
+#include <algorithm>
+
+#include "mechanics/multibody_implementation.hpp"
+
+namespace delassus {
+
+using mechanics::vector;
+
+namespace {
+
+/// Half of the smallest extent of a shape; 0 for a plane, which has none.
+double size_of(const Shape& shape) {
+    switch (shape.kind) {
+        case ShapeKind::Plane:
+            return 0.0;
+        case ShapeKind::Box:
+            return std::min({shape.size[0], shape.size[1], shape.size[2]});
+        case ShapeKind::Convex: {
+            double farthest = 0.0;
+            if (!shape.mesh) return 0.0;
+            for (const auto& vertex : shape.mesh->vertices)
+                farthest = std::max(farthest, (vector(vertex) - vector(shape.mesh->vertices[0])).norm());
+            return 0.5 * farthest;
+        }
+        default:
+            return shape.size[0];
+    }
+}
+
+/// A twentieth of the median size.
+double envelope_for(const std::vector<Shape>& shapes) {
+    std::vector<double> sizes;
+    for (const auto& shape : shapes)
+        if (const double size = size_of(shape); size > 0.0) sizes.push_back(size);
+    if (sizes.empty()) return 0.0;
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    return 0.05 * *middle;
+}
+
+}  // namespace
+
+std::int32_t MultibodySystem::Implementation::owner_of(std::int32_t shape) const {
+    const auto index = static_cast<std::size_t>(shape);
+    if (index < shapes.size()) return shapes[index].body;
+    return static_cast<std::int32_t>(bodies.size()) + node_contacts[index - shapes.size()].node;
+}
+
+// For the detector a node is a body that does not turn, after the bodies; its sphere comes after their shapes.
+void MultibodySystem::Implementation::make_detector() {
+    CollisionSetup setup{shapes, {}, {apart.begin(), apart.end()}, {}};
+    for (const auto& body : bodies) {
+        setup.fixed.push_back(body.column < 0);
+        setup.group.push_back(-1);
+    }
+    for (const auto& node : nodes) {
+        setup.fixed.push_back(node.column < 0);
+        setup.group.push_back(0);
+    }
+    for (const auto& contact : node_contacts) {
+        Shape sphere;
+        sphere.size[0] = contact.radius;
+        sphere.body = static_cast<std::int32_t>(bodies.size()) + contact.node;
+        setup.shapes.push_back(sphere);
+        shape_material.push_back(contact.material);
+    }
+    const bool moves = std::any_of(setup.shapes.begin(), setup.shapes.end(), [&](const Shape& shape) {
+        return shape.body >= 0 && !setup.fixed[static_cast<std::size_t>(shape.body)];
+    });
+    if (!moves || setup.shapes.size() < 2) return;
+    if (envelope == 0.0) envelope = envelope_for(setup.shapes);
+    detector = make_collision_detector(std::move(setup));
+}
+
+}  // namespace delassus

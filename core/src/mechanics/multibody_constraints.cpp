@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// C, C_q, C_t, the curvature and the stiffness of a multibody system's joints.
+#include <cmath>
+
+#include "mechanics/multibody_implementation.hpp"
+
+namespace delassus {
+
+using mechanics::Gear;
+using mechanics::Matrix3d;
+using mechanics::Row;
+using mechanics::Vector3d;
+
+std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
+    implementation_->must_be_finished();
+    std::vector<std::int32_t> blocks;
+    // Rows of one unit make a block: three of a point (m), then the others one by one or, of equal kind, together.
+    for (const auto& joint : implementation_->joints) {
+        if (joint.gear) {
+            blocks.push_back(1);
+            continue;
+        }
+        std::int32_t count = 0;
+        bool last_is_point = false;
+        for (const Row& row : joint.rows) {
+            const bool point = row.u.count == 2;
+            if (count > 0 && point != last_is_point) {
+                blocks.push_back(count);
+                count = 0;
+            }
+            last_is_point = point;
+            ++count;
+        }
+        if (count > 0) blocks.push_back(count);
+    }
+    return blocks;
+}
+
+void MultibodySystem::constraint(const State& state, double* C) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), nullptr);
+    self.for_each_row([&](std::int32_t i, const Row& row) { C[i] = row.value(self.at, state.t); });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        const double angle =
+            gear.denominator * gear.second.value(self.at) - gear.numerator * gear.first.value(self.at) - gear.offset;
+        C[i] = std::remainder(angle, 2.0 * M_PI) / gear.denominator;
+    });
+}
+
+void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), nullptr);
+    self.for_each_row([&](std::int32_t i, const Row& row) {
+        const auto columns = row.columns(self.at);
+        row.gradient(self.at, state.t, columns, self.gradient);
+        for (int k = 0; k < columns.bodies; ++k)
+            for (int j = 0; j < 6; ++j)
+                D.add(first_row + i, columns.column[static_cast<std::size_t>(k)] + j, self.gradient[6 * k + j]);
+    });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        for (const auto& [angle, factor] : self.terms_of(gear))
+            for (const bool second : {true, false}) {
+                const auto column = self.at[second ? angle.second : angle.first].column;
+                if (column < 0) continue;
+                const Vector3d coefficients = factor * angle.coefficients(self.at, second);
+                for (int j = 0; j < 3; ++j) D.add(first_row + i, column + 3 + j, coefficients[j]);
+            }
+    });
+}
+
+void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), nullptr);
+    self.for_each_row([&](std::int32_t i, const Row& row) { C_t[i] = row.rate(self.at, state.t); });
+    self.for_each_gear([&](std::int32_t i, const Gear&) { C_t[i] = 0.0; });
+}
+
+void MultibodySystem::constraint_curvature(const State& state, double* c) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), state.v.data());
+    self.for_each_row([&](std::int32_t i, const Row& row) { c[i] = row.curvature(self.at, state.t); });
+    // θ̇ = z · (ω_s − ω_f), and at ω̄˙ = 0 also ω̇ = 0: what is left is ż · (ω_s − ω_f) = (ω_f × z) · ω_s.
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        c[i] = 0.0;
+        for (const auto& [angle, factor] : self.terms_of(gear)) {
+            const auto &first = self.at[angle.first], &second = self.at[angle.second];
+            c[i] += factor * (first.A * first.omega.cross(angle.z)).dot(second.A * second.omega);
+        }
+    });
+}
+
+void MultibodySystem::add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
+                                               MatrixAssembler& H) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), nullptr);
+    self.for_each_row([&](std::int32_t i, const Row& row) {
+        const auto columns = row.columns(self.at);
+        row.hessian(self.at, state.t, columns, self.hessian);
+        add_local(columns, self.hessian, factor * lambda[i], tangent, H);
+    });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        for (const auto& [angle, scale] : self.terms_of(gear)) {
+            const auto first = self.at[angle.first].column, second = self.at[angle.second].column;
+            if (second < 0) continue;
+            const double weight = factor * scale * lambda[i];
+            for (const bool along_second : {true, false}) {
+                const auto column = along_second ? second : first;
+                if (column < 0) continue;
+                const Matrix3d block = angle.turning(self.at, along_second);
+                for (int a = 0; a < 3; ++a)
+                    for (int b = 0; b < 3; ++b) {
+                        const double value = weight * block(a, b);
+                        if (tangent == Tangent::Exact) {
+                            H.add(second + 3 + a, column + 3 + b, value);
+                        } else {
+                            H.add(second + 3 + a, column + 3 + b, 0.5 * value);
+                            H.add(column + 3 + b, second + 3 + a, 0.5 * value);
+                        }
+                    }
+            }
+        }
+    });
+}
+
+}  // namespace delassus

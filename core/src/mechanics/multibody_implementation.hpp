@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <set>
+
+#include "mechanics/elements.hpp"
+#include "mechanics/model.hpp"
+
+namespace delassus {
+
+struct MultibodySystem::Implementation {
+    // ---- As built ----
+    Vector3 gravity{0.0, 0.0, -9.81};
+    std::vector<mechanics::Body> bodies;
+    std::vector<mechanics::Node> nodes;
+    std::vector<mechanics::Joint> joints;
+    std::vector<mechanics::RowSpring> springs;
+    std::vector<mechanics::Load> loads;
+    std::vector<mechanics::Tetrahedron> tetrahedra;
+    std::vector<mechanics::Cable> cables;
+    std::vector<mechanics::BoundedMotor> bounded_motors;
+    mechanics::Motions motions;
+    std::vector<Shape> shapes;
+    std::vector<std::int32_t> shape_material;  // of shapes, then of node contacts
+    struct NodeContact {
+        std::int32_t node = 0;
+        double radius = 0.0;
+        std::int32_t material = 0;
+    };
+    std::vector<NodeContact> node_contacts;
+    std::vector<ContactMaterial> materials;
+    std::map<std::pair<std::int32_t, std::int32_t>, ContactMaterial> material_pairs;
+    std::set<std::pair<BodyIndex, BodyIndex>> apart;
+    double envelope = 0.0;  // 0: chosen by finish()
+    bool finished = false;
+
+    // ---- Since finish() ----
+    std::int32_t n = 0, position_size = 0, m = 0;
+    bool gyroscopic = false;  // a moving body whose moments differ
+    mechanics::Placements initial;
+    std::unique_ptr<CollisionDetector> detector;
+
+    // ---- Work space of the call that runs ----
+    mutable mechanics::Placements at;
+    mutable mechanics::RowVector gradient;
+    mutable mechanics::RowMatrix hessian;
+    std::vector<ContactPoint> contacts;
+    std::vector<Pose> poses;
+
+    void must_be_finished() const;
+    void must_not_be_finished() const;
+    void check_body(BodyIndex body, const std::string& name) const;
+    void check_node(std::int32_t node, std::string_view what) const;
+
+    /// Placements of a state; v may be null for what needs positions alone.
+    void place(const double* q, const double* v) const;
+
+    [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
+    /// Visits all elements with the placements of their nodes: visit(element, placements).
+    template <class Visitor>
+    void for_each_element(const State& state, Visitor&& visit) const {
+        const auto each = [&](const auto& elements) {
+            for (const auto& element : elements) {
+                std::array<mechanics::NodePlacement, std::decay_t<decltype(element)>::size> corners;
+                for (std::size_t k = 0; k < corners.size(); ++k)
+                    corners[k] = node_at(element.nodes()[k], state.q.data(), state.v.data());
+                visit(element, corners);
+            }
+        };
+        each(tetrahedra);
+        each(cables);
+    }
+
+    /// Visits the rows of all joints but gears: visit(row of C, Row).
+    template <class Visitor>
+    void for_each_row(Visitor&& visit) const {
+        for (const auto& joint : joints)
+            for (std::size_t i = 0; i < joint.rows.size(); ++i)
+                visit(joint.first_row + static_cast<std::int32_t>(i), joint.rows[i]);
+    }
+    template <class Visitor>
+    void for_each_gear(Visitor&& visit) const {
+        for (const auto& joint : joints)
+            if (joint.gear) visit(joint.first_row, *joint.gear);
+    }
+
+    /// The two angles of a gear with their factors in C.
+    struct GearTerm {
+        const mechanics::Angle& angle;
+        double factor;
+    };
+    static std::array<GearTerm, 2> terms_of(const mechanics::Gear& gear) {
+        return {GearTerm{gear.second, 1.0}, GearTerm{gear.first, -gear.numerator / gear.denominator}};
+    }
+
+    /// The body of a shape or of a node contact, or the node: bodies first, nodes after them, −1 for the world.
+    [[nodiscard]] std::int32_t owner_of(std::int32_t shape) const;
+    /// Entries of direction · v of a point of an owner.
+    void put_point(std::int32_t owner, const mechanics::Vector3d& point, const mechanics::Vector3d& direction,
+                   double sign, UnilateralRows& rows) const;
+    void make_detector();
+
+    void collect_limits(double h, UnilateralRows& rows) const;
+    void collect_motors(double t, UnilateralRows& rows) const;
+    void collect_contacts(UnilateralRows& rows);
+};
+
+}  // namespace delassus

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "delassus/multibody.hpp"
+
+namespace delassus {
+
+namespace {
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+}
+
+Inertia Inertia::sphere(double mass, double radius) {
+    const double moment = 0.4 * mass * radius * radius;
+    return {moment, moment, moment};
+}
+
+Inertia Inertia::box(double mass, const Vector3& edges) {
+    const double x = edges[0] * edges[0], y = edges[1] * edges[1], z = edges[2] * edges[2];
+    return {mass / 12.0 * (y + z), mass / 12.0 * (z + x), mass / 12.0 * (x + y)};
+}
+
+Inertia Inertia::cylinder(double mass, double radius, double half_length) {
+    const double across = mass * (radius * radius / 4.0 + half_length * half_length / 3.0);
+    return {across, across, 0.5 * mass * radius * radius};
+}
+
+Inertia Inertia::rod(double mass, double length) {
+    // A rod without thickness has no moment about its axis; a millionth of the others stands for it.
+    const double across = mass * length * length / 12.0;
+    return {1e-6 * across, across, across};
+}
+
+Motion Motion::constant(double level) {
+    return {[level](double) { return level; }, [](double) { return 0.0; }, [](double) { return 0.0; },
+            [level](double t) { return level * t; }};
+}
+
+Motion Motion::linear(double start, double slope) {
+    return {[=](double t) { return start + slope * t; }, [=](double) { return slope; }, [](double) { return 0.0; },
+            [=](double t) { return start * t + 0.5 * slope * t * t; }};
+}
+
+Motion Motion::sine(double amplitude, double frequency, double phase, double offset) {
+    const double omega = 2.0 * std::numbers::pi * frequency;
+    return {[=](double t) { return offset + amplitude * std::sin(omega * t + phase); },
+            [=](double t) { return amplitude * omega * std::cos(omega * t + phase); },
+            [=](double t) { return -amplitude * omega * omega * std::sin(omega * t + phase); },
+            [=](double t) {
+                const double swing =
+                    omega == 0.0 ? std::sin(phase) * t : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
+                return offset * t + amplitude * swing;
+            }};
+}
+
+JointParameters::JointParameters() : lower(none), upper(none) {}
+MotorParameters::MotorParameters() : force_limit(std::numeric_limits<double>::infinity()) {}
+SpringParameters::SpringParameters() : rest_length(none) {}
+CableParameters::CableParameters() : rest_length(none) {}
+
+}  // namespace delassus

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mechanics/row.hpp"
+
+#include <cmath>
+
+namespace delassus::mechanics {
+
+namespace {
+
+/// c̄ and its derivatives in time.
+struct Arm {
+    Vector3d c, c_t = Vector3d::Zero(), c_tt = Vector3d::Zero();
+};
+
+Arm arm_of(const Part& part, double t) {
+    if (!part.turn) return {part.arm};
+    const double angle = part.turn->value(t), rate = part.turn->rate(t), acceleration = part.turn->acceleration(t);
+    const double c = std::cos(angle), s = std::sin(angle);
+    const Vector3d along = c * part.arm + s * part.quarter;
+    const Vector3d across = c * part.quarter - s * part.arm;
+    return {along, rate * across, acceleration * across - rate * rate * along};
+}
+
+struct Motion3 {
+    Vector3d value = Vector3d::Zero(), partial = Vector3d::Zero(), velocity = Vector3d::Zero(),
+             curvature = Vector3d::Zero();
+};
+
+Motion3 evaluate(const Feature& feature, const Placements& at, double t) {
+    Motion3 result;
+    for (int k = 0; k < feature.count; ++k) {
+        const Part& part = feature.parts[static_cast<std::size_t>(k)];
+        const Placement& place = at[part.body];
+        const Arm arm = arm_of(part, t);
+        const double l = part.point ? 1.0 : 0.0;
+        const Vector3d turned = place.omega.cross(arm.c);
+        result.value += part.sign * (l * place.x + place.A * arm.c);
+        result.partial += part.sign * (place.A * arm.c_t);
+        result.velocity += part.sign * (l * place.v + place.A * (turned + arm.c_t));
+        result.curvature +=
+            part.sign * (place.A * (place.omega.cross(turned) + 2.0 * place.omega.cross(arm.c_t) + arm.c_tt));
+    }
+    return result;
+}
+
+/// result += J_featureᵀ y.
+void add_transposed(const Feature& feature, const Placements& at, double t, const Vector3d& y,
+                    const RowColumns& columns, double factor, RowVector& result) {
+    for (int k = 0; k < feature.count; ++k) {
+        const Part& part = feature.parts[static_cast<std::size_t>(k)];
+        const Placement& place = at[part.body];
+        if (place.column < 0) continue;
+        const int first = columns.place(place.column);
+        if (part.point) result.segment<3>(first) += factor * part.sign * y;
+        result.segment<3>(first + 3) += factor * part.sign * arm_of(part, t).c.cross(place.A.transpose() * y);
+    }
+}
+
+/// result += factor (∂(J_featureᵀ y)/∂q).
+void add_turning(const Feature& feature, const Placements& at, double t, const Vector3d& y, const RowColumns& columns,
+                 double factor, RowMatrix& result) {
+    for (int k = 0; k < feature.count; ++k) {
+        const Part& part = feature.parts[static_cast<std::size_t>(k)];
+        const Placement& place = at[part.body];
+        if (place.column < 0) continue;
+        const int first = columns.place(place.column) + 3;
+        result.block<3, 3>(first, first) +=
+            factor * part.sign * skew(arm_of(part, t).c) * skew(place.A.transpose() * y);
+    }
+}
+
+/// result += factor J_uᵀ J_w.
+void add_product(const Feature& u, const Feature& w, const Placements& at, double t, const RowColumns& columns,
+                 double factor, RowMatrix& result) {
+    for (int k = 0; k < u.count; ++k) {
+        const Part& left = u.parts[static_cast<std::size_t>(k)];
+        const Placement& left_place = at[left.body];
+        if (left_place.column < 0) continue;
+        const int row = columns.place(left_place.column);
+        const Matrix3d left_turn = -left.sign * left_place.A * skew(arm_of(left, t).c);
+        for (int j = 0; j < w.count; ++j) {
+            const Part& right = w.parts[static_cast<std::size_t>(j)];
+            const Placement& right_place = at[right.body];
+            if (right_place.column < 0) continue;
+            const int column = columns.place(right_place.column);
+            const Matrix3d right_turn = -right.sign * right_place.A * skew(arm_of(right, t).c);
+            if (left.point && right.point)
+                result.block<3, 3>(row, column) += factor * left.sign * right.sign * Matrix3d::Identity();
+            if (left.point) result.block<3, 3>(row, column + 3) += factor * left.sign * right_turn;
+            if (right.point) result.block<3, 3>(row + 3, column) += factor * right.sign * left_turn.transpose();
+            result.block<3, 3>(row + 3, column + 3) += factor * left_turn.transpose() * right_turn;
+        }
+    }
+}
+
+/// f, f', f'' at c.
+struct Outer {
+    double value, slope, second;
+};
+
+Outer outer(const Row& row, double c) {
+    if (!row.length) return {row.scale * c, row.scale, 0.0};
+    const double root = std::sqrt(c);
+    return {root, 0.5 / root, -0.25 / (c * root)};
+}
+
+}  // namespace
+
+RowColumns Row::columns(const Placements& at) const {
+    RowColumns result;
+    for (const Feature* feature : {&u, &w})
+        for (int k = 0; k < feature->count; ++k) {
+            const auto column = at[feature->parts[static_cast<std::size_t>(k)].body].column;
+            if (column >= 0 && result.place(column) < 0)
+                result.column[static_cast<std::size_t>(result.bodies++)] = column;
+        }
+    return result;
+}
+
+double Row::value(const Placements& at, double t) const {
+    const double c = evaluate(u, at, t).value.dot(evaluate(w, at, t).value);
+    return outer(*this, c).value - offset - (drive ? drive->value(t) : 0.0);
+}
+
+void Row::gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const {
+    const Vector3d first = evaluate(u, at, t).value, second = evaluate(w, at, t).value;
+    const double slope = outer(*this, first.dot(second)).slope;
+    result.setZero(6 * columns.bodies);
+    add_transposed(u, at, t, second, columns, slope, result);
+    add_transposed(w, at, t, first, columns, slope, result);
+}
+
+double Row::rate(const Placements& at, double t) const {
+    const Motion3 first = evaluate(u, at, t), second = evaluate(w, at, t);
+    return outer(*this, first.value.dot(second.value)).slope *
+               (first.partial.dot(second.value) + first.value.dot(second.partial)) -
+           (drive ? drive->rate(t) : 0.0);
+}
+
+double Row::curvature(const Placements& at, double t) const {
+    const Motion3 first = evaluate(u, at, t), second = evaluate(w, at, t);
+    const Outer f = outer(*this, first.value.dot(second.value));
+    const double velocity = first.velocity.dot(second.value) + first.value.dot(second.velocity);
+    return f.slope * (first.curvature.dot(second.value) + 2.0 * first.velocity.dot(second.velocity) +
+                      first.value.dot(second.curvature)) +
+           f.second * velocity * velocity - (drive ? drive->acceleration(t) : 0.0);
+}
+
+void Row::hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const {
+    const Vector3d first = evaluate(u, at, t).value, second = evaluate(w, at, t).value;
+    const Outer f = outer(*this, first.dot(second));
+    result.setZero(6 * columns.bodies, 6 * columns.bodies);
+    add_turning(u, at, t, second, columns, f.slope, result);
+    add_turning(w, at, t, first, columns, f.slope, result);
+    add_product(u, w, at, t, columns, f.slope, result);
+    add_product(w, u, at, t, columns, f.slope, result);
+    if (f.second != 0.0) {
+        RowVector inner;
+        inner.setZero(6 * columns.bodies);
+        add_transposed(u, at, t, second, columns, 1.0, inner);
+        add_transposed(w, at, t, first, columns, 1.0, inner);
+        result += f.second * inner * inner.transpose();
+    }
+}
+
+void add_local(const RowColumns& columns, const RowMatrix& matrix, double factor, Tangent tangent, MatrixAssembler& H) {
+    for (int a = 0; a < columns.bodies; ++a)
+        for (int b = 0; b < columns.bodies; ++b)
+            for (int i = 0; i < 6; ++i)
+                for (int j = 0; j < 6; ++j) {
+                    const double value = tangent == Tangent::Exact
+                                             ? matrix(6 * a + i, 6 * b + j)
+                                             : 0.5 * (matrix(6 * a + i, 6 * b + j) + matrix(6 * b + j, 6 * a + i));
+                    H.add(columns.column[static_cast<std::size_t>(a)] + i,
+                          columns.column[static_cast<std::size_t>(b)] + j, factor * value);
+                }
+}
+
+}  // namespace delassus::mechanics

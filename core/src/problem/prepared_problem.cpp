@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "problem/prepared_problem.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "delassus/sdk/cones.hpp"
+
+namespace delassus {
+
+namespace {
+
+delassus_matrix raw_of(const SparseMatrix& matrix) {
+    return {matrix.rows,          matrix.columns,     matrix.entries(), matrix.row_start.data(),
+            matrix.column.data(), matrix.value.data()};
+}
+
+std::uint64_t need_of(Structure structure) {
+    switch (structure) {
+        case Structure::Reduced:
+            return DELASSUS_CAN_REDUCED;
+        case Structure::Diagonal:
+            return DELASSUS_CAN_H_DIAGONAL;
+        case Structure::Blocks:
+            return DELASSUS_CAN_H_BLOCKS;
+        case Structure::Definite:
+            return DELASSUS_CAN_H_DEFINITE;
+        case Structure::Semidefinite:
+            return DELASSUS_CAN_H_SEMIDEFINITE;
+        case Structure::Indefinite:
+            return DELASSUS_CAN_H_INDEFINITE;
+        case Structure::Unsymmetric:
+            return DELASSUS_CAN_H_UNSYMMETRIC;
+    }
+    return 0;
+}
+
+}  // namespace
+
+PreparedProblem::PreparedProblem(Problem problem) : implementation_(std::make_unique<Implementation>()) {
+    auto& self = *implementation_;
+    self.problem = std::move(problem);
+    const auto n = self.problem.n();
+    const auto m = self.problem.m();
+    if (self.problem.H.rows == 0) self.problem.H = SparseMatrix::zero(n, n);
+    if (self.problem.D.rows == 0) self.problem.D = SparseMatrix::zero(m, n);
+    if (self.problem.E.rows == 0) self.problem.E = SparseMatrix::zero(m, m);
+    validate(self.problem);
+    self.lay_out();
+    self.detect_structure();
+    self.derive_needs();
+    self.identify();
+}
+
+PreparedProblem::~PreparedProblem() = default;
+PreparedProblem::PreparedProblem(PreparedProblem&&) noexcept = default;
+PreparedProblem& PreparedProblem::operator=(PreparedProblem&&) noexcept = default;
+
+const Problem& PreparedProblem::problem() const {
+    return implementation_->problem;
+}
+Structure PreparedProblem::structure() const {
+    return implementation_->structure;
+}
+std::uint64_t PreparedProblem::needs() const {
+    return implementation_->raw.needs;
+}
+const delassus_problem& PreparedProblem::raw() const {
+    return implementation_->raw;
+}
+
+void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<double> b) {
+    auto& self = *implementation_;
+    if (a.size() != self.problem.a.size() || b.size() != self.problem.b.size())
+        throw InputError(fmt::format("the right-hand side has {} and {} entries; the problem has n = {} and m = {}",
+                                     a.size(), b.size(), self.problem.n(), self.problem.m()));
+    const auto finite = [](double value) { return std::isfinite(value); };
+    if (!std::all_of(a.begin(), a.end(), finite) || !std::all_of(b.begin(), b.end(), finite))
+        throw InputError("the right-hand side holds a value that is not finite");
+    self.problem.a = std::move(a);
+    self.problem.b = std::move(b);
+    self.raw.a = self.problem.a.data();
+    self.raw.b = self.problem.b.data();
+}
+
+void PreparedProblem::Implementation::lay_out() {
+    blocks = connected_components(problem.H);
+    std::int32_t first_row = 0;
+    for (const Cone& cone : problem.cones) {
+        const bool box = cone.kind == ConeKind::Box;
+        cones.push_back({static_cast<std::int32_t>(cone.kind), first_row, cone.rows, 0, cone.mu,
+                         box ? cone.lo.data() : nullptr, box ? cone.hi.data() : nullptr});
+        first_row += cone.rows;
+    }
+    raw.struct_size = sizeof raw;
+    raw.law = static_cast<std::int32_t>(problem.law);
+    raw.n = problem.n();
+    raw.m = problem.m();
+    raw.H = raw_of(problem.H);
+    raw.D = raw_of(problem.D);
+    raw.E = raw_of(problem.E);
+    raw.a = problem.a.data();
+    raw.b = problem.b.data();
+    raw.cone_count = static_cast<std::int32_t>(cones.size());
+    raw.h_block_count = static_cast<std::int32_t>(blocks.start.size()) - 1;
+    raw.cones = cones.data();
+    raw.h_block_start = blocks.start.data();
+    raw.h_block_index = blocks.index.data();
+}
+
+// A candidate by pattern counts as definite once its factorisation succeeds with pivots that are not rounding.
+void PreparedProblem::Implementation::detect_structure() {
+    structure = structure_by_pattern(problem.H, blocks);
+    if (structure == Structure::Unsymmetric) return;
+    raw.needs = need_of(structure);
+    const sdk::ProblemView view(raw);
+    auto candidate = std::make_unique<sdk::DelassusOperator>();
+    try {
+        candidate->analyze(view);
+        candidate->factorize(view);
+        if (candidate->inverse().smallest_relative_pivot() > 1e-14) {
+            operator_of_definite = std::move(candidate);
+            return;
+        }
+    } catch (const sdk::NumericalFailure&) {
+    }
+    structure = structure_of_singular(problem.H, blocks);
+}
+
+void PreparedProblem::Implementation::derive_needs() {
+    raw.needs = need_of(structure);
+    for (const auto& cone : cones) raw.needs |= sdk::operations_of(cone).capability;
+    if (raw.needs & DELASSUS_CAN_FRICTION)
+        raw.needs |= problem.law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED;
+    if (raw.n > 0 && problem.E.entries() > 0) raw.needs |= DELASSUS_CAN_COMPLIANCE;
+    if (raw.n > 0 && raw.m > 0 && has_redundant_rows(problem.D, problem.E)) raw.needs |= DELASSUS_CAN_REDUNDANT;
+}
+
+void PreparedProblem::Implementation::identify() {
+    Hash pattern;
+    for (const SparseMatrix* matrix : {&problem.H, &problem.D, &problem.E}) {
+        pattern.add(matrix->row_start);
+        pattern.add(matrix->column);
+    }
+    for (const auto& cone : cones) {
+        pattern.add(&cone.kind, sizeof cone.kind);
+        pattern.add(&cone.rows, sizeof cone.rows);
+    }
+    pattern.add_size(need_of(structure));
+    Hash values = pattern;
+    for (const SparseMatrix* matrix : {&problem.H, &problem.D, &problem.E}) values.add(matrix->value);
+    raw.pattern_id = pattern.value();
+    raw.values_id = values.value();
+}
+
+}  // namespace delassus

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// problem.json: everything of a problem but its matrices and vectors.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/problem.hpp"
+
+namespace delassus {
+
+struct ProblemJson {
+    std::int32_t n = 0;
+    std::int32_t m = 0;
+    Law law = Law::Associated;
+    std::string source;
+    std::string notes;
+
+    /// The rows that the runs cover are known to be m; expanding them is left to expand_cones, for when the vectors
+    /// have shown that m is honest.
+    struct Run {
+        ConeKind kind = ConeKind::Free;
+        std::int32_t rows = 0;       ///< of a block
+        std::int32_t count = 1;      ///< blocks
+        std::vector<double> mu;      ///< one for all, or one for each block
+        std::vector<double> lo, hi;  ///< one for all rows, or one for each
+    };
+    std::vector<Run> runs;
+};
+
+/// Parses the text, key by key; file names it in messages. Throws InputError.
+ProblemJson parse_problem_json(std::string_view text, const std::string& file);
+
+/// One block for each run of rows and for each of the friction cones.
+std::vector<Cone> expand_cones(const ProblemJson& json);
+
+/// The text for a valid problem; neighbouring friction cones of one dimension form a run.
+std::string problem_json_text(const Problem& problem);
+
+}  // namespace delassus

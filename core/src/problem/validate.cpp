@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "delassus/error.hpp"
+#include "delassus/problem.hpp"
+#include "problem/symmetry.hpp"
+
+namespace delassus {
+namespace {
+
+/// Refuses with one sentence that begins with the problem's name.
+class Checker {
+public:
+    explicit Checker(const Problem& problem) : problem_(problem) {}
+
+    void run() const {
+        vector(problem_.a, "a");
+        vector(problem_.b, "b");
+        const std::int32_t n = problem_.n();
+        const std::int32_t m = problem_.m();
+        matrix(problem_.H, "H", n, n, "n × n");
+        if (n > 0 && problem_.H.rows == 0) {
+            refuse("H is absent, but a has {} entries; give an {} × {} matrix, or an empty a for a reduced problem.", n,
+                   n, n);
+        }
+        matrix(problem_.D, "D", m, n, "m × n");
+        matrix(problem_.E, "E", m, m, "m × m");
+        cones();
+        compliance();
+        symmetry_of_H();
+        if (problem_.law != Law::Associated && problem_.law != Law::Coulomb) {
+            refuse("its friction law has the number {}; 0 (associated) and 1 (coulomb) exist.",
+                   static_cast<int>(problem_.law));
+        }
+    }
+
+private:
+    template <class... Arguments>
+    [[noreturn]] void refuse(fmt::format_string<Arguments...> text, Arguments&&... arguments) const {
+        const std::string sentence = fmt::format(text, std::forward<Arguments>(arguments)...);
+        if (problem_.name.empty()) throw InputError("The problem is not valid: " + sentence);
+        throw InputError(fmt::format("The problem \"{}\" is not valid: {}", problem_.name, sentence));
+    }
+
+    void vector(const std::vector<double>& v, const char* name) const {
+        if (v.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
+            refuse("{} has {} entries; at most 2147483646 are possible.", name, v.size());
+        }
+        for (std::size_t k = 0; k < v.size(); ++k) {
+            if (!std::isfinite(v[k])) refuse("{}[{}] is {}; every entry must be finite.", name, k, v[k]);
+        }
+    }
+
+    void matrix(const SparseMatrix& A, const char* name, std::int32_t rows, std::int32_t columns,
+                const char* shape) const {
+        const bool absent = A.rows == 0 && A.columns == 0;
+        if (!absent && (A.rows != rows || A.columns != columns)) {
+            refuse("{} is {} × {}; it must be {} = {} × {}, since a has {} and b has {} entries.", name, A.rows,
+                   A.columns, shape, rows, columns, problem_.n(), problem_.m());
+        }
+        if (A.row_start.size() != static_cast<std::size_t>(A.rows) + 1) {
+            refuse("{}.row_start has {} positions; {} rows need {}.", name, A.row_start.size(), A.rows,
+                   static_cast<std::int64_t>(A.rows) + 1);
+        }
+        if (A.column.size() != A.value.size()) {
+            refuse("{} has {} columns and {} values; each entry needs one of both.", name, A.column.size(),
+                   A.value.size());
+        }
+        if (A.row_start[0] != 0 || A.row_start.back() < 0 ||
+            static_cast<std::size_t>(A.row_start.back()) != A.value.size()) {
+            refuse("{}.row_start goes from {} to {}; it must go from 0 to the number of entries, {}.", name,
+                   A.row_start[0], A.row_start.back(), A.value.size());
+        }
+        // All positions first: only then is it safe to look at the entries of a row.
+        for (std::int32_t row = 0; row < A.rows; ++row) {
+            if (A.row_start[row + 1] < A.row_start[row]) {
+                refuse("{}.row_start descends at row {}; positions must not descend.", name, row);
+            }
+        }
+        for (std::int32_t row = 0; row < A.rows; ++row) {
+            for (std::int32_t k = A.row_start[row]; k < A.row_start[row + 1]; ++k) {
+                if (A.column[k] < 0 || A.column[k] >= A.columns) {
+                    refuse("row {} of {} has an entry in column {}; columns go from 0 to {}.", row, name, A.column[k],
+                           A.columns - 1);
+                }
+                if (k > A.row_start[row] && A.column[k] <= A.column[k - 1]) {
+                    refuse("row {} of {} has column {} after column {}; columns must ascend and not repeat.", row, name,
+                           A.column[k], A.column[k - 1]);
+                }
+                if (!std::isfinite(A.value[k])) {
+                    refuse("{}({}, {}) is {}; every entry must be finite.", name, row, A.column[k], A.value[k]);
+                }
+            }
+        }
+    }
+
+    void cones() const {
+        std::int64_t rows = 0;
+        for (std::size_t c = 0; c < problem_.cones.size(); ++c) {
+            const Cone& block = problem_.cones[c];
+            switch (block.kind) {
+                case ConeKind::Free:
+                case ConeKind::Nonnegative:
+                case ConeKind::Box:
+                    if (block.rows < 1) refuse("cone {} has {} rows; it needs at least one.", c, block.rows);
+                    break;
+                case ConeKind::Friction:
+                    if (block.rows != 2 && block.rows != 3) {
+                        refuse("cone {} is a friction cone of {} rows; it must have 3, or 2 in the plane.", c,
+                               block.rows);
+                    }
+                    if (!std::isfinite(block.mu) || block.mu < 0) {
+                        refuse("cone {} has the friction coefficient {}; it must be finite and not negative.", c,
+                               block.mu);
+                    }
+                    break;
+                default:
+                    refuse("cone {} has the kind number {}; 0 to 3 exist.", c, static_cast<int>(block.kind));
+            }
+            bounds(block, c);
+            rows += block.rows;
+        }
+        if (rows != problem_.m()) {
+            refuse("its cones cover {} rows, but b has {} entries; each row belongs to one cone.", rows, problem_.m());
+        }
+    }
+
+    void bounds(const Cone& block, std::size_t c) const {
+        const std::size_t wanted = block.kind == ConeKind::Box ? static_cast<std::size_t>(block.rows) : 0;
+        if (block.lo.size() != wanted || block.hi.size() != wanted) {
+            refuse("cone {} ({}, {} rows) has {} lower and {} upper bounds; it must have {} of each.", c,
+                   name_of(block.kind), block.rows, block.lo.size(), block.hi.size(), wanted);
+        }
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        for (std::size_t k = 0; k < wanted; ++k) {
+            const double lo = block.lo[k];
+            const double hi = block.hi[k];
+            if (!(lo <= hi) || lo == infinity || hi == -infinity) {
+                refuse("row {} of cone {} has the bounds lo = {} and hi = {}; they must be numbers with lo <= hi.", k,
+                       c, lo, hi);
+            }
+        }
+    }
+
+    void compliance() const {
+        const SparseMatrix& E = problem_.E;
+        for (std::int32_t row = 0; row < E.rows; ++row) {
+            for (std::int32_t k = E.row_start[row]; k < E.row_start[row + 1]; ++k) {
+                if (E.column[k] == row && E.value[k] < 0) {
+                    refuse("E({}, {}) is {}; E must be positive semidefinite, so its diagonal cannot be negative.", row,
+                           row, E.value[k]);
+                }
+            }
+        }
+        const Asymmetry asymmetry = asymmetry_of(E);
+        if (asymmetry.relative > symmetry_tolerance) {
+            refuse(
+                "E is not symmetric: E({}, {}) differs from E({}, {}) by {:.1e} of the largest entry; "
+                "at most {:.0e} is taken for rounding.",
+                asymmetry.row, asymmetry.column, asymmetry.column, asymmetry.row, asymmetry.relative,
+                symmetry_tolerance);
+        }
+    }
+
+    void symmetry_of_H() const {
+        for (std::size_t c = 0; c < problem_.cones.size(); ++c) {
+            if (problem_.cones[c].kind == ConeKind::Free) continue;
+            const Asymmetry asymmetry = asymmetry_of(problem_.H);
+            if (asymmetry.relative > symmetry_tolerance) {
+                refuse(
+                    "H is not symmetric (H({}, {}) differs from H({}, {}) by {:.1e} of the largest entry), "
+                    "but cone {} is {}; an unsymmetric H goes with free rows only.",
+                    asymmetry.row, asymmetry.column, asymmetry.column, asymmetry.row, asymmetry.relative, c,
+                    name_of(problem_.cones[c].kind));
+            }
+            return;
+        }
+    }
+
+    const Problem& problem_;
+};
+
+}  // namespace
+
+void validate(const Problem& problem) {
+    Checker(problem).run();
+}
+
+}  // namespace delassus

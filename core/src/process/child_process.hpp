@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A program run as a child process: watched, limited, and killed with everything it started.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace delassus {
+
+struct ChildSettings {
+    std::filesystem::path program;                                 ///< absolute
+    std::vector<std::string> arguments;                            ///< without the program's own name
+    std::string input;                                             ///< what it reads on standard input
+    std::vector<std::pair<std::string, std::string>> environment;  ///< set on top of this process's own
+
+    double timeout = 0.0;            ///< wall seconds until it is killed; infinity for never
+    std::uint64_t memory_limit = 0;  ///< bytes of address space (RLIMIT_AS); 0 for none
+    std::optional<int> core;         ///< the only core that it may run on, as far as the system grants that
+
+    /// Called with each piece of standard output as it comes; answers the seconds that the child has from now on, in
+    /// place of what was left. May be empty: the output is then collected in ChildResult.
+    std::function<double(std::string_view)> on_output;
+    /// Asked about twenty times a second; true: the child is sent SIGINT, and killed if it is still there after
+    /// cancel_grace. May be empty.
+    std::function<bool()> cancelled;
+    double cancel_grace = 2.0;  ///< seconds
+};
+
+struct ChildResult {
+    std::optional<int> exit_code;  ///< if it ended by itself
+    int signal = 0;                ///< the signal that ended it, or 0
+    bool timed_out = false;        ///< killed after its time
+    bool cancelled = false;        ///< asked to stop by `cancelled`
+    double seconds = 0.0;          ///< wall time
+    std::int64_t peak_memory = 0;  ///< bytes resident at most (of it alone)
+    std::string output;            ///< standard output, unless on_output took it
+    std::string errors;            ///< the last 64 KiB of standard error
+};
+
+/// Runs the program to its end in a process group of its own, whatever is left of the group being killed then. It dies
+/// with this process, and leaves no core dump. Throws Error if it cannot be started.
+ChildResult run_child(const ChildSettings& settings);
+
+/// The cores that this process may run on.
+[[nodiscard]] std::vector<int> allowed_cores();
+
+/// "SIGSEGV (Segmentation fault)".
+[[nodiscard]] std::string signal_name(int signal_number);
+
+/// The path of this program.
+[[nodiscard]] std::filesystem::path own_program();
+
+}  // namespace delassus

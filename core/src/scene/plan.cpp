@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "delassus/error.hpp"
+#include "delassus/simulation.hpp"
+
+namespace delassus {
+namespace {
+
+std::string counted(std::size_t count, std::string_view one, std::string_view many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
+/// "a, b, c and 4 more".
+std::string some_of(const std::vector<std::string>& names) {
+    constexpr std::size_t most = 3;
+    std::vector<std::string> shown(names.begin(),
+                                   names.begin() + static_cast<std::ptrdiff_t>(std::min(most, names.size())));
+    std::string text = fmt::format("{}", fmt::join(shown, ", "));
+    if (names.size() > most) text += fmt::format(" and {} more", names.size() - most);
+    return text;
+}
+
+/// What of the system can touch what: the pairs of materials, each with its friction, that two shapes of different
+/// bodies have of which one moves and which are not kept apart.
+class Touching {
+public:
+    explicit Touching(const SceneSystem& system) : system_(system), apart_(system.apart.begin(), system.apart.end()) {
+        const auto& shapes = system.system->shapes();
+        shape_moves_ = std::any_of(shapes.begin(), shapes.end(), [&](const Shape& shape) { return moves(shape.body); });
+        // Shapes by material and body: equal ones behave equally.
+        std::map<std::int32_t, std::set<BodyIndex>> bodies;
+        for (std::size_t i = 0; i < shapes.size(); ++i) bodies[system.shape_material[i]].insert(shapes[i].body);
+        // Nodes do not touch one another: all of them are as one more body.
+        for (const auto& block : system.elastic_blocks) {
+            if (block.contact_radius == 0.0) continue;
+            nodes_touch_ = shape_moves_ = true;
+            bodies[block.contact_material].insert(static_cast<BodyIndex>(system.bodies.size()));
+        }
+        for (auto first = bodies.begin(); first != bodies.end(); ++first)
+            for (auto second = first; second != bodies.end(); ++second)
+                if (any_pair(first->second, second->second))
+                    pairs_.push_back({first->first, second->first, friction(first->first, second->first)});
+    }
+
+    struct Pair {
+        std::int32_t first, second;
+        double friction;
+    };
+    [[nodiscard]] const std::vector<Pair>& pairs() const { return pairs_; }
+    /// Whether the system makes a collision detector: see MultibodySystem::finish().
+    [[nodiscard]] bool detects() const {
+        return shape_moves_ && (nodes_touch_ || system_.system->shapes().size() >= 2);
+    }
+    [[nodiscard]] bool nodes_touch() const { return nodes_touch_; }
+
+private:
+    [[nodiscard]] bool moves(BodyIndex body) const {
+        const auto index = static_cast<std::size_t>(body);
+        return body != world_body && (index >= system_.bodies.size() || !system_.bodies[index].fixed);
+    }
+    [[nodiscard]] bool any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second) const {
+        for (const BodyIndex a : first)
+            for (const BodyIndex b : second)
+                if (a != b && (moves(a) || moves(b)) && !apart_.contains({std::min(a, b), std::max(a, b)})) return true;
+        return false;
+    }
+    [[nodiscard]] double friction(std::int32_t first, std::int32_t second) const {
+        double result = std::sqrt(system_.materials[static_cast<std::size_t>(first)].contact.friction *
+                                  system_.materials[static_cast<std::size_t>(second)].contact.friction);
+        for (const auto& pair : system_.material_pairs)
+            if (pair.first == std::min(first, second) && pair.second == std::max(first, second))
+                result = pair.contact.friction;
+        return result;
+    }
+
+    const SceneSystem& system_;
+    std::set<std::array<BodyIndex, 2>> apart_;
+    bool shape_moves_ = false, nodes_touch_ = false;
+    std::vector<Pair> pairs_;
+};
+
+class Planner {
+public:
+    Planner(SceneSystem& system, const Registry& registry)
+        : system_(system), registry_(registry), simulation_(system, registry), touching_(system) {
+        plan_.name = system.name;
+        plan_.velocities = system.system->n();
+        plan_.constraints = system.system->m();
+    }
+
+    SystemPlan make() {
+        first_step();
+        bodies();
+        constraints();
+        contacts();
+        matrix();
+        solvers();
+        plan_.left_out.insert(plan_.left_out.begin(), nothing_.begin(), nothing_.end());
+        for (const auto& one : system_.left_out) plan_.left_out.push_back({one.what, one.reason});
+        return std::move(plan_);
+    }
+
+private:
+    void keep(std::string what, std::string reason) { plan_.kept.push_back({std::move(what), std::move(reason)}); }
+    void leave(std::string what, std::string reason) { plan_.left_out.push_back({std::move(what), std::move(reason)}); }
+
+    void first_step() {
+        const double end = std::exchange(system_.end, std::max(system_.end, system_.step));  // at least one step
+        simulation_.solver().on_problem = [this](const Problem& problem) {
+            std::int32_t parts = 0;
+            for (const auto& part : simulation_.solver().parts(problem)) {
+                sparse_ = sparse_ || part.structure > Structure::Blocks;
+                if (part.m == 0) continue;
+                ++parts;
+                needs_ |= part.needs;
+            }
+            plan_.parts = std::max(plan_.parts, parts);
+        };
+        simulation_.step();
+        system_.end = end;
+        plan_.solvers = simulation_.solver().loaded();
+    }
+
+    void bodies() {
+        std::vector<std::string> fixed, free, moving;
+        std::set<BodyIndex> held;
+        const auto hold = [&](BodyIndex first, BodyIndex second) {
+            held.insert(first);
+            held.insert(second);
+        };
+        for (const auto& joint : system_.joints)
+            if (joint.kind != JointKind::Gear) hold(joint.first, joint.second);
+        for (const auto& spring : system_.springs) hold(spring.first, spring.second);
+        for (const auto& bushing : system_.bushings) hold(bushing.first, bushing.second);
+        if (!touching_.pairs().empty())
+            for (const auto& shape : system_.system->shapes()) held.insert(shape.body);
+        for (std::size_t i = 0; i < system_.bodies.size(); ++i) {
+            const auto& body = system_.bodies[i];
+            moving.push_back(body.name);
+            if (body.fixed) {
+                fixed.push_back(body.name);
+                moving.pop_back();
+            } else if (!held.contains(static_cast<BodyIndex>(i))) {
+                free.push_back(body.name);
+            }
+        }
+        if (!moving.empty())
+            keep(counted(moving.size(), "moving body", "moving bodies"), "6 velocities each: " + some_of(moving));
+        if (const auto nodes = system_.system->node_count(); nodes > 0)
+            keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities each that moves");
+        if (!fixed.empty())
+            leave(counted(fixed.size(), "fixed body", "fixed bodies"), "no unknowns, no columns: " + some_of(fixed));
+        if (!free.empty())
+            leave(counted(free.size(), "free body", "free bodies"),
+                  "nothing touches or holds them, so they reach no solver: " + some_of(free));
+    }
+
+    void constraints() {
+        if (plan_.constraints > 0) {
+            keep(fmt::format("{} rows of joints and motors", plan_.constraints),
+                 fmt::format("{}, in {} that are solved apart", counted(system_.joints.size(), "joint", "joints"),
+                             counted(static_cast<std::size_t>(plan_.parts), "part", "parts")));
+        } else {
+            leave("bilateral constraints", "the system has no joint with rows");
+        }
+        for (const auto& joint : system_.joints)
+            if (!std::isnan(joint.lower) || !std::isnan(joint.upper)) needs_ |= DELASSUS_CAN_NONNEGATIVE;
+        if (has_limits()) keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");
+        for (const auto& motor : system_.motors) {
+            if (std::isinf(motor.force_limit)) continue;
+            needs_ |= DELASSUS_CAN_BOX;
+            keep(fmt::format("motor \"{}\" as a box row", motor.name), "its force is limited");
+        }
+    }
+    [[nodiscard]] bool has_limits() const {
+        return std::any_of(system_.joints.begin(), system_.joints.end(),
+                           [](const auto& joint) { return !std::isnan(joint.lower) || !std::isnan(joint.upper); });
+    }
+
+    void contacts() {
+        if (touching_.detects()) {
+            keep("collision detection", counted(system_.system->shapes().size(), "shape", "shapes") +
+                                            (touching_.nodes_touch() ? " and nodes of elastic blocks" : ""));
+            plan_.libraries.emplace_back("delassus_collision.so");
+        } else {
+            leave("collision detection",
+                  system_.system->shapes().empty() ? "no body has a shape" : "no two shapes could ever meet");
+        }
+        bool friction = false;
+        for (const auto& pair : touching_.pairs()) {
+            const auto& first = system_.materials[static_cast<std::size_t>(pair.first)].name;
+            const auto& second = system_.materials[static_cast<std::size_t>(pair.second)].name;
+            if (pair.friction > 0.0) {
+                friction = true;
+                keep(fmt::format("friction cones of 3 rows, {} on {}", first, second),
+                     fmt::format("friction {:.4g}", pair.friction));
+            } else {
+                needs_ |= DELASSUS_CAN_NONNEGATIVE;
+                keep(fmt::format("contacts of 1 row, {} on {}", first, second), "friction is zero");
+                leave(fmt::format("2 of 3 rows of each contact, {} on {}", first, second), "friction is zero");
+            }
+        }
+        if (friction) {
+            const Law law = system_.solver.law.value_or(Law::Associated);
+            needs_ |= DELASSUS_CAN_FRICTION | (law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED);
+        } else {
+            leave("friction cones",
+                  touching_.pairs().empty() ? "nothing can touch" : "no pair of materials has friction");
+        }
+    }
+
+    void matrix() {
+        if (sparse_) {
+            keep("a sparse H", "forces or constraints couple bodies in it; it is factorised");
+        } else {
+            leave("factorisation of H", "no stiffness couples bodies: H is diagonal by blocks of one body");
+        }
+    }
+
+    void solvers() {
+        constexpr std::uint64_t cones =
+            DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
+        constexpr std::uint64_t unilateral = cones & ~static_cast<std::uint64_t>(DELASSUS_CAN_FREE);
+        if ((needs_ & cones) == 0) {
+            nothing_.push_back({"a solver", "no row in any problem: velocities follow from H alone"});
+            return;
+        }
+        // Contacts that are not there yet: bodies may touch, with any kind of redundancy among their rows.
+        if (needs_ & unilateral) {
+            std::uint64_t all = needs_ | (sparse_ ? DELASSUS_CAN_H_DEFINITE : DELASSUS_CAN_H_BLOCKS);
+            if (!touching_.pairs().empty()) all |= DELASSUS_CAN_REDUNDANT;
+            const std::string name = simulation_.solver().choice(all);
+            if (name.empty())
+                throw Unsupported(fmt::format("system \"{}\": no installed solver can take all that it may need: {}",
+                                              system_.name, fmt::join(capability_names(all), ", ")));
+            if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
+                plan_.solvers.push_back(name);
+        } else {
+            nothing_.push_back({"a solver for cones", "no contact, stop or limited motor: every row is bilateral"});
+        }
+        for (const auto& name : plan_.solvers) {
+            const bool chosen = name == system_.solver.name;
+            keep(fmt::format("solver {}", name),
+                 chosen ? "the scene names it" : "the first of the preference list that can take the problems");
+            const bool file = name.find('/') != std::string::npos || name.ends_with(".so");
+            plan_.libraries.push_back(file ? name : registry_.find(name).library.filename().string());
+        }
+    }
+
+    SceneSystem& system_;
+    const Registry& registry_;
+    Simulation simulation_;
+    Touching touching_;
+    SystemPlan plan_;
+    std::vector<PlanLine> nothing_;
+    std::uint64_t needs_ = 0;
+    bool sparse_ = false;
+};
+
+}  // namespace
+
+std::vector<SystemPlan> make_plan(Scene& scene, const Registry& registry) {
+    std::vector<SystemPlan> plans;
+    for (auto& system : scene.systems) plans.push_back(Planner(system, registry).make());
+    return plans;
+}
+
+}  // namespace delassus

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Materials, bodies with their shapes, and nodes of a scene.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "scene/mass_properties.hpp"
+#include "scene/system_reader.hpp"
+
+namespace delassus::scene {
+
+ContactMaterial SystemReader::read_contact_material(const YAML::Node& node, std::string_view name,
+                                                    std::vector<std::pair<std::string_view, Handler>> more) {
+    ContactMaterial material;
+    more.emplace_back("friction",
+                      [&](const YAML::Node& n) { material.friction = nonnegative_number(source_, n, "friction"); });
+    more.emplace_back("restitution", [&](const YAML::Node& n) {
+        material.restitution = finite_number(source_, n, "restitution");
+        if (material.restitution < 0.0 || material.restitution > 1.0)
+            source_.refuse(n, fmt::format("\"restitution\" is {}; it must be from 0 to 1", material.restitution));
+    });
+    read_map(source_, node, name, more);
+    return material;
+}
+
+void SystemReader::read_materials(const YAML::Node& node) {
+    if (!node.IsMap()) source_.refuse(node, "\"materials\" must be a map of names to materials");
+    for (const auto& entry : node) {
+        const std::string name = scalar(source_, entry.first, "key");
+        const auto material = read_contact_material(entry.second, fmt::format("the material \"{}\"", name));
+        const auto number = at(entry.second, [&] { return result_.system->add_material(material); });
+        take_name(entry.first, materials_, "material", name, number);
+        result_.materials.push_back({name, material});
+    }
+}
+
+void SystemReader::read_material_pair(const YAML::Node& item, const Copy&) {
+    std::int32_t first = -1, second = -1;
+    const auto material =
+        read_contact_material(item, "a material pair",
+                              {{"first", [&](const YAML::Node& n) { first = material_named(n, "first"); }},
+                               {"second", [&](const YAML::Node& n) { second = material_named(n, "second"); }}});
+    if (first < 0 || second < 0) source_.refuse(item, "a material pair needs the keys \"first\" and \"second\"");
+    at(item, [&] { result_.system->set_material_pair(first, second, material); });
+    result_.material_pairs.push_back({std::min(first, second), std::max(first, second), material});
+}
+
+Shape SystemReader::read_shape_kind(const YAML::Node& item, std::string_view kind, const YAML::Node& node) {
+    Shape shape;
+    std::optional<double> radius, length;
+    std::optional<Vector3> size;
+    const auto name = fmt::format("\"{}\"", kind);
+    const auto need = [&](const auto& number, std::string_view key) {
+        if (!number) source_.refuse(node.IsDefined() ? node : item, fmt::format("{} lacks the key \"{}\"", name, key));
+        return *number;
+    };
+    const std::pair<std::string_view, Handler> read_radius{
+        "radius", [&](const YAML::Node& n) { radius = positive_number(source_, n, "radius"); }};
+    const std::pair<std::string_view, Handler> read_length{
+        "length", [&](const YAML::Node& n) { length = positive_number(source_, n, "length"); }};
+    if (kind == "sphere") {
+        shape.kind = ShapeKind::Sphere;
+        read_map(source_, node, name, {read_radius});
+        shape.size[0] = need(radius, "radius");
+    } else if (kind == "box") {
+        shape.kind = ShapeKind::Box;
+        read_map(source_, node, name,
+                 {{"size", [&](const YAML::Node& n) {
+                       size = vector3(source_, n, "size");
+                       if (!std::all_of(size->begin(), size->end(), [](double v) { return v > 0; }))
+                           source_.refuse(n, "\"size\" must be three positive numbers");
+                   }}});
+        shape.size = need(size, "size");
+        for (double& edge : shape.size) edge *= 0.5;
+    } else if (kind == "plane") {
+        shape.kind = ShapeKind::Plane;
+        if (!node.IsNull()) read_map(source_, node, name, {});
+    } else {
+        shape.kind = kind == "capsule" ? ShapeKind::Capsule : ShapeKind::Cylinder;
+        read_map(source_, node, name, {read_radius, read_length});
+        shape.size = {need(radius, "radius"), 0.5 * need(length, "length"), 0.0};
+    }
+    return shape;
+}
+
+std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Node& node) {
+    std::vector<ShapeOfBody> shapes;
+    for (const YAML::Node& item : elements(source_, node, "shapes")) {
+        std::optional<Shape> kind;
+        ShapeOfBody one;
+        one.node = item;
+        Pose pose;
+        double margin = 0.0;
+        std::vector<std::pair<std::string_view, Handler>> handlers = {
+            {"material", [&](const YAML::Node& n) { one.material = material_named(n, "material"); }},
+            {"position", [&](const YAML::Node& n) { pose.position = vector3(source_, n, "position"); }},
+            {"orientation", [&](const YAML::Node& n) { pose.orientation = orientation(source_, n); }},
+            {"margin", [&](const YAML::Node& n) { margin = nonnegative_number(source_, n, "margin"); }}};
+        for (const char* name : {"sphere", "box", "capsule", "cylinder", "plane"})
+            handlers.emplace_back(name, [&, name](const YAML::Node& n) {
+                if (kind) source_.refuse(n, "a shape is of one kind, not of several");
+                kind = read_shape_kind(item, name, n);
+            });
+        read_map(source_, item, "a shape", handlers);
+        if (!kind)
+            source_.refuse(item,
+                           "a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
+                           "\"plane\"");
+        one.shape = *kind;
+        one.shape.pose = pose;
+        one.shape.margin = margin;
+        shapes.push_back(std::move(one));
+    }
+    return shapes;
+}
+
+namespace {
+
+Inertia scaled(const Inertia& inertia, double factor) {
+    return {factor * inertia.xx, factor * inertia.yy, factor * inertia.zz,
+            factor * inertia.xy, factor * inertia.xz, factor * inertia.yz};
+}
+
+}  // namespace
+
+void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
+    BodyParameters body;
+    body.pose.position = copy.offset;
+    std::optional<double> mass, density;
+    std::optional<Inertia> inertia;
+    std::vector<ShapeOfBody> shapes;
+    read_map(source_, item, "a body",
+             {{"name", [&](const YAML::Node& n) { body.name = name_in(source_, n, "name", copy); }},
+              {"mass", [&](const YAML::Node& n) { mass = positive_number(source_, n, "mass"); }},
+              {"density", [&](const YAML::Node& n) { density = positive_number(source_, n, "density"); }},
+              {"inertia",
+               [&](const YAML::Node& n) {
+                   Inertia J{0.0, 0.0, 0.0};
+                   const auto into = [&](double& entry, std::string_view key) {
+                       return std::pair<std::string_view, Handler>{
+                           key, [&, key](const YAML::Node& v) { entry = finite_number(source_, v, key); }};
+                   };
+                   read_map(source_, n, "\"inertia\"",
+                            {into(J.xx, "xx"), into(J.yy, "yy"), into(J.zz, "zz"), into(J.xy, "xy"), into(J.xz, "xz"),
+                             into(J.yz, "yz")});
+                   inertia = J;
+               }},
+              {"position", [&](const YAML::Node& n) { body.pose.position = point_in(source_, n, "position", copy); }},
+              {"orientation", [&](const YAML::Node& n) { body.pose.orientation = orientation(source_, n); }},
+              {"velocity", [&](const YAML::Node& n) { body.velocity = vector3(source_, n, "velocity"); }},
+              {"angular_velocity",
+               [&](const YAML::Node& n) { body.angular_velocity = vector3(source_, n, "angular_velocity"); }},
+              {"fixed", [&](const YAML::Node& n) { body.fixed = truth(source_, n, "fixed"); }},
+              {"shapes", [&](const YAML::Node& n) { shapes = read_shapes(n); }},
+              {"repeat", [](const YAML::Node&) {}}});
+    if (mass && density) source_.refuse(item, "a body has either \"mass\" or \"density\", not both");
+    if (!body.fixed) {
+        if (!mass && !density)
+            source_.refuse(item,
+                           fmt::format("body \"{}\" lacks the key \"mass\" (or \"density\", with shapes)", body.name));
+        if (density && inertia) source_.refuse(item, "a body with \"density\" takes its inertia from its shapes");
+        if (inertia) {
+            body.mass = *mass;
+            body.inertia = *inertia;
+        } else {
+            if (shapes.empty())
+                source_.refuse(item, fmt::format("body \"{}\" lacks the key \"inertia\", and has no shapes from which "
+                                                 "it would follow",
+                                                 body.name));
+            std::vector<Shape> solids;
+            for (const auto& one : shapes) solids.push_back(one.shape);
+            const auto properties = at(item, [&] { return mass_properties(solids); });
+            const auto& c = properties.centre;
+            if (std::hypot(c[0], c[1], c[2]) > 1e-6 * std::cbrt(properties.volume))
+                source_.refuse(item, fmt::format("the mass centre of the shapes of body \"{}\" is at ({:.6g}, {:.6g}, "
+                                                 "{:.6g}) in its frame; it must be at the origin",
+                                                 body.name, c[0], c[1], c[2]));
+            body.mass = mass ? *mass : *density * properties.volume;
+            body.inertia = scaled(properties.inertia, body.mass / properties.volume);
+        }
+    }
+    const auto index = at(item, [&] { return result_.system->add_body(body); });
+    take_name(item, bodies_, "body", body.name, index);
+    result_.bodies.push_back(body);
+    for (auto& one : shapes) {
+        if (one.material < 0) {
+            const auto [place, added] = materials_.emplace("frictionless", 0);
+            if (added) {
+                place->second = result_.system->add_material({});
+                result_.materials.push_back({"frictionless", {}});
+            }
+            one.material = place->second;
+        }
+        one.shape.body = index;
+        at(one.node, [&] { result_.system->add_shape(one.shape, one.material); });
+        result_.shape_material.push_back(one.material);
+    }
+}
+
+void SystemReader::read_node(const YAML::Node& item, const Copy& copy) {
+    NodeParameters node;
+    node.position = copy.offset;
+    read_map(source_, item, "a node",
+             {{"name", [&](const YAML::Node& n) { node.name = name_in(source_, n, "name", copy); }},
+              {"mass", [&](const YAML::Node& n) { node.mass = nonnegative_number(source_, n, "mass"); }},
+              {"position", [&](const YAML::Node& n) { node.position = point_in(source_, n, "position", copy); }},
+              {"velocity", [&](const YAML::Node& n) { node.velocity = vector3(source_, n, "velocity"); }},
+              {"fixed", [&](const YAML::Node& n) { node.fixed = truth(source_, n, "fixed"); }},
+              {"repeat", [](const YAML::Node&) {}}});
+    const auto number = at(item, [&] { return result_.system->add_node(node); });
+    take_name(item, nodes_, "node", node.name, number);
+    result_.nodes.push_back(node);
+}
+
+}  // namespace delassus::scene

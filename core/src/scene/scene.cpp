@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/scene.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+
+#include "config/sections.hpp"
+#include "scene/overrides.hpp"
+#include "scene/system_reader.hpp"
+#include "support/text_file.hpp"
+
+namespace delassus {
+namespace {
+
+using scene::SystemReader;
+
+void read_one_system(const Source& source, const YAML::Node& map, Scene& scene, std::string name, std::string_view what,
+                     std::vector<std::pair<std::string_view, Handler>> more = {}) {
+    SceneSystem system;
+    system.name = std::move(name);
+    SystemReader reader(source, system);
+    auto handlers = reader.handlers();
+    handlers.insert(handlers.end(), more.begin(), more.end());
+    read_map(source, map, what, handlers);
+    reader.build(map);
+    scene.systems.push_back(std::move(system));
+}
+
+/// A name of a system becomes part of file names.
+void check_system_name(const Source& source, const YAML::Node& node, const std::string& name) {
+    const bool plain = !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+    });
+    if (!plain) source.refuse(node, fmt::format("\"{}\" cannot name a system; use letters, digits, _ and -", name));
+}
+
+void apply(const SceneOverrides& overrides, SceneSystem& system) {
+    if (!overrides.solver.empty()) {
+        const SolverConfig chosen = parse_solver(overrides.solver);
+        if (chosen.name != system.solver.name) system.solver.options.clear();
+        system.solver.name = chosen.name;
+        for (const auto& [key, text] : chosen.options) system.solver.options.insert_or_assign(key, text);
+    }
+    if (!overrides.integrator.empty()) {
+        const auto [name, options] = parse_name_with_options(overrides.integrator, "integrator");
+        if (name != system.integrator) system.integrator_options.clear();
+        system.integrator = name;
+        for (const auto& [key, text] : options) system.integrator_options.insert_or_assign(key, text);
+    }
+}
+
+/// Step and end from the command line, put where the file would have them.
+void put_times(const SceneOverrides& overrides, Source& source, YAML::Node map) {
+    if (!map.IsMap()) return;  // refused when it is read
+    const auto put = [&](const char* key, const std::optional<double>& value) {
+        if (!value) return;
+        const YAML::Node node(fmt::format("{:.17g}", *value));
+        source.comes_from(node, fmt::format("--{} {}", key, *value));
+        map[key] = node;
+    };
+    put("step", overrides.step);
+    put("end", overrides.end);
+}
+
+std::string canonical_text(const YAML::Node& root, const SceneOverrides& overrides) {
+    YAML::Node copy = YAML::Clone(root);
+    copy.remove("end");
+    copy.remove("title");
+    if (copy["systems"].IsDefined())
+        for (auto entry : copy["systems"]) entry.second.remove("end");
+    return fmt::format("{}\nsolver {}\nintegrator {}\n", YAML::Dump(copy), overrides.solver, overrides.integrator);
+}
+
+}  // namespace
+
+Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOverrides& overrides) {
+    Source source(where);
+    Scene scene;
+    try {
+        const YAML::Node root = YAML::Load(yaml);
+        if (!root.IsMap()) throw InputError(fmt::format("{}: a scene must be a map of keys to values", where));
+        for (const auto& [path, text] : overrides.values) scene::set_value(source, root, path, text);
+        if (root["systems"].IsDefined() && root["systems"].IsMap()) {
+            for (const auto& entry : root["systems"]) put_times(overrides, source, entry.second);
+        } else {
+            put_times(overrides, source, root);
+        }
+        const std::pair<std::string_view, Handler> title{
+            "title", [&](const YAML::Node& n) { scene.title = scalar(source, n, "title"); }};
+        if (root["systems"].IsDefined()) {
+            read_map(source, root, "a scene with \"systems\"",
+                     {title, {"systems", [&](const YAML::Node& systems) {
+                                  if (!systems.IsMap() || systems.size() == 0)
+                                      source.refuse(systems, "\"systems\" must be a map of names to systems");
+                                  for (const auto& entry : systems) {
+                                      const std::string name = scalar(source, entry.first, "key");
+                                      check_system_name(source, entry.first, name);
+                                      for (const auto& other : scene.systems)
+                                          if (other.name == name)
+                                              source.refuse(entry.first, fmt::format("\"{}\" is given twice", name));
+                                      read_one_system(source, entry.second, scene, name,
+                                                      fmt::format("the system \"{}\"", name));
+                                  }
+                              }}});
+        } else {
+            read_one_system(source, root, scene, "main", "the scene", {title, {"systems", [](const YAML::Node&) {}}});
+        }
+        for (auto& system : scene.systems) apply(overrides, system);
+        scene.canonical = canonical_text(root, overrides);
+    } catch (const YAML::Exception& error) {
+        throw InputError(fmt::format("{}: not valid YAML: {}", source.at(error.mark), error.msg));
+    }
+    return scene;
+}
+
+Scene read_scene(const std::filesystem::path& file, const SceneOverrides& overrides) {
+    return parse_scene(read_file(file), file.string(), overrides);
+}
+
+}  // namespace delassus

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "delassus/error.hpp"
+
+namespace delassus {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Remaining times within this fraction of a step are whole steps that rounding spoiled.
+constexpr double rounding_of_step = 1e-9;
+
+bool finite(const std::vector<double>& values) {
+    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+Simulation::Simulation(SceneSystem& system, const Registry& registry)
+    : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
+    try {
+        // Checked here without loading the plugin, which may never be needed.
+        const auto& name = system.solver.name;
+        const bool file = name.find('/') != std::string::npos || name.ends_with(".so");
+        if (!name.empty() && !file)
+            static_cast<void>(resolve_options(name, registry.find(name).options, system.solver.options));
+        timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
+    } catch (const InputError& error) {
+        throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));
+    } catch (const Unsupported& error) {
+        throw Unsupported(fmt::format("system \"{}\": {}", system.name, error.what()));
+    }
+    now_.state = system.system->initial_state();
+    constraint_.resize(static_cast<std::size_t>(system.system->m()));
+    measure();
+    now_.totals.start_energy = now_.totals.energy = record_.energy;
+    now_.totals.worst_drift = record_.drift;
+}
+
+Simulation::~Simulation() = default;
+
+bool Simulation::finished() const {
+    return system_->end - now_.state.t <= rounding_of_step * system_->step;
+}
+
+void Simulation::measure() {
+    const MultibodySystem& mechanics = *system_->system;
+    const State& state = now_.state;
+    record_.step = now_.step;
+    record_.t = state.t;
+    record_.energy = mechanics.energy(state);
+    const auto momentum = mechanics.momentum(state);
+    record_.momentum = momentum[0];
+    record_.angular_momentum = momentum[1];
+    if (!constraint_.empty()) mechanics.constraint(state, constraint_.data());
+    record_.drift = 0.0;
+    for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
+}
+
+const StepRecord& Simulation::step() {
+    const auto begin = Clock::now();
+    // A whole step unless the end comes sooner: a run that is ended here or goes on later takes the same steps.
+    const double remaining = system_->end - now_.state.t;
+    const double h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
+    const auto where = [&] {
+        return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
+    };
+    State next = now_.state;
+    const std::vector<double> memory = timestepper_->save();
+    StepReport report;
+    solver_->reset_effort();
+    const auto undo = [&] {
+        timestepper_->restart();
+        timestepper_->load(memory);
+    };
+    try {
+        report = timestepper_->step(next, h, *solver_);
+        if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
+    } catch (const Unsupported& error) {
+        undo();
+        throw Unsupported(fmt::format("{}: {}", where(), error.what()));
+    } catch (const InputError& error) {
+        undo();
+        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+    } catch (const StepFailure& error) {
+        undo();
+        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+    }
+    const std::string place = where();
+    now_.state = std::move(next);
+    ++now_.step;
+
+    record_.contacts = report.unilateral_blocks;
+    record_.penetration = 0.0;
+    for (const auto& contact : system_->system->contacts())
+        record_.penetration = std::max(record_.penetration, -contact.gap);
+    const SolverEffort& effort = solver_->effort();
+    record_.newton_iterations = report.newton_iterations;
+    record_.solver_iterations = effort.iterations;
+    record_.natural = effort.worst_natural;
+    record_.solved = report.solved;
+    measure();
+    record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+
+    auto& totals = now_.totals;
+    totals.energy = record_.energy;
+    totals.worst_drift = std::max(totals.worst_drift, record_.drift);
+    totals.worst_penetration = std::max(totals.worst_penetration, record_.penetration);
+    totals.worst_natural = std::max(totals.worst_natural, record_.natural);
+    totals.most_contacts = std::max(totals.most_contacts, record_.contacts);
+    totals.newton_iterations += record_.newton_iterations;
+    totals.solver_iterations += record_.solver_iterations;
+    totals.plugin_solves += effort.plugin_solves;
+    totals.solver_seconds += effort.seconds;
+    totals.seconds += record_.seconds;
+    if (!report.solved) {
+        ++totals.unsolved_steps;
+        if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
+    }
+    return record_;
+}
+
+SimulationState Simulation::save() const {
+    SimulationState result = now_;
+    result.memory = timestepper_->save();
+    return result;
+}
+
+void Simulation::load(SimulationState state) {
+    if (state.state.q.size() != now_.state.q.size() || state.state.v.size() != now_.state.v.size())
+        throw InputError(fmt::format(
+            "the checkpoint of system \"{}\" has {} positions and {} velocities; the system "
+            "has {} and {}",
+            system_->name, state.state.q.size(), state.state.v.size(), now_.state.q.size(), now_.state.v.size()));
+    timestepper_->restart();
+    timestepper_->load(state.memory);
+    now_ = std::move(state);
+    now_.memory.clear();
+    record_ = {};
+    measure();
+}
+
+}  // namespace delassus

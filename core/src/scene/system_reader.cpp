@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/system_reader.hpp"
+
+#include "config/sections.hpp"
+
+namespace delassus::scene {
+
+SystemReader::SystemReader(const Source& source, SceneSystem& result) : source_(source), result_(result) {
+    result_.system = std::make_unique<MultibodySystem>();
+}
+
+std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
+    std::vector<std::pair<std::string_view, Handler>> all = {
+        {"gravity", [this](const YAML::Node& n) { gravity_ = vector3(source_, n, "gravity"); }},
+        {"step", [this](const YAML::Node& n) { step_ = positive_number(source_, n, "step"); }},
+        {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
+        {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
+        {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
+        {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
+    for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "cables", "joints",
+                             "motors", "springs", "bushings", "loads", "keep_apart"})
+        all.emplace_back(list, [this, list](const YAML::Node& n) { lists_.insert_or_assign(list, n); });
+    return all;
+}
+
+void SystemReader::build(const YAML::Node& place) {
+    const auto missing = [&](std::string_view key, std::string_view example) {
+        source_.refuse(place, fmt::format("system \"{}\" lacks the key \"{}\", e.g. {}", result_.name, key, example));
+    };
+    if (!step_) missing("step", "step: 0.001");
+    if (!end_) missing("end", "end: 10");
+    result_.step = *step_;
+    result_.end = *end_;
+    if (gravity_) result_.system->set_gravity(*gravity_);
+    if (envelope_) result_.system->set_envelope(*envelope_);
+    if (const auto found = lists_.find("materials"); found != lists_.end()) read_materials(found->second);
+    read_items("material_pairs", &SystemReader::read_material_pair);
+    read_items("bodies", &SystemReader::read_body);
+    read_items("nodes", &SystemReader::read_node);
+    read_items("elastic_blocks", &SystemReader::read_elastic_block);
+    read_items("cables", &SystemReader::read_cable);
+    if (result_.bodies.empty() && result_.system->node_count() == 0)
+        missing("bodies", "bodies: [{name: ball, mass: 1, …}]");
+    read_items("joints", &SystemReader::read_joint);
+    read_items("motors", &SystemReader::read_motor);
+    read_items("springs", &SystemReader::read_spring);
+    read_items("bushings", &SystemReader::read_bushing);
+    read_items("loads", &SystemReader::read_load);
+    if (const auto found = lists_.find("keep_apart"); found != lists_.end()) read_keep_apart(found->second);
+    at(place, [&] { result_.system->finish(); });
+}
+
+void SystemReader::read_items(std::string_view key, ItemReader reader) {
+    const auto found = lists_.find(key);
+    if (found == lists_.end() || found->second.IsNull()) return;
+    for (const YAML::Node& item : elements(source_, found->second, key)) {
+        if (!item.IsMap()) source_.refuse(item, fmt::format("an item of \"{}\" must be a map of keys to values", key));
+        const YAML::Node repeated = item["repeat"];
+        if (!repeated.IsDefined()) {
+            (this->*reader)(item, {});
+            continue;
+        }
+        for (const Copy& copy : repeat(source_, repeated)) (this->*reader)(item, copy);
+    }
+}
+
+void SystemReader::read_integrator(const YAML::Node& node) {
+    if (node.IsScalar()) {  // integrator: rk4
+        result_.integrator = node.Scalar();
+        return;
+    }
+    bool named = false;
+    read_map(source_, node, "\"integrator\"",
+             {{"name",
+               [&](const YAML::Node& n) {
+                   result_.integrator = scalar(source_, n, "name");
+                   named = true;
+               }},
+              {"options", [&](const YAML::Node& n) { result_.integrator_options = read_options(source_, n); }}});
+    if (!named) source_.refuse(node, "\"integrator\" lacks the key \"name\"");
+}
+
+namespace {
+
+/// The end of a sentence that says which names there are.
+std::string hint(const std::string& name, const std::map<std::string, std::int32_t, std::less<>>& numbers) {
+    if (numbers.empty()) return "; there are none";
+    std::vector<std::string_view> names;
+    for (const auto& [known, number] : numbers) names.push_back(known);
+    return nearest_name_hint(name, names);
+}
+
+}  // namespace
+
+void SystemReader::take_name(const YAML::Node& node, Numbers& numbers, std::string_view kind, const std::string& name,
+                             std::int32_t number) {
+    if (name.empty()) source_.refuse(node, fmt::format("a {} lacks the key \"name\"", kind));
+    if (name == "world") source_.refuse(node, fmt::format("a {} cannot be named \"world\"", kind));
+    if (!numbers.emplace(name, number).second)
+        source_.refuse(node, fmt::format("there are two {} named \"{}\"; names must differ",
+                                         kind == "body" ? std::string("bodies") : fmt::format("{}s", kind), name));
+}
+
+std::int32_t SystemReader::material_named(const YAML::Node& node, std::string_view key) {
+    const std::string name = scalar(source_, node, key);
+    const auto found = materials_.find(name);
+    if (found == materials_.end())
+        source_.refuse(
+            node, fmt::format("\"{}\" is \"{}\", but there is no such material{}", key, name, hint(name, materials_)));
+    return found->second;
+}
+
+BodyIndex SystemReader::body_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
+    const std::string name = name_in(source_, node, key, copy);
+    if (name == "world") return world_body;
+    const auto found = bodies_.find(name);
+    if (found == bodies_.end())
+        source_.refuse(node,
+                       fmt::format("\"{}\" is \"{}\", but there is no such body{}", key, name, hint(name, bodies_)));
+    return found->second;
+}
+
+std::int32_t SystemReader::joint_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
+    const std::string name = name_in(source_, node, key, copy);
+    const auto found = joints_.find(name);
+    if (found == joints_.end())
+        source_.refuse(node,
+                       fmt::format("\"{}\" is \"{}\", but there is no such joint{}", key, name, hint(name, joints_)));
+    return found->second;
+}
+
+bool SystemReader::moves(BodyIndex body) const {
+    return body != world_body && !result_.bodies[static_cast<std::size_t>(body)].fixed;
+}
+
+Vector3 SystemReader::position(BodyIndex body) const {
+    return body == world_body ? Vector3{} : result_.bodies[static_cast<std::size_t>(body)].pose.position;
+}
+
+}  // namespace delassus::scene

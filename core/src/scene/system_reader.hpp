@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Reads one system of a scene: keys are read in the order in which things need one another, whatever their order in
+// the file.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "delassus/scene.hpp"
+#include "scene/scene_values.hpp"
+
+namespace delassus::scene {
+
+class SystemReader {
+public:
+    /// Fills result; both outlive the reader.
+    SystemReader(const Source& source, SceneSystem& result);
+
+    /// The keys of a system, for the map that holds them.
+    [[nodiscard]] std::vector<std::pair<std::string_view, Handler>> handlers();
+
+    /// Builds the system from what the handlers met. place: the map, for what is missing in it.
+    void build(const YAML::Node& place);
+
+private:
+    using Numbers = std::map<std::string, std::int32_t, std::less<>>;
+    using ItemReader = void (SystemReader::*)(const YAML::Node& item, const Copy& copy);
+
+    void read_integrator(const YAML::Node& node);
+    void read_materials(const YAML::Node& node);
+    void read_material_pair(const YAML::Node& item, const Copy& copy);
+    void read_body(const YAML::Node& item, const Copy& copy);
+    void read_node(const YAML::Node& item, const Copy& copy);
+    void read_elastic_block(const YAML::Node& item, const Copy& copy);
+    void read_cable(const YAML::Node& item, const Copy& copy);
+    void read_joint(const YAML::Node& item, const Copy& copy);
+    void read_motor(const YAML::Node& item, const Copy& copy);
+    void read_spring(const YAML::Node& item, const Copy& copy);
+    void read_bushing(const YAML::Node& item, const Copy& copy);
+    void read_load(const YAML::Node& item, const Copy& copy);
+    void read_keep_apart(const YAML::Node& node);
+
+    /// Reads each item of the list, each of its copies.
+    void read_items(std::string_view key, ItemReader reader);
+
+    struct ShapeOfBody {
+        Shape shape;
+        std::int32_t material = -1;
+        YAML::Node node;
+    };
+    std::vector<ShapeOfBody> read_shapes(const YAML::Node& node);
+    Shape read_shape_kind(const YAML::Node& item, std::string_view kind, const YAML::Node& node);
+    ContactMaterial read_contact_material(const YAML::Node& node, std::string_view name,
+                                          std::vector<std::pair<std::string_view, Handler>> more = {});
+
+    std::int32_t material_named(const YAML::Node& node, std::string_view key);
+    /// Also "world".
+    BodyIndex body_named(const YAML::Node& node, std::string_view key, const Copy& copy);
+    /// −1 if the joint was left out.
+    std::int32_t joint_named(const YAML::Node& node, std::string_view key, const Copy& copy);
+    [[nodiscard]] bool moves(BodyIndex body) const;
+    [[nodiscard]] Vector3 position(BodyIndex body) const;
+    /// Notes the name, or refuses it if there is one already.
+    void take_name(const YAML::Node& node, Numbers& numbers, std::string_view kind, const std::string& name,
+                   std::int32_t number);
+
+    /// Adds the place to the sentence of an InputError that knows none.
+    template <class Action>
+    auto at(const YAML::Node& node, Action&& action) {
+        try {
+            return action();
+        } catch (const InputError& error) {
+            source_.refuse(node, error.what());
+        }
+    }
+
+    const Source& source_;
+    SceneSystem& result_;
+    std::map<std::string, YAML::Node, std::less<>> lists_;
+    Numbers bodies_, nodes_, blocks_, joints_, materials_, others_;
+    std::optional<Vector3> gravity_;
+    std::optional<double> envelope_, step_, end_;
+};
+
+}  // namespace delassus::scene

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pictures of a run for ParaView: one polydata file (.vtp) a frame and system, and a collection (.pvd) with the times.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "delassus/multibody.hpp"
+
+namespace delassus {
+
+class VtkSeries {
+public:
+    /// folder: of the .vtp files; it must exist. name: of the system. system outlives the series.
+    VtkSeries(std::filesystem::path folder, std::string name, const MultibodySystem& system);
+
+    /// Writes frame `number`: the mass centres of the bodies as vertices, the surfaces of the shapes and of the
+    /// elements as triangles. Cell data: body (its index; the number of bodies for elements), speed (of its mass
+    /// centre, or the mean of the nodes', m/s).
+    void write(std::int64_t number, const State& state) const;
+
+    [[nodiscard]] std::string file_name(std::int64_t number) const;
+
+private:
+    std::filesystem::path folder_;
+    std::string name_;
+    const MultibodySystem& system_;
+    std::vector<Mesh> surfaces_;                         // of the shapes, in the frames of their bodies
+    std::vector<std::array<std::int32_t, 3>> elements_;  // surface of the elements, triangles of nodes
+};
+
+/// One system's part of a collection.
+struct VtkCollectionPart {
+    const VtkSeries* series;
+    const std::vector<double>* times;  ///< of the frames 0, 1, …
+};
+
+/// The .pvd: folder is that of the .vtp files, relative to the collection's.
+void write_vtk_collection(const std::filesystem::path& file, const std::string& folder,
+                          const std::vector<VtkCollectionPart>& parts);
+
+}  // namespace delassus

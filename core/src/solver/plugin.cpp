@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Loading a plugin and checking its handshake.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/dll/shared_library.hpp>
+#include <cstring>
+#include <mutex>
+#include <set>
+
+#include "delassus/error.hpp"
+#include "delassus/registry.hpp"
+
+namespace delassus {
+
+namespace {
+
+// The descriptor of the first ABI: a plugin must have at least these fields.
+constexpr std::uint32_t smallest_descriptor = sizeof(delassus_plugin_descriptor);
+
+/// Keeps a library loaded until the process ends: PETSc and MPI are not safe to unload.
+void keep_forever(const boost::dll::shared_library& library) {
+    static std::mutex mutex;
+    static auto* const libraries = new std::vector<boost::dll::shared_library>;
+    const std::lock_guard lock(mutex);
+    libraries->push_back(library);
+}
+
+boost::dll::shared_library open(const std::filesystem::path& path, bool global) {
+    using boost::dll::load_mode::rtld_global;
+    using boost::dll::load_mode::rtld_local;
+    using boost::dll::load_mode::rtld_now;
+    // The overload with an error_code loses the loader's message, so the exception is caught instead.
+    try {
+        return boost::dll::shared_library(path, rtld_now | (global ? rtld_global : rtld_local));
+    } catch (const std::exception& error) {
+        throw PluginError(fmt::format("cannot load the plugin {}: {}", path.string(), error.what()));
+    }
+}
+
+std::string text_of(const char* text) {
+    return text ? text : "";
+}
+
+bool is_plugin_name(const std::string& name) {
+    return !name.empty() && name.size() <= 64 && name[0] >= 'a' && name[0] <= 'z' &&
+           std::all_of(name.begin(), name.end(),
+                       [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-'; });
+}
+
+std::vector<OptionInfo> read_options(const delassus_plugin_descriptor& descriptor) {
+    std::vector<OptionInfo> options;
+    std::set<std::string> keys;
+    if (descriptor.option_count < 0 || (descriptor.option_count > 0 && !descriptor.options))
+        throw PluginError("its option table is missing");
+    for (std::int32_t k = 0; k < descriptor.option_count; ++k) {
+        const delassus_option& row = descriptor.options[k];
+        OptionInfo option;
+        option.key = text_of(row.key);
+        if (option.key.empty() || !keys.insert(option.key).second)
+            throw PluginError(fmt::format("row {} of its option table has no key, or one used before", k));
+        if (row.type < DELASSUS_OPTION_BOOLEAN || row.type > DELASSUS_OPTION_TEXT)
+            throw PluginError(fmt::format("its option \"{}\" has an unknown type", option.key));
+        option.type = static_cast<delassus_option_type>(row.type);
+        option.default_value = text_of(row.default_value);
+        option.minimum = row.minimum;
+        option.maximum = row.maximum;
+        for (std::int32_t c = 0; row.choices && c < row.choice_count; ++c)
+            option.choices.push_back(text_of(row.choices[c]));
+        option.unit = text_of(row.unit);
+        option.doc = text_of(row.doc);
+        options.push_back(std::move(option));
+    }
+    return options;
+}
+
+const char* missing_operation(const delassus_plugin_descriptor& descriptor) {
+    if (!descriptor.create) return "create";
+    if (!descriptor.destroy) return "destroy";
+    if (!descriptor.analyze) return "analyze";
+    if (!descriptor.factorize) return "factorize";
+    if (!descriptor.solve) return "solve";
+    if (!descriptor.last_error) return "last_error";
+    return nullptr;
+}
+
+/// Checks the handshake and copies what the descriptor says. Throws PluginError with the part after "the plugin X: ".
+PluginInfo read_descriptor(const delassus_plugin_descriptor* descriptor) {
+    if (!descriptor) throw PluginError("delassus_plugin() returned nothing");
+    if (descriptor->magic != DELASSUS_PLUGIN_MAGIC)
+        throw PluginError(
+            fmt::format("its descriptor does not begin with the magic number {:#x}", DELASSUS_PLUGIN_MAGIC));
+    if (descriptor->abi_major != DELASSUS_ABI_MAJOR)
+        throw PluginError(fmt::format("it was built for version {}.{} of the plugin interface; this is version {}.{}",
+                                      descriptor->abi_major, descriptor->abi_minor, DELASSUS_ABI_MAJOR,
+                                      DELASSUS_ABI_MINOR));
+    if (descriptor->struct_size < smallest_descriptor)
+        throw PluginError(
+            fmt::format("its descriptor has {} bytes; {} are needed", descriptor->struct_size, smallest_descriptor));
+    PluginInfo info;
+    info.name = text_of(descriptor->name);
+    if (!is_plugin_name(info.name))
+        throw PluginError(
+            fmt::format("its name \"{}\" is not a word of a–z, 0–9, _ and - that begins with a letter", info.name));
+    if (const char* operation = missing_operation(*descriptor))
+        throw PluginError(fmt::format("it lacks the operation {}", operation));
+    info.version = text_of(descriptor->version);
+    info.description = text_of(descriptor->description);
+    info.licence = text_of(descriptor->licence);
+    info.abi_major = descriptor->abi_major;
+    info.abi_minor = descriptor->abi_minor;
+    info.flags = descriptor->flags;
+    info.capabilities = descriptor->capabilities;
+    info.options = read_options(*descriptor);
+    static_cast<void>(resolve_options(info.name, info.options, {}));  // the defaults must lie in their own domains
+    return info;
+}
+
+}  // namespace
+
+std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
+    const auto absolute = std::filesystem::absolute(path).lexically_normal();
+    if (!std::filesystem::is_regular_file(absolute))
+        throw PluginError(fmt::format("there is no plugin {}", absolute.string()));
+    auto library = open(absolute, false);
+    keep_forever(library);
+    if (!library.has(DELASSUS_PLUGIN_SYMBOL))
+        throw PluginError(fmt::format("{} is not a Delassus plugin: it does not export {}", absolute.string(),
+                                      DELASSUS_PLUGIN_SYMBOL));
+    std::shared_ptr<Plugin> plugin(new Plugin);
+    try {
+        plugin->descriptor_ = library.get<const delassus_plugin_descriptor*()>(DELASSUS_PLUGIN_SYMBOL)();
+        plugin->info_ = read_descriptor(plugin->descriptor_);
+    } catch (const std::exception& error) {
+        throw PluginError(fmt::format("the plugin {}: {}", absolute.string(), error.what()));
+    } catch (...) {
+        throw PluginError(
+            fmt::format("the plugin {} threw an exception from {}", absolute.string(), DELASSUS_PLUGIN_SYMBOL));
+    }
+    plugin->info_.library = absolute;
+    if (plugin->info_.flags & DELASSUS_FLAG_GLOBAL_SYMBOLS) keep_forever(open(absolute, true));
+    return plugin;
+}
+
+}  // namespace delassus

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <nlohmann/json.hpp>
+
+#include "delassus/solver.hpp"
+#include "support/json_number.hpp"
+
+namespace delassus {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+}  // namespace
+
+std::string to_json(const SolveReport& report) {
+    Json json = {{"problem", report.problem},
+                 {"solver", report.solver},
+                 {"version", report.version},
+                 {"options", report.options},
+                 {"law", name_of(report.law)},
+                 {"tolerance", report.tolerance},
+                 {"status", name_of(report.status)},
+                 {"message", report.message},
+                 {"iterations", report.iterations},
+                 {"seconds", {{"setup", report.seconds_setup}, {"solve", report.seconds_solve}}},
+                 {"analyses", report.analyses},
+                 {"factorizations", report.factorizations},
+                 {"claimed_residual", json_number(report.claimed_residual)},
+                 {"error",
+                  {{"natural", json_number(report.error.natural)},
+                   {"siconos", json_number(report.error.siconos)},
+                   {"balance", json_number(report.error.balance)},
+                   {"cone", json_number(report.error.cone)},
+                   {"dual", json_number(report.error.dual)},
+                   {"gap", json_number(report.error.gap)},
+                   {"rounding", json_number(report.error.rounding)}}}};
+    if (!report.curve.empty()) {
+        Json curve = Json::array();
+        for (const auto& sample : report.curve) curve.push_back({sample.iteration, sample.seconds, sample.natural});
+        json["curve"] = {{"columns", {"iteration", "seconds", "natural"}}, {"samples", std::move(curve)}};
+    }
+    return json.dump(2) + "\n";
+}
+
+}  // namespace delassus

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The JSON sidecar beside a plugin, by which it is listed without being loaded.
+#include <fmt/format.h>
+
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "delassus/error.hpp"
+#include "delassus/needs.hpp"
+#include "delassus/plugin_info.hpp"
+#include "support/json_number.hpp"
+
+namespace delassus {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view sidecar_format = "delassus-plugin";
+constexpr int sidecar_version = 1;
+constexpr std::string_view type_names[] = {"boolean", "integer", "real", "choice", "text"};
+
+delassus_option_type type_of(const std::string& name) {
+    for (std::size_t k = 0; k < std::size(type_names); ++k)
+        if (name == type_names[k]) return static_cast<delassus_option_type>(k);
+    throw PluginError(fmt::format("\"{}\" is not an option type", name));
+}
+
+OptionInfo read_option(const Json& json) {
+    const auto number = [&](const char* key, double open) {
+        return json.at(key).is_null() ? open : json.at(key).get<double>();
+    };
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    return {json.at("key"),
+            type_of(json.at("type")),
+            json.at("default"),
+            number("minimum", -infinity),
+            number("maximum", infinity),
+            json.at("choices").get<std::vector<std::string>>(),
+            json.at("unit"),
+            json.at("doc")};
+}
+
+}  // namespace
+
+std::string sidecar_text(const PluginInfo& info) {
+    Json options = Json::array();
+    for (const auto& option : info.options) {
+        options.push_back({{"key", option.key},
+                           {"type", type_names[option.type]},
+                           {"default", option.default_value},
+                           {"minimum", json_number(option.minimum)},
+                           {"maximum", json_number(option.maximum)},
+                           {"choices", option.choices},
+                           {"unit", option.unit},
+                           {"doc", option.doc}});
+    }
+    const Json sidecar = {{"format", sidecar_format},
+                          {"version", sidecar_version},
+                          {"library", info.library.filename().string()},
+                          {"abi", {info.abi_major, info.abi_minor}},
+                          {"name", info.name},
+                          {"plugin_version", info.version},
+                          {"description", info.description},
+                          {"licence", info.licence},
+                          {"flags", info.flags},
+                          {"capabilities", capability_names(info.capabilities)},
+                          {"options", options}};
+    return sidecar.dump(2) + "\n";
+}
+
+PluginInfo read_sidecar(const std::filesystem::path& sidecar) {
+    std::ifstream file(sidecar);
+    std::ostringstream text;
+    text << file.rdbuf();
+    if (!file) throw PluginError(fmt::format("cannot read {}", sidecar.string()));
+    try {
+        const Json json = Json::parse(text.str());
+        if (json.at("format") != sidecar_format || json.at("version") != sidecar_version)
+            throw PluginError(
+                fmt::format("{} is not a plugin sidecar of version {}", sidecar.string(), sidecar_version));
+        PluginInfo info;
+        info.name = json.at("name");
+        info.version = json.at("plugin_version");
+        info.description = json.at("description");
+        info.licence = json.at("licence");
+        info.abi_major = json.at("abi").at(0);
+        info.abi_minor = json.at("abi").at(1);
+        info.flags = json.at("flags");
+        info.capabilities = capabilities_of(json.at("capabilities").get<std::vector<std::string>>());
+        for (const auto& option : json.at("options")) info.options.push_back(read_option(option));
+        const std::filesystem::path library = json.at("library").get<std::string>();
+        if (library.has_parent_path())
+            throw PluginError(fmt::format("{} names a library in another folder", sidecar.string()));
+        info.library = std::filesystem::absolute(sidecar).parent_path() / library;
+        return info;
+    } catch (const nlohmann::json::exception& error) {
+        throw PluginError(fmt::format("{} is not a valid sidecar: {}", sidecar.string(), error.what()));
+    } catch (const InputError& error) {
+        throw PluginError(fmt::format("{}: {}", sidecar.string(), error.what()));
+    }
+}
+
+}  // namespace delassus

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "support/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "delassus/error.hpp"
+
+namespace delassus {
+namespace fs = std::filesystem;
+namespace {
+
+/// "out/", "out/." and "out" are the same target, and a temporary name goes beside it, not into it.
+fs::path without_trailing_slash(const fs::path& path) {
+    fs::path clean = path.lexically_normal();
+    if (!clean.has_filename() && clean.has_relative_path()) clean = clean.parent_path();
+    if (clean == "." || clean == ".." || !clean.has_filename()) {
+        std::error_code error;
+        const fs::path canonical = fs::weakly_canonical(fs::absolute(path, error), error);
+        if (!error) clean = canonical;
+    }
+    return clean;
+}
+
+void require_parent(const fs::path& target) {
+    const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
+    std::error_code error;
+    if (!fs::is_directory(parent, error)) {
+        throw InputError(fmt::format("{} cannot be written: there is no folder {}.", target.string(), parent.string()));
+    }
+}
+
+[[noreturn]] void refuse_write(const fs::path& target, int error_number) {
+    throw InputError(fmt::format("{} cannot be written: {}.", target.string(), std::strerror(error_number)));
+}
+
+/// A name beside target that nothing has yet.
+fs::path temporary_name_beside(const fs::path& target) {
+    static std::atomic<unsigned> count{0};
+    for (;;) {
+        fs::path name = target;
+        name += fmt::format(".partial-{}-{}", getpid(), count++);
+        std::error_code error;
+        if (!fs::exists(fs::symlink_status(name, error))) return name;
+    }
+}
+
+void require_replaceable(const fs::path& target, std::span<const std::string_view> own_files) {
+    std::error_code error;
+    if (!fs::exists(fs::symlink_status(target, error))) return;
+    if (!fs::is_directory(target, error)) {
+        throw InputError(fmt::format("{} exists and is not a folder; give another name.", target.string()));
+    }
+    fs::directory_iterator entries(target, error);
+    if (error) throw InputError(fmt::format("{} cannot be listed: {}.", target.string(), error.message()));
+    for (const fs::directory_entry& entry : entries) {
+        const std::string name = entry.path().filename().string();
+        std::error_code type_error;
+        if (std::find(own_files.begin(), own_files.end(), name) == own_files.end() ||
+            fs::is_directory(entry.symlink_status(type_error))) {
+            throw InputError(
+                fmt::format("{} holds {}, which would be lost if the folder were replaced; "
+                            "give another name or an empty folder.",
+                            target.string(), name));
+        }
+    }
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(fs::path target) : target_(std::move(target)) {
+    require_parent(target_);
+    std::error_code error;
+    if (fs::is_directory(target_, error)) {
+        throw InputError(fmt::format("{} cannot be written: it is a folder.", target_.string()));
+    }
+    temporary_ = temporary_name_beside(target_);
+}
+
+AtomicFile::~AtomicFile() {
+    if (!temporary_.empty()) unlink(temporary_.c_str());
+}
+
+void AtomicFile::commit() {
+    if (std::rename(temporary_.c_str(), target_.c_str()) != 0) refuse_write(target_, errno);
+    temporary_.clear();
+}
+
+void write_file_atomically(const fs::path& path, std::string_view content) {
+    AtomicFile target(path);
+    const int file = open(target.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file < 0) refuse_write(path, errno);
+    int failure = 0;
+    while (!content.empty() && failure == 0) {
+        const ssize_t written = write(file, content.data(), content.size());
+        if (written >= 0) {
+            content.remove_prefix(static_cast<std::size_t>(written));
+        } else if (errno != EINTR) {
+            failure = errno;
+        }
+    }
+    if (close(file) != 0 && failure == 0) failure = errno;
+    if (failure != 0) refuse_write(path, failure);
+    target.commit();
+}
+
+AtomicFolder::AtomicFolder(fs::path target, std::span<const std::string_view> own_files)
+    : target_(without_trailing_slash(target)) {
+    require_parent(target_);
+    require_replaceable(target_, own_files);
+    std::error_code error;
+    if (fs::is_symlink(target_, error)) {
+        const fs::path pointed_to = fs::canonical(target_, error);  // a link stays a link: its folder is replaced
+        if (!error) target_ = pointed_to;
+    }
+    temporary_ = temporary_name_beside(target_);
+    if (!fs::create_directory(temporary_, error)) {
+        throw InputError(fmt::format("{} cannot be written: {}.", target_.string(), error.message()));
+    }
+}
+
+AtomicFolder::~AtomicFolder() {
+    std::error_code ignored;
+    if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
+}
+
+void AtomicFolder::commit() {
+    std::error_code ignored;
+    if (!fs::exists(target_, ignored)) {
+        if (std::rename(temporary_.c_str(), target_.c_str()) != 0) refuse_write(target_, errno);
+        temporary_.clear();
+        return;
+    }
+    // One exchange where the file system can do it; the destructor then removes the old folder. Elsewhere two renames,
+    // of which the second is undone if it fails.
+    if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0) return;
+    if (errno != EINVAL && errno != ENOSYS) refuse_write(target_, errno);
+    const fs::path old = temporary_name_beside(target_);
+    if (std::rename(target_.c_str(), old.c_str()) != 0) refuse_write(target_, errno);
+    if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
+        const int failure = errno;
+        std::rename(old.c_str(), target_.c_str());
+        refuse_write(target_, failure);
+    }
+    temporary_ = old;
+}
+
+}  // namespace delassus

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Files and folders that appear whole or not at all: written under a temporary name beside the target, then renamed.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "delassus/export.hpp"
+
+namespace delassus {
+
+/// Replaces or creates the file. If anything fails, what was there before stays, nothing is left beside it, and
+/// InputError says why.
+DELASSUS_API void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+/// A file under construction by a library that opens files itself. Let it create path(), then commit(); a file that
+/// is not committed disappears.
+class DELASSUS_API AtomicFile {
+public:
+    /// Throws InputError if target is a folder or its parent is missing.
+    explicit AtomicFile(std::filesystem::path target);
+    AtomicFile(const AtomicFile&) = delete;
+    AtomicFile& operator=(const AtomicFile&) = delete;
+    ~AtomicFile();
+
+    /// The temporary name; nothing has it yet.
+    [[nodiscard]] const std::filesystem::path& path() const { return temporary_; }
+
+    /// Puts the file in its place; throws InputError and leaves the old one if that fails.
+    void commit();
+
+private:
+    std::filesystem::path target_;
+    std::filesystem::path temporary_;
+};
+
+/// A folder under construction. Fill path(), then commit(); a folder that is not committed disappears.
+class DELASSUS_API AtomicFolder {
+public:
+    /// own_files: the names that a folder of this kind may hold. A target that exists is replaced only if it holds
+    /// nothing else; otherwise InputError names the file that would be lost.
+    AtomicFolder(std::filesystem::path target, std::span<const std::string_view> own_files);
+    AtomicFolder(const AtomicFolder&) = delete;
+    AtomicFolder& operator=(const AtomicFolder&) = delete;
+    ~AtomicFolder();
+
+    /// The temporary folder, empty at first.
+    [[nodiscard]] const std::filesystem::path& path() const { return temporary_; }
+
+    /// Puts the folder in its place; throws InputError and leaves the old one if that fails.
+    void commit();
+
+private:
+    std::filesystem::path target_;
+    std::filesystem::path temporary_;
+};
+
+}  // namespace delassus

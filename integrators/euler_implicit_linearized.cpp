@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The linearised implicit Euler method for differential variational inequalities (seed eq. 123, 148): one linear or
+// cone problem a step, contacts and impacts included. Order 1.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "delassus/timestepper.hpp"
+#include "dynamics/linear_problem.hpp"
+
+namespace delassus {
+namespace {
+
+// With f taken at the end of the step to first order, f(q⁺, v⁺, t⁺) ≈ f(q, v, t⁺) − K h v⁺ − R (v⁺ − v), the balance
+// M (v⁺ − v) = h f + C_qᵀ λ over a step of size h, λ being impulses, becomes
+//
+//     (M + h R + h² K) v⁺ − Dᵀ λ = (M + h R) v + h f(q, v, t⁺)
+//
+// It is consistent for any R and K, so that their symmetric parts do. Constraints at the end of the step, again to
+// first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows with b = C(q, t⁺)/h. The part C(q, t)/h of
+// it is error of earlier steps; it is recovered with at most the speed η_s (seed footnote 5). A gap Φ ≥ 0 likewise:
+//
+//     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most η_s
+//
+// Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻.
+class EulerImplicitLinearized : public Timestepper {
+public:
+    EulerImplicitLinearized(DynamicalSystem& system, const std::vector<OptionValue>& values)
+        : system_(system),
+          recovery_speed_(values[0].real),
+          restitution_speed_(values[1].real),
+          exact_(values[2].text == "exact" && !system.has_unilateral()),
+          blocks_(system.constraint_blocks()),
+          n_(system.n()),
+          m_(system.m()) {
+        before_.resize(static_cast<std::size_t>(m_));
+        after_.resize(static_cast<std::size_t>(m_));
+        delta_.resize(static_cast<std::size_t>(n_));
+    }
+
+    StepReport step(State& state, double h, StepSolver& solver) override {
+        require_step(system_, state, h, "euler_implicit_linearized");
+        Problem problem;
+        problem.name = "step";
+        State end = state;  // the old q and v at the new time
+        end.t = state.t + h;
+        assemble_balance(state, end, h, problem);
+        assemble_constraints(state, end, h, problem);
+        assemble_unilateral(state, h, problem);
+
+        StepReport report;
+        report.newton_iterations = 1;
+        report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
+        Solution solution{state.v, warm_start()};
+        solution.lambda.resize(problem.b.size());
+        std::vector<std::uint64_t> keys;
+        report.solved = solver.solve(std::move(problem), solution, true);
+        if (!report.solved) report.message = solver.effort().unsolved;
+        if (!std::all_of(solution.x.begin(), solution.x.end(), [](double value) { return std::isfinite(value); }))
+            throw StepFailure("the velocities of the step are not finite");
+
+        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution.x[i];
+        system_.increment(state.q.data(), delta_.data(), end.q.data());
+        end.v = solution.x;
+        state = std::move(end);
+        keep(solution.lambda, h);
+        return report;
+    }
+
+    void restart() override {
+        multipliers_.clear();
+        impulses_.clear();
+        last_h_ = 0.0;
+    }
+
+    // h, whether there are multipliers, these, and for each unilateral block its key in two halves, which a double
+    // holds exactly, its number of rows and its impulses.
+    std::vector<double> save() const override {
+        std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0};
+        memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
+        for (const auto& [key, impulse] : impulses_) {
+            memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),
+                                         static_cast<double>(impulse.size())});
+            memory.insert(memory.end(), impulse.begin(), impulse.end());
+        }
+        return memory;
+    }
+    void load(const std::vector<double>& memory) override {
+        restart();
+        auto next = memory.begin();
+        const auto take = [&](std::ptrdiff_t count) {
+            if (count < 0 || memory.end() - next < count)
+                throw InputError("the memory of euler_implicit_linearized is too short");
+            next += count;
+            return next - count;
+        };
+        const auto head = take(2);
+        const auto multipliers = take(head[1] == 0.0 ? 0 : m_);
+        multipliers_.assign(multipliers, next);
+        last_h_ = head[0];
+        while (next != memory.end()) {
+            const auto block = take(3);
+            const auto key = (static_cast<std::uint64_t>(block[0]) << 32U) | static_cast<std::uint64_t>(block[1]);
+            const auto impulse = take(static_cast<std::ptrdiff_t>(block[2]));
+            impulses_[key].assign(impulse, next);
+        }
+    }
+
+private:
+    void assemble_balance(const State& state, const State& end, double h, Problem& problem) {
+        const Tangent tangent = exact_ ? Tangent::Exact : Tangent::Symmetric;
+        H_.begin(n_, n_);
+        system_.add_mass(state, 1.0, H_);
+        problem.a.assign(static_cast<std::size_t>(n_), 0.0);
+        system_.multiply_mass(state, 1.0, state.v.data(), problem.a.data());
+        system_.add_force(end, h, problem.a.data());
+        if (system_.has_stiffness()) {
+            system_.add_damping(end, h, tangent, H_);
+            system_.add_stiffness(end, h * h, tangent, H_);
+            R_.begin(n_, n_);
+            system_.add_damping(end, h, tangent, R_);
+            R_.finish().multiply_add(1.0, state.v.data(), problem.a.data());
+        }
+        problem.H = H_.finish();
+    }
+
+    void assemble_constraints(const State& state, const State& end, double h, Problem& problem) {
+        D_.begin(m_, n_);
+        if (m_ > 0) {
+            system_.add_constraint_jacobian(end, 0, D_);
+            system_.constraint(state, before_.data());
+            system_.constraint(end, after_.data());
+        }
+        for (std::int32_t i = 0; i < m_; ++i) {
+            const double drift = std::clamp(before_[i] / h, -recovery_speed_, recovery_speed_);
+            problem.b.push_back(drift + (after_[i] - before_[i]) / h);
+        }
+        for (const auto rows : blocks_) problem.cones.push_back(Cone::free(rows));
+        problem.D = D_.finish();
+    }
+
+    void assemble_unilateral(const State& state, double h, Problem& problem) {
+        rows_.clear();
+        if (!system_.has_unilateral()) return;
+        system_.collect_unilateral(state, h, rows_);
+        const auto count = static_cast<std::int32_t>(rows_.rows().size());
+        // Rows are appended to D, which is by compressed rows.
+        auto& D = problem.D;
+        D.rows += count;
+        D.columns = n_;
+        std::vector<UnilateralRows::Entry> sorted;
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            Cone cone = block.cone;
+            for (auto* bounds : {&cone.lo, &cone.hi})
+                for (double& bound : *bounds) bound *= h;
+            for (std::int32_t i = 0; i < cone.rows; ++i, ++row) {
+                const auto first = rows_.entries().begin() + rows_.row_start()[row];
+                const auto last = rows_.entries().begin() + rows_.row_start()[row + 1];
+                sorted.assign(first, last);
+                std::sort(sorted.begin(), sorted.end(),
+                          [](const auto& a, const auto& b) { return a.column < b.column; });
+                double speed = rows_.rows()[row].rate;
+                for (const auto& entry : sorted) {
+                    D.column.push_back(entry.column);
+                    D.value.push_back(entry.value);
+                    speed += entry.value * state.v[static_cast<std::size_t>(entry.column)];
+                }
+                D.row_start.push_back(D.entries());
+                problem.b.push_back(offset(block, i, rows_.rows()[row], speed, h));
+            }
+            problem.cones.push_back(std::move(cone));
+        }
+    }
+
+    [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, const UnilateralRows::Row& row,
+                                double speed, double h) const {
+        const bool normal =
+            i == 0 && (block.cone.kind == ConeKind::Friction || block.cone.kind == ConeKind::Nonnegative);
+        if (normal && block.restitution > 0.0 && speed < -restitution_speed_ && row.gap + h * speed <= 0.0)
+            return row.rate + block.restitution * speed;
+        return row.rate + std::max(row.gap / h, -recovery_speed_);
+    }
+
+    /// The impulses of the last step, for the constraints that are still there.
+    [[nodiscard]] std::vector<double> warm_start() const {
+        std::vector<double> lambda = multipliers_;
+        for (double& value : lambda) value *= last_h_;
+        lambda.resize(static_cast<std::size_t>(m_));
+        for (const auto& block : rows_.blocks()) {
+            const auto found = impulses_.find(block.key);
+            if (found != impulses_.end() && static_cast<std::int32_t>(found->second.size()) == block.cone.rows) {
+                lambda.insert(lambda.end(), found->second.begin(), found->second.end());
+            } else {
+                lambda.insert(lambda.end(), static_cast<std::size_t>(block.cone.rows), 0.0);
+            }
+        }
+        return lambda;
+    }
+
+    void keep(const std::vector<double>& lambda, double h) {
+        last_h_ = h;
+        multipliers_.resize(static_cast<std::size_t>(m_));
+        for (std::int32_t i = 0; i < m_; ++i) multipliers_[i] = lambda[i] / h;
+        impulses_.clear();
+        auto next = lambda.begin() + m_;
+        for (const auto& block : rows_.blocks()) {
+            impulses_[block.key].assign(next, next + block.cone.rows);
+            next += block.cone.rows;
+        }
+    }
+
+    DynamicalSystem& system_;
+    double recovery_speed_, restitution_speed_;
+    bool exact_;
+    std::vector<std::int32_t> blocks_;
+    std::int32_t n_, m_;
+    MatrixAssembler H_, R_, D_;
+    UnilateralRows rows_;
+    std::vector<double> before_, after_, delta_;
+    double last_h_ = 0.0;
+    std::map<std::uint64_t, std::vector<double>> impulses_;
+};
+
+const RegisterTimestepper row{
+    {.name = "euler_implicit_linearized",
+     .description = "linearised implicit Euler for contacts, impacts and constraints; one problem a step",
+     .options = {{.key = "recovery_speed",
+                  .type = DELASSUS_OPTION_REAL,
+                  .default_value = "inf",
+                  .minimum = 0.0,
+                  .maximum = HUGE_VAL,
+                  .choices = {},
+                  .unit = "m/s",
+                  .doc = "largest speed with which errors of position are corrected"},
+                 {.key = "restitution_speed",
+                  .type = DELASSUS_OPTION_REAL,
+                  .default_value = "0",
+                  .minimum = 0.0,
+                  .maximum = HUGE_VAL,
+                  .choices = {},
+                  .unit = "m/s",
+                  .doc = "contacts that close slower than this do not bounce"},
+                 {.key = "jacobian",
+                  .type = DELASSUS_OPTION_CHOICE,
+                  .default_value = "symmetric",
+                  .minimum = 0.0,
+                  .maximum = 0.0,
+                  .choices = {"symmetric", "exact"},
+                  .unit = "",
+                  .doc = "tangent of gyroscopic and follower forces; with contacts always symmetric"}},
+     .constraints = true,
+     .unilateral = true,
+     .order = 1,
+     .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
+         return std::make_unique<EulerImplicitLinearized>(system, values);
+     }}};
+
+}  // namespace
+}  // namespace delassus

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "apgd.hpp"
+
+namespace {
+
+using delassus::sdk::boolean_option;
+using delassus::sdk::integer_option;
+using delassus::sdk::real_option;
+
+constexpr delassus_option options[] = {
+    real_option("step_growth", "1.02", 1.0, 2.0, "", "factor by which the step grows after each iteration"),
+    real_option("step_shrinkage", "0.9", 0.1, 0.999, "", "largest factor by which backtracking cuts the step"),
+    boolean_option("restart", true, "drop the momentum where it points uphill"),
+    integer_option("stall_iterations", "100000", 0, 1e9, "iterations",
+                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+};
+
+constexpr delassus::sdk::PluginInfo info{
+    .name = "apgd",
+    .version = "0.1.0",
+    .description = "Nesterov's accelerated projected gradient with backtracking and adaptive restart",
+    .licence = "BSD-3-Clause",
+    .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
+                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
+                    DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |
+                    DELASSUS_CAN_WARM_START,
+};
+
+}  // namespace
+
+DELASSUS_SOLVER_PLUGIN(delassus::apgd::AcceleratedGradient, info, options)

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A problem as the sweeps see it: blocks, their rows, their local problems.
+#pragma once
+
+#include <Eigen/Eigenvalues>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "delassus/sdk/delassus_operator.hpp"
+#include "sweep.hpp"
+
+namespace delassus::pgs {
+
+/// Blocks that a sweep visits: a friction cone is one, free rows are one where there are at most six of them, and the
+/// other kinds are visited row by row.
+inline std::vector<Block> blocks_of(std::span<const delassus_cone> cones) {
+    std::vector<Block> blocks;
+    for (std::size_t c = 0; c < cones.size(); ++c) {
+        const bool together = cones[c].kind == DELASSUS_CONE_FRICTION ||
+                              (cones[c].kind == DELASSUS_CONE_FREE && cones[c].rows <= largest_block);
+        const std::int32_t rows = together ? cones[c].rows : 1;
+        for (std::int32_t i = 0; i < cones[c].rows; i += rows)
+            blocks.push_back({cones[c].first_row + i, rows, 0, static_cast<std::int32_t>(c), 0, 0});
+    }
+    return blocks;
+}
+
+/// Whether E is zero off its diagonal and not negative on it.
+inline bool is_nonnegative_diagonal(const sdk::SparseRowsView& E) {
+    for (Eigen::Index i = 0; i < E.outerSize(); ++i)
+        for (sdk::SparseRowsView::InnerIterator entry(E, i); entry; ++entry)
+            if (entry.value() != 0.0 && (entry.col() != i || entry.value() < 0.0)) return false;
+    return true;
+}
+
+/// Whether the sweep can work on velocities: then N is never formed.
+inline bool can_sweep_on_velocities(const sdk::ProblemView& problem) {
+    return problem.n > 0 && problem.needs_any(DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS) &&
+           is_nonnegative_diagonal(problem.E);
+}
+
+class Model {
+public:
+    /// The operator is factorised. Throws std::length_error where N would be too large to form.
+    void build(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, bool on_velocities, bool jacobi) {
+        on_velocities_ = on_velocities;
+        states_ = on_velocities ? problem.n + problem.m : problem.m;
+        if (!on_velocities) check_size(problem);
+        const sdk::SparseRows matrix = on_velocities ? whitened_jacobian(problem, N.inverse()) : N.formed(problem);
+        rows_.build(matrix, blocks_of(problem.cones));
+        build_local_problems(problem, jacobi);
+    }
+
+    /// μ and bounds, and what the sweep starts from; call it at each solve.
+    void set_right_hand_side(const sdk::ProblemView& problem, const sdk::DelassusOperator& N) {
+        for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
+            const Block& block = rows_.blocks()[k];
+            const delassus_cone& cone = problem.cones[static_cast<std::size_t>(block.cone)];
+            LocalBlock& local = local_.block[k];
+            local.mu = cone.mu;
+            if (cone.kind == DELASSUS_CONE_NONNEGATIVE) local.lo = 0.0;
+            if (cone.kind == DELASSUS_CONE_BOX) {
+                local.lo = cone.lo[block.first_row - cone.first_row];
+                local.hi = cone.hi[block.first_row - cone.first_row];
+            }
+        }
+        std::fill(local_.kappa.begin(), local_.kappa.end(), 0.0);
+        if (on_velocities_) {
+            offset_ = problem.b;
+            free_state_.setZero(states_ + padding);
+            free_state_.head(problem.n) = whitened(problem, N.inverse());
+        } else {
+            offset_ = N.free_velocity(problem);
+        }
+    }
+
+    /// The state z of a sweep that belongs to λ; with padding.
+    void state_of(const sdk::Vector& lambda, sdk::Vector& z) const {
+        if (on_velocities_) {
+            z = free_state_;
+            add_impulses(rows_, lambda.data(), z.data());
+        } else {
+            z.setZero(states_ + padding);
+            z.head(lambda.size()) = lambda;
+        }
+    }
+
+    /// One Gauss–Seidel sweep; z and λ (m) belong together before and after.
+    void sweep_in_place(const SweepRule& rule, sdk::Vector& z, sdk::Vector& lambda) const {
+        if (on_velocities_) {
+            sweep<true>(rows_, local_, rule, offset_.data(), z.data(), z.data(), lambda.data());
+        } else {
+            sweep<false>(rows_, local_, rule, offset_.data(), z.data(), z.data(), nullptr);
+            lambda = z.head(lambda.size());
+        }
+    }
+
+    /// One Jacobi step; next is work space.
+    void jacobi_step(const SweepRule& rule, sdk::Vector& z, sdk::Vector& next, sdk::Vector& lambda) const {
+        next = z;
+        if (on_velocities_) {
+            sweep<true>(rows_, local_, rule, offset_.data(), z.data(), next.data(), lambda.data());
+        } else {
+            sweep<false>(rows_, local_, rule, offset_.data(), z.data(), next.data(), nullptr);
+            lambda = next.head(lambda.size());
+        }
+        z.swap(next);
+    }
+
+    /// u without the De Saxcé term; m.
+    void constraint_velocities(const sdk::Vector& z, sdk::Vector& u) const {
+        u.resize(offset_.size());
+        velocities(rows_, offset_.data(), z.data(), u.data());
+    }
+
+    [[nodiscard]] bool on_velocities() const { return on_velocities_; }
+    [[nodiscard]] const SweepRows& rows() const { return rows_; }
+    [[nodiscard]] const LocalProblems& local() const { return local_; }
+
+private:
+    // D̂ = D L⁻ᵀ with H = L Lᵀ, m × (n + m): with v̂ = Lᵀv, D v = D̂ v̂ and an impulse changes v̂ by D̂ᵀδ, so that the
+    // sweep needs one set of rows instead of D and H⁻¹Dᵀ. A diagonal compliance is one more velocity of its own for
+    // each row: √E_ii in column n + i adds E_ii to N_ii.
+    static sdk::SparseRows whitened_jacobian(const sdk::ProblemView& problem, const sdk::HInverse& inverse) {
+        std::vector<std::int32_t> start = {0}, column;
+        std::vector<double> value;
+        std::vector<std::int32_t> sorted;
+        inverse.for_each_half_solved_row(
+            problem.D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const sdk::Vector& work) {
+                sorted = reach;
+                std::sort(sorted.begin(), sorted.end());
+                for (const auto j : sorted)
+                    if (work[j] != 0.0) {
+                        column.push_back(j);
+                        value.push_back(work[j]);
+                    }
+                double compliance = 0.0;
+                for (sdk::SparseRowsView::InnerIterator entry(problem.E, row); entry; ++entry)
+                    if (entry.col() == row) compliance = entry.value();
+                if (compliance > 0.0) {
+                    column.push_back(static_cast<std::int32_t>(problem.n + row));
+                    value.push_back(std::sqrt(compliance));
+                }
+                start.push_back(static_cast<std::int32_t>(column.size()));
+            });
+        return sdk::SparseRowsView(problem.m, problem.n + problem.m, static_cast<Eigen::Index>(value.size()),
+                                   start.data(), column.data(), value.data());
+    }
+
+    // L⁻¹a: a half solve with a as the single row of a matrix.
+    static sdk::Vector whitened(const sdk::ProblemView& problem, const sdk::HInverse& inverse) {
+        std::vector<std::int32_t> column(static_cast<std::size_t>(problem.n));
+        for (std::size_t j = 0; j < column.size(); ++j) column[j] = static_cast<std::int32_t>(j);
+        const std::int32_t start[2] = {0, static_cast<std::int32_t>(problem.n)};
+        sdk::Vector result;
+        inverse.for_each_half_solved_row(
+            sdk::SparseRowsView(1, problem.n, problem.n, start, column.data(), problem.a.data()),
+            [&](Eigen::Index, const std::vector<std::int32_t>&, const sdk::Vector& work) { result = work; });
+        return result;
+    }
+
+    // N couples all rows that reach one connected part of H; its entries are counted by 32-bit numbers.
+    static void check_size(const sdk::ProblemView& problem) {
+        std::vector<std::int32_t> part(static_cast<std::size_t>(problem.n), 0);
+        for (std::size_t k = 0; k + 1 < problem.h_block_start.size(); ++k)
+            for (auto i = problem.h_block_start[k]; i < problem.h_block_start[k + 1]; ++i)
+                part[static_cast<std::size_t>(problem.h_block_index[static_cast<std::size_t>(i)])] =
+                    static_cast<std::int32_t>(k);
+        std::vector<double> touching(problem.h_block_start.size(), 0.0);
+        std::vector<Eigen::Index> last(problem.h_block_start.size(), -1);
+        for (Eigen::Index row = 0; row < problem.m && problem.n > 0; ++row)
+            for (sdk::SparseRowsView::InnerIterator entry(problem.D, row); entry; ++entry) {
+                const auto k = static_cast<std::size_t>(part[static_cast<std::size_t>(entry.col())]);
+                if (last[k] == row) continue;
+                last[k] = row;
+                touching[k] += 1.0;
+            }
+        double entries = static_cast<double>(problem.E.nonZeros());
+        for (const double count : touching) entries += count * count;
+        if (entries > static_cast<double>(std::numeric_limits<std::int32_t>::max()))
+            throw std::length_error("pgs would have to form N = D H⁻¹ Dᵀ + E with about " + std::to_string(entries) +
+                                    " entries, which is too many; a solver that only multiplies by N can take this");
+    }
+
+    void build_local_problems(const sdk::ProblemView& problem, bool jacobi) {
+        const std::size_t count = rows_.blocks().size();
+        local_ = {};
+        local_.block.resize(count);
+        const std::vector<double> sharing = jacobi && on_velocities_ ? sharing_of_columns() : std::vector<double>();
+        Eigen::MatrixXd M;
+        for (std::size_t k = 0; k < count; ++k) {
+            const Block& block = rows_.blocks()[k];
+            block_matrix(block, jacobi, sharing, M);
+            LocalBlock& local = local_.block[k];
+            if (problem.cones[static_cast<std::size_t>(block.cone)].kind == DELASSUS_CONE_FRICTION) {
+                local.kind = LocalBlock::Kind::Friction;
+                local.step = reciprocal(largest_eigenvalue(M));
+                local.matrix = static_cast<std::int32_t>(local_.contact.size());
+                local_.contact.emplace_back(block.rows, M.data());
+            } else if (block.rows > 1) {
+                local.kind = LocalBlock::Kind::Free;
+                local.matrix = static_cast<std::int32_t>(local_.inverse.size());
+                append_pseudo_inverse(M);
+            } else {
+                local.step = reciprocal(M(0, 0));
+            }
+        }
+        local_.kappa.assign(local_.contact.size(), 0.0);
+    }
+
+    // How many blocks touch each entry of v̂.
+    [[nodiscard]] std::vector<double> sharing_of_columns() const {
+        std::vector<double> sharing(static_cast<std::size_t>(states_ + padding), 0.0);
+        std::vector<std::int32_t> last(sharing.size(), -1);
+        for (const Block& block : rows_.blocks())
+            rows_.for_each(block, [&](int, std::int32_t column, double value) {
+                const auto j = static_cast<std::size_t>(column);
+                if (value == 0.0 || last[j] == block.first_row) return;
+                last[j] = block.first_row;
+                sharing[j] += 1.0;
+            });
+        return sharing;
+    }
+
+    // M_c. Gauss–Seidel: the diagonal block N_cc.
+    //
+    // Jacobi moves all blocks at once and needs blocks with N ≼ blockdiag(M_c), so that the sum of the local models
+    // bounds the objective. On velocities: if w_j blocks touch the entry j of v̂, then
+    //     λᵀNλ = Σ_j (Σ_c (D̂_cᵀλ_c)_j)² ≤ Σ_j w_j Σ_c (D̂_cᵀλ_c)_j² = Σ_c λ_cᵀ (D̂_c W D̂_cᵀ) λ_c     (Cauchy–Schwarz).
+    // On rows of N: N ≼ diag(Σ_j |N_ij|), as the difference is diagonally dominant.
+    void block_matrix(const Block& block, bool jacobi, const std::vector<double>& sharing, Eigen::MatrixXd& M) const {
+        M.setZero(block.rows, block.rows);
+        if (!on_velocities_) {
+            rows_.for_each(block, [&](int i, std::int32_t column, double value) {
+                const Eigen::Index j = column - block.first_row;
+                if (jacobi) {
+                    M(i, i) += std::abs(value);
+                } else if (j >= 0 && j < block.rows) {
+                    M(i, j) += value;
+                }
+            });
+            M = (0.5 * (M + M.transpose())).eval();
+            return;
+        }
+        const int width = rows_.width();
+        for (int k = 0; k < block.chunks; ++k) {
+            const double* chunk = rows_.values(block) + static_cast<std::ptrdiff_t>(k) * block.rows * width;
+            for (int j = 0; j < width; ++j) {
+                const double weight =
+                    jacobi ? sharing[static_cast<std::size_t>(rows_.chunk_starts(block)[k] + j)] : 1.0;
+                for (int i = 0; i < block.rows; ++i)
+                    for (int other = 0; other < block.rows; ++other)
+                        M(i, other) += weight * chunk[i * width + j] * chunk[other * width + j];
+            }
+        }
+    }
+
+    static double reciprocal(double value) { return value > 0.0 ? 1.0 / value : 0.0; }
+
+    static double largest_eigenvalue(const Eigen::MatrixXd& M) {
+        if (M.rows() == 2) return 0.5 * (M(0, 0) + M(1, 1) + std::hypot(M(0, 0) - M(1, 1), 2.0 * M(0, 1)));
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+        solver.computeDirect(Eigen::Matrix3d(M), Eigen::EigenvaluesOnly);
+        return solver.eigenvalues()[2];
+    }
+
+    void append_pseudo_inverse(const Eigen::MatrixXd& M) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(M);
+        const double threshold = 1e-12 * std::max(0.0, solver.eigenvalues()[M.rows() - 1]);
+        const Eigen::VectorXd inverse =
+            solver.eigenvalues().unaryExpr([threshold](double value) { return value > threshold ? 1.0 / value : 0.0; });
+        const Eigen::MatrixXd result = solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
+        local_.inverse.insert(local_.inverse.end(), result.data(), result.data() + result.size());
+    }
+
+    bool on_velocities_ = false;
+    Eigen::Index states_ = 0;  // entries of z without padding
+    SweepRows rows_;
+    LocalProblems local_;
+    sdk::Vector offset_;      // m: b on velocities, r on rows of N
+    sdk::Vector free_state_;  // v̂ without reactions, padded
+};
+
+}  // namespace delassus::pgs

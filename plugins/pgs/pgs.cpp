@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Projected Gauss–Seidel over blocks: see README.md.
+#include <chrono>
+
+#include "delassus/sdk/monitor.hpp"
+#include "delassus/sdk/residual.hpp"
+#include "delassus/sdk/solver.hpp"
+#include "model.hpp"
+
+namespace delassus::pgs {
+namespace {
+
+using sdk::ProblemView;
+using sdk::Vector;
+
+constexpr const char* variants[] = {"forward", "symmetric", "jacobi"};
+constexpr const char* local_solvers[] = {"diagonal", "exact"};
+constexpr const char* forms[] = {"auto", "velocities", "operator"};
+
+constexpr delassus_option option_table[] = {
+    sdk::choice_option("variant", "forward", variants,
+                       "order of the blocks: forward, forward and back in one iteration, or all at once (damped)"),
+    sdk::choice_option(
+        "local_solver", "diagonal", local_solvers,
+        "friction blocks: one projected step of length 1/largest eigenvalue, or the one-contact problem"),
+    sdk::real_option("omega", "1.5", 1e-3, 1.999, "", "over- or underrelaxation of the local step"),
+    sdk::choice_option("form", "auto", forms,
+                       "sweep on velocities (H diagonal or of blocks, E diagonal), on rows of N, or what is possible"),
+    sdk::integer_option("check_every", "0", 0, 1e9, "iterations",
+                        "between measurements of the natural error; 0: every 5 % of the iterations done"),
+    sdk::integer_option("stall_window", "1000000", 0, 1e15, "iterations",
+                        "without a gain of 1 % that count as a stall; 0: never"),
+};
+
+class Pgs : public sdk::Solver {
+public:
+    explicit Pgs(const sdk::OptionValues& options)
+        : symmetric_(options.choice("variant") == "symmetric"),
+          jacobi_(options.choice("variant") == "jacobi"),
+          form_(options.choice("form")),
+          check_every_(options.integer("check_every")),
+          stall_window_(options.integer("stall_window")) {
+        rule_.local = options.choice("local_solver") == "exact" ? Local::Exact : Local::Diagonal;
+        rule_.omega = options.real("omega");
+    }
+
+    std::string refusal(const ProblemView& problem) override {
+        if (form_ == "velocities" && !can_sweep_on_velocities(problem))
+            return "form = velocities needs a diagonal or block-diagonal H and a diagonal E";
+        return {};
+    }
+
+    void analyze(const ProblemView& problem) override { operator_.analyze(problem); }
+
+    void factorize(const ProblemView& problem) override {
+        operator_.factorize(problem);
+        model_.build(problem, operator_, form_ != "operator" && can_sweep_on_velocities(problem), jacobi_);
+    }
+
+    sdk::Outcome solve(const ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
+                       sdk::MutableVectorView lambda) override {
+        model_.set_right_hand_side(problem, operator_);
+        residual_ = sdk::NaturalResidual(problem, operator_.diagonal(), operator_.free_velocity(problem));
+        rule_.coulomb = problem.coulomb;
+        lambda_.setZero(problem.m);
+        if (request.warm_start() && lambda.allFinite()) lambda_ = lambda;
+        for (const delassus_cone& cone : problem.cones) sdk::project(cone, lambda_.data() + cone.first_row);
+
+        sdk::Monitor monitor(request, stall_window_);
+        iterate(problem, request, monitor);
+        lambda = monitor.best();
+        x = operator_.velocity(problem, lambda);
+        return monitor.outcome();
+    }
+
+    std::int64_t analyses() const override { return operator_.inverse().analyses(); }
+    std::int64_t factorizations() const override { return operator_.inverse().factorizations(); }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    static constexpr std::chrono::milliseconds patience{20};  // between two calls of progress
+
+    void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor) {
+        model_.state_of(lambda_, z_);
+        std::int64_t next_check = 0;
+        Clock::time_point shown = Clock::now();
+        for (std::int64_t iteration = 0;; ++iteration) {
+            if (iteration > 0) advance();
+            bool due = iteration >= next_check || iteration >= request.max_iterations();
+            if (!due && request.has_listener() && Clock::now() - shown > patience) {
+                const auto answer = request.progress(iteration, nullptr, lambda_.data());
+                shown = Clock::now();
+                due = answer != DELASSUS_CONTINUE;
+                if (due) {
+                    // The iterate may be better than the best that was measured.
+                    (void)monitor.check(iteration, nullptr, lambda_, measure(problem, request));
+                    monitor.outcome().status = sdk::status_of(answer);
+                    return;
+                }
+            }
+            if (!due) continue;
+            if (monitor.check(iteration, nullptr, lambda_, measure(problem, request))) return;
+            shown = Clock::now();
+            next_check = iteration + (check_every_ > 0 ? check_every_ : 1 + iteration / 20);
+        }
+    }
+
+    void advance() {
+        if (jacobi_) {
+            model_.jacobi_step(rule_, z_, next_, lambda_);
+            return;
+        }
+        rule_.direction = Direction::Forward;
+        model_.sweep_in_place(rule_, z_, lambda_);
+        if (!symmetric_) return;
+        rule_.direction = Direction::Backward;
+        model_.sweep_in_place(rule_, z_, lambda_);
+    }
+
+    // The natural error of λ. Where it would end the solve it is measured again as the host does, from
+    // u = D H⁻¹(a + Dᵀλ) + E λ + b, and v̂ is renewed from λ, which takes out the rounding of all changes so far.
+    double measure(const ProblemView& problem, const sdk::Request& request) {
+        model_.constraint_velocities(z_, u_);
+        const double error = residual_.natural(lambda_, u_);
+        if (error > sdk::Monitor::aim * request.tolerance()) return error;
+        model_.state_of(lambda_, z_);
+        u_ = problem.b;
+        if (problem.n > 0) u_.noalias() += problem.D * operator_.velocity(problem, lambda_);
+        if (problem.E.nonZeros() > 0) u_.noalias() += problem.E * lambda_;
+        return residual_.natural(lambda_, u_);
+    }
+
+    bool symmetric_, jacobi_;
+    std::string form_;
+    std::int64_t check_every_, stall_window_;
+    SweepRule rule_;
+    sdk::DelassusOperator operator_;
+    Model model_;
+    sdk::NaturalResidual residual_;
+    Vector lambda_, z_, next_, u_;
+};
+
+constexpr std::uint64_t capabilities =
+    DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION | DELASSUS_CAN_ASSOCIATED |
+    DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE |
+    DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START;
+
+}  // namespace
+}  // namespace delassus::pgs
+
+DELASSUS_SOLVER_PLUGIN(delassus::pgs::Pgs,
+                       (delassus::sdk::PluginInfo{.name = "pgs",
+                                                  .version = "0.1.0",
+                                                  .description = "projected Gauss-Seidel over blocks, on velocities or "
+                                                                 "on rows of the Delassus operator",
+                                                  .licence = "BSD-3-Clause AND MPL-2.0",
+                                                  .capabilities = delassus::pgs::capabilities}),
+                       delassus::pgs::option_table)

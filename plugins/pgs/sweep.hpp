@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The sweeps of projected Gauss–Seidel and Jacobi: each visits the blocks and replaces λ_c by the answer of a local
+// problem with the other reactions held fixed. No memory is allocated in a sweep.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "contact_problem.hpp"
+#include "delassus/sdk/cones.hpp"
+#include "sweep_rows.hpp"
+
+namespace delassus::pgs {
+
+enum class Local {
+    Diagonal,  ///< friction: λ_c ← P(λ_c − ω ρ_c u_c) with one scalar ρ_c = 1/λ_max(M_c)
+    Exact      ///< friction: λ_c solves its one-contact problem, the others being fixed
+};
+enum class Direction { Forward, Backward };
+
+/// What the local problem of a block needs besides its rows. M_c is the diagonal block of N, or the larger block of
+/// the Jacobi variant.
+struct LocalBlock {
+    enum class Kind : std::int32_t {
+        Interval,  ///< one row with lo ≤ λ ≤ hi: free, nonnegative, box
+        Free,      ///< two to six free rows, solved together
+        Friction   ///< normal and one or two tangents
+    };
+    Kind kind = Kind::Interval;
+    std::int32_t matrix = 0;  ///< index of the ContactMatrix, or offset of the inverse of M_c
+    double step = 0.0;        ///< ρ_c; for an interval 1/M_cc
+    double mu = 0.0;
+    double lo = -std::numeric_limits<double>::infinity(), hi = std::numeric_limits<double>::infinity();
+};
+
+/// The local problems of all blocks.
+struct LocalProblems {
+    std::vector<LocalBlock> block;
+    std::vector<ContactMatrix> contact;  ///< one a friction block
+    std::vector<double> inverse;         ///< pseudo-inverses of the M_c of free blocks, row-major
+    mutable std::vector<double> kappa;   ///< sliding multipliers of the last visit, guesses for the next; one a contact
+};
+
+/// How a sweep goes about it.
+struct SweepRule {
+    Local local = Local::Exact;
+    Direction direction = Direction::Forward;
+    bool coulomb = false;
+    double omega = 1.0;
+};
+
+/// λ_c ← P(λ_c − ω ρ u), with the De Saxcé term in u_n under the Coulomb law.
+template <int Rows>
+inline void diagonal_contact_step(const LocalBlock& local, const SweepRule& rule, const double* u, double* lambda) {
+    const double step = rule.omega * local.step;
+    const double tangent = Rows == 3 ? std::sqrt(u[1] * u[1] + u[2] * u[2]) : std::abs(u[1]);
+    lambda[0] -= step * (u[0] + (rule.coulomb ? local.mu * tangent : 0.0));
+    for (int i = 1; i < Rows; ++i) lambda[i] -= step * u[i];
+    sdk::FrictionCone::project_with_slope(local.mu, Rows, lambda);
+}
+
+/// λ_c ← P(λ_c + ω (λ_c* − λ_c)), where λ_c* solves M_c λ* + q = u, q = u_c − M_c λ_c, in its cone.
+template <int Rows>
+inline void exact_contact_step(const LocalProblems& problems, const LocalBlock& local, const SweepRule& rule,
+                               const double* u, double* lambda) {
+    const ContactMatrix& M = problems.contact[static_cast<std::size_t>(local.matrix)];
+    double q[3], solution[3] = {lambda[0], 0.0, 0.0};
+    if constexpr (Rows == 3) {
+        q[0] = u[0] - M.nn * lambda[0] - M.nt[0] * lambda[1] - M.nt[1] * lambda[2];
+        q[1] = u[1] - M.nt[0] * lambda[0] - M.tt[0] * lambda[1] - M.tt[1] * lambda[2];
+        q[2] = u[2] - M.nt[1] * lambda[0] - M.tt[1] * lambda[1] - M.tt[2] * lambda[2];
+    } else {
+        q[0] = u[0] - M.nn * lambda[0] - M.nt[0] * lambda[1];
+        q[1] = u[1] - M.nt[0] * lambda[0] - M.tt[0] * lambda[1];
+    }
+    double& kappa = problems.kappa[static_cast<std::size_t>(local.matrix)];
+    if (rule.coulomb) {
+        solve_coulomb(M, local.mu, q, kappa, solution);
+    } else {
+        solve_associated(M, local.mu, q, kappa, solution);
+    }
+    for (int i = 0; i < Rows; ++i) lambda[i] += rule.omega * (solution[i] - lambda[i]);
+    if (rule.omega != 1.0) sdk::FrictionCone::project_with_slope(local.mu, Rows, lambda);
+}
+
+/// The new λ of a block from its velocities u.
+template <int Rows, Local Choice>
+inline void local_step(const LocalProblems& problems, const LocalBlock& local, const SweepRule& rule, const double* u,
+                       double* lambda) {
+    if constexpr (Rows == 2 || Rows == 3) {
+        if (local.kind == LocalBlock::Kind::Friction) {
+            if constexpr (Choice == Local::Diagonal) {
+                diagonal_contact_step<Rows>(local, rule, u, lambda);
+            } else {
+                exact_contact_step<Rows>(problems, local, rule, u, lambda);
+            }
+            return;
+        }
+    }
+    if constexpr (Rows == 1) {
+        if (local.step > 0.0) {
+            lambda[0] = std::min(local.hi, std::max(local.lo, lambda[0] - rule.omega * local.step * u[0]));
+        } else if (u[0] > 0.0 ? std::isfinite(local.lo) : std::isfinite(local.hi) && u[0] < 0.0) {
+            lambda[0] = u[0] > 0.0 ? local.lo : local.hi;  // no reaction moves this row
+        }
+    } else {
+        const double* inverse = problems.inverse.data() + local.matrix;
+        for (int i = 0; i < Rows; ++i) {
+            double change = 0.0;
+            for (int j = 0; j < Rows; ++j) change += inverse[i * Rows + j] * u[j];
+            lambda[i] -= rule.omega * change;
+        }
+    }
+}
+
+/// One visit of every block. lambda: m, by the problem's rows. offset: m.
+///   OnVelocities: z and next have the entries of v̂; Gauss–Seidel passes one array for both, Jacobi reads z and adds to
+///   next (a copy of z on entry). Otherwise z is λ itself and next where new values go; lambda is not used.
+template <bool OnVelocities, int Width, Local Choice>
+void sweep_blocks(const SweepRows& rows, const LocalProblems& problems, const SweepRule& rule, const double* offset,
+                  const double* z, double* next, double* lambda) {
+    const auto blocks = rows.blocks();
+    const auto count = static_cast<std::ptrdiff_t>(blocks.size());
+    const bool forward = rule.direction == Direction::Forward;
+    for (std::ptrdiff_t k = 0; k < count; ++k) {
+        const auto index = static_cast<std::size_t>(forward ? k : count - 1 - k);
+        const Block& block = blocks[index];
+        const LocalBlock& local = problems.block[index];
+        const double* value = rows.values(block);
+        const std::int32_t* start = rows.chunk_starts(block);
+        with_rows(block.rows, [&]<int Rows>() {
+            double u[Rows], fresh[Rows], delta[Rows];
+            velocity_of_block<Rows, Width>(value, start, block.chunks, z, offset + block.first_row, u);
+            const double* old = (OnVelocities ? lambda : z) + block.first_row;
+            for (int i = 0; i < Rows; ++i) fresh[i] = old[i];
+            local_step<Rows, Choice>(problems, local, rule, u, fresh);
+            if constexpr (OnVelocities) {
+                bool changed = false;
+                for (int i = 0; i < Rows; ++i) {
+                    delta[i] = fresh[i] - lambda[block.first_row + i];
+                    lambda[block.first_row + i] = fresh[i];
+                    changed = changed || delta[i] != 0.0;
+                }
+                if (changed) add_impulse_of_block<Rows, Width>(value, start, block.chunks, delta, next);
+            } else {
+                for (int i = 0; i < Rows; ++i) next[block.first_row + i] = fresh[i];
+            }
+        });
+    }
+}
+
+/// sweep_blocks with the width and the local solver chosen at run time.
+template <bool OnVelocities>
+void sweep(const SweepRows& rows, const LocalProblems& problems, const SweepRule& rule, const double* offset,
+           const double* z, double* next, double* lambda) {
+    const auto go = [&]<int Width>() {
+        if (rule.local == Local::Diagonal) {
+            sweep_blocks<OnVelocities, Width, Local::Diagonal>(rows, problems, rule, offset, z, next, lambda);
+        } else {
+            sweep_blocks<OnVelocities, Width, Local::Exact>(rows, problems, rule, offset, z, next, lambda);
+        }
+    };
+    switch (rows.width()) {
+        case 2:
+            return go.template operator()<2>();
+        case 4:
+            return go.template operator()<4>();
+        default:
+            return go.template operator()<6>();
+    }
+}
+
+/// u ← A z + offset; both m.
+inline void velocities(const SweepRows& rows, const double* offset, const double* z, double* u) {
+    const auto go = [&]<int Width>() {
+        for (const Block& block : rows.blocks())
+            with_rows(block.rows, [&]<int Rows>() {
+                velocity_of_block<Rows, Width>(rows.values(block), rows.chunk_starts(block), block.chunks, z,
+                                               offset + block.first_row, u + block.first_row);
+            });
+    };
+    switch (rows.width()) {
+        case 2:
+            return go.template operator()<2>();
+        case 4:
+            return go.template operator()<4>();
+        default:
+            return go.template operator()<6>();
+    }
+}
+
+/// z += Aᵀ δ; δ has m entries.
+inline void add_impulses(const SweepRows& rows, const double* delta, double* z) {
+    const auto go = [&]<int Width>() {
+        for (const Block& block : rows.blocks())
+            with_rows(block.rows, [&]<int Rows>() {
+                add_impulse_of_block<Rows, Width>(rows.values(block), rows.chunk_starts(block), block.chunks,
+                                                  delta + block.first_row, z);
+            });
+    };
+    switch (rows.width()) {
+        case 2:
+            return go.template operator()<2>();
+        case 4:
+            return go.template operator()<4>();
+        default:
+            return go.template operator()<6>();
+    }
+}
+
+}  // namespace delassus::pgs

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the detector reports of many shapes, and what it refuses.
+#include <cstring>
+#include <limits>
+
+#include "collision/scene.hpp"
+#include "delassus/error.hpp"
+
+namespace delassus::collision_tests {
+namespace {
+
+std::string refusal(const CollisionSetup& setup) {
+    try {
+        (void)make_collision_detector(setup);
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+TEST(CollisionSetup, BadOnesAreRefused) {
+    const auto one = [](const Shape& bad) { return refusal({{bad}, {false}, {}}); };
+    const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+    EXPECT_TRUE(has(one(shape(ShapeKind::Sphere, {0.0, 0.0, 0.0}, 0)), "positive"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Box, {1.0, std::nan(""), 1.0}, 0)), "size 1"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Capsule, {1.0, HUGE_VAL, 0.0}, 0)), "finite"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Box, {1.0, 0.1, 1.0}, 0, 0.1)), "margin"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Box, {1.0, 0.1, 1.0}, 0, -0.1)), "margin"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Plane, {}, 0)), "moves"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 1)), "body"));
+    EXPECT_TRUE(has(one(shape(ShapeKind::Convex, {}, 0)), "no mesh"));
+    Shape tilted = shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 0);
+    tilted.pose.orientation = {0.0, 0.0, 0.0, 0.0};
+    EXPECT_TRUE(has(one(tilted), "quaternion"));
+    EXPECT_TRUE(has(refusal({{}, {false}, {{0, 1}}}), "pair of bodies"));
+
+    Mesh mesh = *box_mesh(1.0, 1.0, 1.0);
+    const auto meshed = [&](const Mesh& bad) { return one(convex(std::make_shared<Mesh>(bad), 0)); };
+    Mesh open = mesh;
+    open.triangles.pop_back();
+    EXPECT_TRUE(has(meshed(open), "open"));
+    Mesh turned = mesh;
+    std::swap(turned.triangles[3][0], turned.triangles[3][1]);
+    EXPECT_TRUE(has(meshed(turned), "opposite directions"));
+    Mesh inside_out = mesh;
+    for (auto& triangle : inside_out.triangles) std::swap(triangle[0], triangle[1]);
+    EXPECT_TRUE(has(meshed(inside_out), "clockwise"));
+    Mesh flat = mesh;
+    for (auto& vertex : flat.vertices) vertex[2] = 0.0;
+    EXPECT_TRUE(has(meshed(flat), "volume"));
+    Mesh outside = mesh;
+    outside.triangles[0][0] = 8;
+    EXPECT_TRUE(has(meshed(outside), "triangle 0"));
+    Mesh infinite = mesh;
+    infinite.vertices[2][1] = std::numeric_limits<double>::infinity();
+    EXPECT_TRUE(has(meshed(infinite), "vertex 2"));
+#ifdef DELASSUS_HAS_FCL
+    EXPECT_TRUE(has(one(convex(box_mesh(1.0, 1.0, 1.0), 0, 1.0)), "margin"));
+#endif
+}
+
+#ifdef DELASSUS_HAS_FCL
+
+/// Bodies in a heap, all kinds mixed, over a fixed plane and a fixed box of the world.
+CollisionSetup heap(int count) {
+    CollisionSetup setup;
+    setup.shapes.push_back(shape(ShapeKind::Plane, {}, -1));
+    setup.shapes.push_back(shape(ShapeKind::Box, {1.0, 1.0, 0.2}, -1));
+    for (int i = 0; i < count; ++i) {
+        setup.shapes.push_back(kinds(i)[static_cast<std::size_t>(i) % 8]);
+        setup.fixed.push_back(i % 10 == 9);
+    }
+    return setup;
+}
+
+std::vector<Pose> heap_poses(int count, unsigned seed) {
+    Random random(seed);
+    std::vector<Pose> poses;
+    for (int i = 0; i < count; ++i) {
+        const Quaterniond turned = random.rotation();
+        poses.push_back(pose(Vector3d(random(-1.5, 1.5), random(-1.5, 1.5), random(0.0, 2.0)), turned));
+    }
+    return poses;
+}
+
+TEST(Detector, SameInputSameBits) {
+    auto detector = make_collision_detector(heap(60)), other = make_collision_detector(heap(60));
+    std::vector<ContactPoint> first, between, again, elsewhere;
+    detector->detect(heap_poses(60, 1), 0.02, first);
+    detector->detect(heap_poses(60, 2), 0.05, between);
+    detector->detect(heap_poses(60, 1), 0.02, again);
+    other->detect(heap_poses(60, 1), 0.02, elsewhere);
+    ASSERT_GT(first.size(), 100U);
+    expect_consistent(first, 0.02);
+    const auto same = [](const ContactPoint& a, const ContactPoint& b) {
+        return a.shape_a == b.shape_a && a.shape_b == b.shape_b && a.point_a == b.point_a && a.point_b == b.point_b &&
+               a.normal == b.normal && a.gap == b.gap && a.feature == b.feature;
+    };
+    EXPECT_TRUE(std::equal(first.begin(), first.end(), again.begin(), again.end(), same));
+    EXPECT_TRUE(std::equal(first.begin(), first.end(), elsewhere.begin(), elsewhere.end(), same));
+}
+
+TEST(Detector, FindsWhatAllPairsFind) {
+    const CollisionSetup setup = heap(40);
+    const auto poses = heap_poses(40, 3);
+    std::vector<ContactPoint> contacts;
+    make_collision_detector(setup)->detect(poses, 0.02, contacts);
+    std::size_t expected = 0;
+    for (std::size_t i = 0; i < setup.shapes.size(); ++i) {
+        for (std::size_t j = i + 1; j < setup.shapes.size(); ++j) {
+            CollisionSetup pair{{setup.shapes[i], setup.shapes[j]}, setup.fixed, {}};
+            std::vector<ContactPoint> alone;
+            make_collision_detector(pair)->detect(poses, 0.02, alone);
+            expected += alone.size();
+        }
+    }
+    EXPECT_EQ(contacts.size(), expected);
+}
+
+TEST(Detector, TheWholeSceneMayMove) {
+    CollisionSetup setup;
+    const int count = 24;
+    for (int i = 0; i < count; ++i) {
+        setup.shapes.push_back(kinds(i)[static_cast<std::size_t>(i) % 8]);
+        setup.fixed.push_back(false);
+    }
+    auto poses = heap_poses(count, 5);
+    auto detector = make_collision_detector(setup);
+    std::vector<ContactPoint> still, moved;
+    detector->detect(poses, 0.01, still);
+    const Quaterniond turned = turn(0.7, Vector3d(1.0, -2.0, 0.5));
+    const Vector3d shift(3.0, -5.0, 2.0);
+    for (Pose& at : poses) {
+        const Quaterniond q(at.orientation[0], at.orientation[1], at.orientation[2], at.orientation[3]);
+        at = pose(turned * vector(at.position) + shift, turned * q);
+    }
+    detector->detect(poses, 0.01, moved);
+    ASSERT_EQ(still.size(), moved.size());
+    ASSERT_GT(still.size(), 30U);
+    for (std::size_t i = 0; i < still.size(); ++i) {
+        EXPECT_NEAR(still[i].gap, moved[i].gap, 1e-12) << i;
+        EXPECT_EQ(still[i].feature, moved[i].feature) << i;
+    }
+}
+
+TEST(Detector, LeavesOutWhatCannotTouch) {
+    const Shape ball = shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 0);
+    std::vector<Shape> shapes(5, ball);
+    for (int i = 0; i < 5; ++i) shapes[static_cast<std::size_t>(i)].body = std::min(i, 3);
+    shapes.push_back(shape(ShapeKind::Plane, {}, -1));
+    // Bodies 0 and 1 are fixed; 2 and 3 are joined; body 3 has two shapes.
+    auto detector = make_collision_detector({shapes, {true, true, false, false}, {{3, 2}, {2, -1}}});
+    std::vector<ContactPoint> contacts;
+    detector->detect(std::vector<Pose>(4, pose(Vector3d(0.0, 0.0, 0.5))), 0.1, contacts);
+    std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
+    for (const auto& contact : contacts) pairs.emplace_back(contact.shape_a, contact.shape_b);
+    EXPECT_EQ(pairs, (std::vector<std::pair<std::int32_t, std::int32_t>>{
+                         {0, 2}, {0, 3}, {0, 4}, {1, 2}, {1, 3}, {1, 4}, {3, 5}, {4, 5}}));
+}
+
+TEST(Detector, RespectsTheEnvelope) {
+    const Shape ball = shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 0);
+    EXPECT_EQ(touch(ball, ball, pose(Vector3d::Zero()), pose(Vector3d(2.1, 0.0, 0.0)), 0.0999).size(), 0U);
+    EXPECT_EQ(touch(ball, ball, pose(Vector3d::Zero()), pose(Vector3d(2.1, 0.0, 0.0)), 0.1001).size(), 1U);
+}
+
+TEST(Detector, ShapesSitWhereTheirPoseSays) {
+    Shape ball = shape(ShapeKind::Sphere, {0.5, 0.0, 0.0}, 0), box = shape(ShapeKind::Box, {1.0, 0.2, 0.1}, 1);
+    ball.pose = pose(Vector3d(0.0, 0.0, 2.0));
+    box.pose = pose(Vector3d(0.0, 3.0, 0.0), turn(0.5 * std::acos(-1.0), Vector3d::UnitZ()));
+    // The body's quarter turn about x brings the ball to y = −2; the box reaches from 3 − 1 to 3 + 1 along y, less 3.4.
+    const auto contacts = touch(ball, box, pose(Vector3d::Zero(), turn(0.5 * std::acos(-1.0), Vector3d::UnitX())),
+                                pose(Vector3d(0.0, -3.4, 0.0)), 1.0);
+    ASSERT_EQ(contacts.size(), 1U);
+    EXPECT_NEAR(contacts[0].gap, -1.4 - -2.0 - 0.5, 1e-12);
+    EXPECT_NEAR(contacts[0].point_b[1], -1.4, 1e-12);
+    EXPECT_NEAR(contacts[0].normal[1], 1.0, 1e-12);
+}
+
+TEST(Detector, BadCallsAreRefused) {
+    auto detector = make_collision_detector({{shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 0)}, {false}, {}});
+    std::vector<ContactPoint> contacts;
+    std::vector<Pose> poses(1);
+    EXPECT_THROW(detector->detect(poses, -1.0, contacts), InputError);
+    EXPECT_THROW(detector->detect({}, 0.1, contacts), InputError);
+    poses[0].position[1] = std::nan("");
+    EXPECT_THROW(detector->detect(poses, 0.1, contacts), InputError);
+}
+
+#endif
+
+}  // namespace
+}  // namespace delassus::collision_tests

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `delassus run` and `delassus plan` as a user would call them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "support/run_command.hpp"
+
+namespace delassus::tests {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string scene(const std::string& name) {
+    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / (name + ".yaml")).string();
+}
+
+Json json_of(const std::filesystem::path& file) {
+    return Json::parse(text_of(file));
+}
+
+TEST(Run, WritesWhatTheDocumentationSays) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const auto result = run_command("run " + scene("bouncing_ball") + " --end 0.05 --every 10 -o " + folder.string());
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.out.find("main: 100 steps of euler_implicit_linearized to t = 0.05 s"), std::string::npos)
+        << result.out;
+    EXPECT_TRUE(result.err.empty()) << result.err;  // no progress where there is no terminal
+    for (const char* name : {"scene.yaml", "trajectory.h5", "scene.pvd", "report.json", "checkpoint.json"})
+        EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+    std::size_t frames = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "vtk")) {
+        ++frames;
+        EXPECT_NE(text_of(entry.path()).find("NumberOfPolys"), std::string::npos);
+    }
+    EXPECT_EQ(frames, 11u);
+    const std::string collection = text_of(folder / "scene.pvd");
+    EXPECT_NE(collection.find("file=\"vtk/main_000010.vtp\""), std::string::npos);
+    EXPECT_EQ(text_of(folder / "scene.yaml"), text_of(scene("bouncing_ball")));
+    const Json report = json_of(folder / "report.json");
+    EXPECT_EQ(report.at("status"), "finished");
+    EXPECT_EQ(report.at("systems")[0].at("steps"), 100);
+}
+
+TEST(Run, JsonIsTheReport) {
+    const auto result = run_command("run " + scene("box_on_incline") + " --end 0.05 --json");
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    ASSERT_EQ(report.at("systems").size(), 2u);
+    EXPECT_EQ(report.at("systems")[0].at("name"), "sticks");
+    EXPECT_EQ(report.at("systems")[1].at("most_contacts"), 4);
+    EXPECT_GT(report.at("systems")[1].at("effort").at("iterations"), 0);
+}
+
+TEST(Run, ResumedRunEndsInTheSameFiles) {
+    const ScratchFolder scratch;
+    const auto whole = scratch / "whole", parts = scratch / "parts";
+    const std::string arguments = "run " + scene("brick_wall") + " --every 2 ";
+    ASSERT_EQ(run_command(arguments + "--end 0.04 -o " + whole.string()).exit_code, 0);
+    ASSERT_EQ(run_command(arguments + "--end 0.018 -o " + parts.string()).exit_code, 0);
+    const auto resumed = run_command(arguments + "--end 0.04 --resume " + parts.string());
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    Json a = json_of(whole / "checkpoint.json").at("systems")[0];
+    Json b = json_of(parts / "checkpoint.json").at("systems")[0];
+    for (const char* key : {"t", "q", "v", "memory", "frame_times", "step"}) EXPECT_EQ(a.at(key), b.at(key)) << key;
+    EXPECT_EQ(a.at("step"), 20);
+    for (const auto& entry : std::filesystem::directory_iterator(whole / "vtk"))
+        EXPECT_EQ(text_of(entry.path()), text_of(parts / "vtk" / entry.path().filename().string())) << entry.path();
+    EXPECT_EQ(text_of(whole / "scene.pvd"), text_of(parts / "scene.pvd"));
+}
+
+TEST(Run, ResumeRefusesAnotherScene) {
+    const ScratchFolder scratch;
+    const auto folder = (scratch / "run").string();
+    ASSERT_EQ(run_command("run " + scene("pendulum") + " --end 0.01 -o " + folder).exit_code, 0);
+    const auto result = run_command("run " + scene("pendulum") + " --step 0.002 --end 0.02 --resume " + folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("was of another scene, or with other settings"), std::string::npos) << result.err;
+    EXPECT_EQ(run_command("run " + scene("pendulum") + " --resume " + (scratch / "none").string()).exit_code, 2);
+}
+
+TEST(Run, LeavesForeignFilesAlone) {
+    const ScratchFolder scratch;
+    std::ofstream(scratch / "thesis.tex") << "x";
+    const auto result = run_command("run " + scene("pendulum") + " --end 0.01 -o " + scratch.path().string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("holds thesis.tex, which no run wrote"), std::string::npos) << result.err;
+    EXPECT_TRUE(std::filesystem::exists(scratch / "thesis.tex"));
+}
+
+TEST(Run, DumpedProblemsCanBeSolved) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const auto result =
+        run_command("run " + scene("brick_wall") + " --end 0.02 --dump-problems 5 -o " + folder.string());
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "problems"))
+        names.insert(entry.path().filename().string());
+    EXPECT_EQ(names, (std::set<std::string>{"main_000005", "main_000010"}));
+    const auto solved = run_command("solve " + (folder / "problems" / "main_000010").string() +
+                                    " --solver apgd --tolerance 1e-6 --json");
+    EXPECT_EQ(solved.exit_code, 0) << solved.err;
+    EXPECT_EQ(Json::parse(solved.out).at("status"), "solved");
+}
+
+TEST(Run, FailedStepSaysWhenAndLeavesTheLastState) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const auto result = run_command("run " + scene("pendulum") +
+                                    " --integrator 'euler_implicit(max_newton_iterations=1)' -o " + folder.string());
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_NE(result.err.find("system \"main\", step "), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(" from t = "), std::string::npos) << result.err;
+    EXPECT_EQ(json_of(folder / "report.json").at("status"), "failed");
+    EXPECT_FALSE(json_of(folder / "checkpoint.json").at("systems")[0].at("q").get<std::string>().empty());
+}
+
+TEST(Run, MissedToleranceIsNotSuccess) {
+    const auto result =
+        run_command("run " + scene("brick_wall") + " --end 0.01 --set solver.max_iterations=1 --solver pgs");
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_NE(result.err.find("missed the solver's tolerance"), std::string::npos) << result.err;
+}
+
+TEST(Run, SolverThatCannotIsRefusedWithTheTime) {
+    const auto result = run_command("run " + scene("brick_wall") + " --solver minres");
+    EXPECT_EQ(result.exit_code, 4);
+    EXPECT_NE(result.err.find("step 1 from t = 0 s: minres cannot solve"), std::string::npos) << result.err;
+}
+
+TEST(Run, InterruptKeepsWhatWasReached) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const auto result = run_shell("timeout -s INT 1 " + std::string(DELASSUS_COMMAND) + " run " + scene("sphere_pile") +
+                                  " --end 1000 --every 100 -o " + folder.string() + "; test $? = 124");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.err.find("--resume goes on from there"), std::string::npos) << result.err;
+    EXPECT_EQ(json_of(folder / "report.json").at("status"), "interrupted");
+    EXPECT_GT(json_of(folder / "checkpoint.json").at("systems")[0].at("step"), 0);
+}
+
+TEST(Run, BadUseIsExplained) {
+    EXPECT_EQ(run_command("run nowhere.yaml").exit_code, 2);
+    const auto dump = run_command("run " + scene("pendulum") + " --dump-problems 2");
+    EXPECT_EQ(dump.exit_code, 2);
+    EXPECT_NE(dump.err.find("--dump-problems writes into the folder of -o"), std::string::npos);
+    const auto solver = run_command("run " + scene("pendulum") + " --solver cholmd");
+    EXPECT_EQ(solver.exit_code, 2);
+    EXPECT_NE(solver.err.find("cholmod"), std::string::npos) << solver.err;
+    EXPECT_EQ(run_command("run " + scene("pendulum") + " --solver 'pgs(omega=99)'").exit_code, 2);
+}
+
+/// The libraries among these that the dynamic loader maps during a run, from its own log.
+std::set<std::string> mapped(const std::string& arguments) {
+    const ScratchFolder scratch;
+    const auto result = run_shell("LD_DEBUG=files LD_DEBUG_OUTPUT=" + (scratch / "log").string() + " " +
+                                  DELASSUS_COMMAND + " " + arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::string log;
+    for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) log += text_of(entry.path());
+    std::set<std::string> found;
+    for (const char* library : {"apgd.so", "cholmod.so", "minres.so", "mumps.so", "petsc.so", "pgs.so", "spg.so",
+                                "delassus_collision.so", "delassus_trajectory.so", "libhdf5", "libfcl"})
+        if (log.find(std::string("/") + library) != std::string::npos) found.insert(library);
+    return found;
+}
+
+class PlanAgrees : public testing::TestWithParam<const char*> {};
+
+TEST_P(PlanAgrees, WithWhatTheRunLoads) {
+    const auto result = run_command("plan " + scene(GetParam()) + " --json");
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    std::set<std::string> planned;
+    const Json plan = Json::parse(result.out);
+    for (const auto& system : plan.at("systems"))
+        for (const auto& library : system.at("libraries")) planned.insert(library.get<std::string>());
+    if (planned.contains("delassus_collision.so")) planned.insert("libfcl");
+    // Long enough for the ball to meet the ground.
+    EXPECT_EQ(mapped("run " + scene(GetParam()) + " --end 0.5"), planned);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, PlanAgrees,
+                         testing::Values("pendulum", "slider_crank", "heavy_top", "bouncing_ball", "box_on_incline"));
+
+TEST(Plan, SaysWhatIsLeftOutAndWhy) {
+    const auto pendulum = run_command("plan " + scene("pendulum"));
+    EXPECT_NE(pendulum.out.find("a solver for cones: no contact, stop or limited motor"), std::string::npos);
+    EXPECT_NE(pendulum.out.find("collision detection: no body has a shape"), std::string::npos);
+    EXPECT_NE(pendulum.out.find("factorisation of H: no stiffness couples bodies"), std::string::npos);
+    const auto ball = run_command("plan " + scene("bouncing_ball"));
+    EXPECT_NE(ball.out.find("2 of 3 rows of each contact, rubber on rubber: friction is zero"), std::string::npos);
+    EXPECT_NE(ball.out.find("1 fixed body: no unknowns, no columns: ground"), std::string::npos);
+    EXPECT_NE(ball.out.find("friction cones: no pair of materials has friction"), std::string::npos);
+}
+
+TEST(Plan, DoesNotDependOnTheEnd) {
+    EXPECT_EQ(run_command("plan --end 0 " + scene("pendulum")).out, run_command("plan " + scene("pendulum")).out);
+}
+
+TEST(Plan, FreeBodyNeedsNoSolver) {
+    const ScratchFolder scratch;
+    std::ofstream(scratch / "free.yaml")
+        << "step: 0.1\nend: 1\nbodies: [{name: stone, mass: 1, inertia: {xx: 1, yy: 2, zz: 2}}]\n";
+    const auto file = (scratch / "free.yaml").string();
+    const auto plan = Json::parse(run_command("plan --json " + file).out).at("systems")[0];
+    EXPECT_EQ(plan.at("libraries"), Json::array());
+    EXPECT_EQ(plan.at("left_out")[0].at("what"), "a solver");
+    EXPECT_EQ(mapped("run " + file), std::set<std::string>{});
+    EXPECT_EQ(mapped("run " + file + " -o " + (scratch / "out").string()),
+              (std::set<std::string>{"delassus_trajectory.so", "libhdf5"}));
+}
+
+TEST(LeaveOut, SolvingAProblemMapsNeitherHdf5NorFcl) {
+    EXPECT_EQ(mapped("solve " + example("box_stack") + " --solver apgd"), std::set<std::string>{"apgd.so"});
+}
+
+}  // namespace
+}  // namespace delassus::tests

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Energy of linear systems, from hω = 0.01 to 1e8 (h = 1). Two modes, ω and ω/2, that both coordinates share.
+#include <gtest/gtest.h>
+
+#include "support/order.hpp"
+#include "support/systems/linear_oscillators.hpp"
+
+namespace delassus::tests {
+namespace {
+
+const double frequencies[] = {1e-2, 1.0, 1e2, 1e4, 1e6, 1e8};
+
+/// Displaced, moving, both.
+std::vector<State> starts(double omega) {
+    return {{0.0, {1.0, 0.3}, {0.0, 0.0}}, {0.0, {0.0, 0.0}, {1.0, 0.3}}, {0.0, {1.0, 0.3}, {omega, -omega}}};
+}
+
+/// The energies of the states from the beginning on, until nothing is left.
+std::vector<State> states(const std::string& method, const OptionTexts& options, LinearOscillators& system, int steps) {
+    const Registry registry;
+    StepSolver solver(registry, {});
+    const auto stepper = make_timestepper(method, system, options);
+    std::vector<State> result = {system.initial_state()};
+    while (static_cast<int>(result.size()) <= steps && system.energy(result.back()) > 1e-150) {
+        result.push_back(result.back());
+        stepper->step(result.back(), 1.0, solver);
+    }
+    return result;
+}
+
+TEST(Energy, NeverGrowsWithImplicitEuler) {
+    for (const char* method : {"euler_implicit", "euler_implicit_linearized"})
+        for (const double omega : frequencies)
+            for (const auto& start : starts(omega)) {
+                LinearOscillators system(omega, 0.5 * omega, start);
+                double before = system.energy(start);
+                for (const auto& state : states(method, {}, system, 300)) {
+                    EXPECT_LE(system.energy(state), before * (1.0 + 1e-14)) << method << " at " << omega;
+                    before = system.energy(state);
+                }
+            }
+}
+
+TEST(Energy, StaysWithTheTrapezoidalRule) {
+    for (const char* method : {"trapezoidal", "trapezoidal_linearized", "newmark"})
+        for (const double omega : frequencies)
+            for (const auto& start : starts(omega)) {
+                LinearOscillators system(omega, 0.5 * omega, start);
+                const double first = system.energy(start);
+                for (const auto& state : states(method, {}, system, 300))
+                    EXPECT_NEAR(system.energy(state) / first, 1.0, 1e-12) << method << " at " << omega;
+            }
+}
+
+// With γ > ½ the energy itself may grow for a few steps. What never grows is (Hughes, The Finite Element Method, 1987,
+// ch. 9) E + ½ h² (β − γ/2) aᵀM a, with M a = −K q.
+TEST(Energy, OfNewmarksMethodNeverGrowsWithItsThirdTerm) {
+    for (const double omega : frequencies)
+        for (const auto& start : starts(omega)) {
+            LinearOscillators system(omega, 0.5 * omega, start);
+            const auto extended = [&](const State& state) {
+                Eigen::Vector2d a = Eigen::Vector2d::Zero();
+                system.add_force(state, 1.0, a.data());
+                return system.energy(state) + 0.5 * (0.3025 - 0.3) * a.squaredNorm();
+            };
+            double before = extended(start);
+            for (const auto& state : states("newmark", {{"gamma", "0.6"}, {"beta", "0.3025"}}, system, 200)) {
+                EXPECT_LE(extended(state), before * (1.0 + 1e-9)) << omega;
+                before = extended(state);
+            }
+        }
+}
+
+struct Damped {
+    std::string method;
+    OptionTexts options;
+    double rho;  ///< of infinite frequencies
+};
+
+// The damped methods of order 2 take a stiff mode from its first displacement to velocities of (h ω)² times the energy
+// (their overshoot), and from then on damp it: by ρ_∞ a step.
+TEST(Energy, OfStiffModesFallsByTheFactorChosen) {
+    for (const auto& damped :
+         {Damped{"generalized_alpha", {{"rho_infinity", "0.8"}}, 0.8},
+          Damped{"generalized_alpha", {{"rho_infinity", "0.9"}}, 0.9},
+          Damped{"generalized_alpha", {{"rho_infinity", "0.5"}}, 0.5}, Damped{"hht", {{"alpha", "-0.1"}}, 0.9 / 1.1},
+          Damped{"hht", {{"alpha", "-0.3"}}, 0.7 / 1.3},
+          Damped{"newmark", {{"gamma", "0.6"}, {"beta", "0.3025"}}, 0.9 / 1.1}})
+        for (const double omega : {1e4, 1e6, 1e8}) {
+            LinearOscillators system(omega, 0.5 * omega, starts(omega)[0]);
+            const auto run = states(damped.method, damped.options, system, 90);
+            ASSERT_EQ(run.size(), 91u) << damped.method;
+            for (const auto& state : run)
+                EXPECT_LE(system.energy(state), 2.0 * omega * omega * system.energy(run[0])) << damped.method;
+            const double rate = std::pow(system.energy(run[90]) / system.energy(run[45]), 1.0 / 90.0);
+            EXPECT_NEAR(rate, damped.rho, 0.03) << damped.method << " at " << omega;
+        }
+}
+
+// Moving through equilibrium there is nothing to overshoot.
+TEST(Energy, OfAMovingSystemStaysBelowTheFirst) {
+    for (const auto& damped :
+         {Damped{"generalized_alpha", {{"rho_infinity", "0.8"}}, 0.0},
+          Damped{"generalized_alpha", {{"rho_infinity", "0"}}, 0.0}, Damped{"hht", {{"alpha", "-0.3"}}, 0.0},
+          Damped{"newmark", {{"gamma", "0.6"}, {"beta", "0.3025"}}, 0.0}})
+        for (const double omega : frequencies) {
+            LinearOscillators system(omega, 0.5 * omega, starts(omega)[1]);
+            for (const auto& state : states(damped.method, damped.options, system, 300))
+                EXPECT_LE(system.energy(state), system.energy(starts(omega)[1]) * (1.0 + 1e-5)) << damped.method;
+        }
+}
+
+}  // namespace
+}  // namespace delassus::tests

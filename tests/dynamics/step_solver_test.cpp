@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a step's problem costs: parts that nothing touches reach no plugin, separate parts are solved apart.
+#include "delassus/step_solver.hpp"
+
+#include <gtest/gtest.h>
+
+#include "delassus/error.hpp"
+#include "delassus/generate.hpp"
+#include "support/small_problems.hpp"
+
+namespace delassus {
+namespace {
+
+/// Two problems beside each other, the second's columns and rows after the first's.
+Problem beside(const Problem& first, const Problem& second) {
+    Problem both = first;
+    const auto n = first.n() + second.n();
+    for (auto [to, from] : {std::pair{&both.H, &second.H}, {&both.D, &second.D}}) {
+        SparseMatrix result = *to;
+        const auto entries = result.entries();
+        for (std::int32_t i = 0; i < from->rows; ++i)
+            result.row_start.push_back(entries + from->row_start[static_cast<std::size_t>(i) + 1]);
+        for (const auto column : from->column) result.column.push_back(column + first.n());
+        result.value.insert(result.value.end(), from->value.begin(), from->value.end());
+        result.rows += from->rows;
+        result.columns = n;
+        *to = result;
+    }
+    both.a.insert(both.a.end(), second.a.begin(), second.a.end());
+    both.b.insert(both.b.end(), second.b.begin(), second.b.end());
+    both.cones.insert(both.cones.end(), second.cones.begin(), second.cones.end());
+    return both;
+}
+
+class StepSolverTest : public testing::Test {
+protected:
+    SolverConfig config(const std::string& name) const {
+        SolverConfig chosen;
+        chosen.name = name;
+        chosen.tolerance = 1e-10;
+        return chosen;
+    }
+    Registry registry;
+};
+
+TEST_F(StepSolverTest, CallsNoPluginWithoutRows) {
+    StepSolver solver(registry, {});
+    Problem problem;
+    problem.H = tests::diagonal_matrix({2.0, 4.0});
+    problem.a = {2.0, 8.0};
+    Solution solution;
+    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_EQ(solution.x, (std::vector<double>{1.0, 2.0}));
+    // An unsymmetric H without rows as well.
+    problem.H = SparseMatrix::from_triplets(2, 2, {{0, 0, 2.0}, {0, 1, 1.0}, {1, 0, -1.0}, {1, 1, 4.0}});
+    problem.a = {3.0, 3.0};
+    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_NEAR(solution.x[0], 1.0, 1e-15);
+    EXPECT_NEAR(solution.x[1], 1.0, 1e-15);
+    EXPECT_EQ(solver.effort().solves, 2);
+    EXPECT_EQ(solver.effort().plugin_solves, 0);
+    EXPECT_TRUE(solver.loaded().empty());
+}
+
+TEST_F(StepSolverTest, SolvesSeparateStacksApart) {
+    BoxStackParameters parameters;
+    const Problem one = generate_box_stack(parameters);
+    const Problem both = beside(one, one);
+    StepSolver apart(registry, config("apgd"));
+    Solution solution, whole;
+    ASSERT_TRUE(apart.solve(both, solution, false));
+    const auto stacks = apart.effort().plugin_solves;
+    StepSolver alone(registry, config("apgd"));
+    ASSERT_TRUE(alone.solve(one, whole, false));
+    EXPECT_EQ(stacks, 2 * alone.effort().plugin_solves);
+    // Each part sees the same problem and gives the same bits.
+    for (std::size_t i = 0; i < whole.x.size(); ++i) {
+        EXPECT_EQ(solution.x[i], whole.x[i]);
+        EXPECT_EQ(solution.x[whole.x.size() + i], whole.x[i]);
+    }
+    for (std::size_t i = 0; i < whole.lambda.size(); ++i)
+        EXPECT_EQ(solution.lambda[whole.lambda.size() + i], whole.lambda[i]);
+    const PreparedProblem prepared(both);
+    EXPECT_LE(ErrorMeter(prepared).measure(solution.x, solution.lambda).natural, 2e-10);
+}
+
+TEST_F(StepSolverTest, LeavesOutRowsBetweenFixedBodies) {
+    Problem problem = tests::point_on_plane(2.0, 6.0, 5.0, 0.5, Law::Associated);
+    problem.b.push_back(1.0);
+    problem.cones.push_back(Cone::nonnegative(1));
+    problem.D.row_start.push_back(problem.D.entries());
+    ++problem.D.rows;
+    StepSolver solver(registry, config("apgd"));
+    std::int32_t shown = 0;
+    solver.on_problem = [&](const Problem& seen) { shown = seen.m(); };
+    Solution solution;
+    ASSERT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_EQ(shown, 4) << "who asks for the step's problem sees all of it";
+    ASSERT_EQ(solution.lambda.size(), 4U);
+    EXPECT_EQ(solution.lambda[3], 0.0);
+    EXPECT_GT(solution.lambda[0], 0.0);
+}
+
+TEST_F(StepSolverTest, ChoosesBySolversThatCan) {
+    StepSolver solver(registry, {});
+    Solution solution;
+    ASSERT_TRUE(solver.solve(generate_chain({}), solution, false));
+    EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod"}));
+    ASSERT_TRUE(solver.solve(generate_box_stack({}), solution, false));
+    EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"apgd", "cholmod"}));
+    StepSolver wrong(registry, config("cholmod"));
+    EXPECT_THROW(wrong.solve(generate_box_stack({}), solution, false), Unsupported);
+}
+
+TEST_F(StepSolverTest, SaysWhatItDidNotSolve) {
+    auto chosen = config("apgd");
+    chosen.max_iterations = 2;
+    StepSolver solver(registry, chosen);
+    Solution solution;
+    EXPECT_FALSE(solver.solve(generate_box_stack({}), solution, false));
+    EXPECT_NE(solver.effort().unsolved.find("iteration_limit"), std::string::npos) << solver.effort().unsolved;
+    solver.reset_effort();
+    EXPECT_TRUE(solver.effort().unsolved.empty());
+}
+
+}  // namespace
+}  // namespace delassus

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Every Jacobian of a multibody system against differences, away from the configuration that its joints hold.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "delassus/multibody.hpp"
+#include "support/system_derivatives.hpp"
+
+namespace delassus {
+namespace {
+
+using Eigen::VectorXd;
+using tests::expect_derivatives;
+using tests::expect_group;
+
+BodyParameters tumbling(const std::string& name, const Vector3& position) {
+    BodyParameters body;
+    body.name = name;
+    body.mass = 2.0;
+    body.inertia = {0.3, 0.4, 0.5, 0.02, -0.03, 0.01};
+    body.pose = {position, {0.8, 0.2, -0.4, 0.3}};
+    body.velocity = {0.3, -0.2, 0.5};
+    body.angular_velocity = {0.7, -1.1, 0.4};
+    return body;
+}
+
+/// A displaced state: the joints do not hold there, nothing is small.
+State displaced(const MultibodySystem& system) {
+    State state = system.initial_state();
+    state.t = 0.3;
+    VectorXd delta(system.n());
+    for (int i = 0; i < delta.size(); ++i) delta[i] = 0.2 * std::sin(1.0 + 3.0 * i);
+    system.increment(state.q.data(), delta.data(), state.q.data());
+    for (std::size_t i = 0; i < state.v.size(); ++i) state.v[i] += 0.3 * std::cos(2.0 + static_cast<double>(i));
+    return state;
+}
+
+VectorXd some_lambda(const MultibodySystem& system) {
+    VectorXd lambda(system.m());
+    for (int i = 0; i < lambda.size(); ++i) lambda[i] = 1.5 * std::cos(0.5 + i);
+    return lambda;
+}
+
+void check(MultibodySystem& system) {
+    system.finish();
+    const State state = displaced(system);
+    expect_derivatives(system, state, some_lambda(system));
+}
+
+class JointDerivatives : public testing::TestWithParam<JointKind> {};
+
+TEST_P(JointDerivatives, OfTwoBodies) {
+    MultibodySystem system;
+    const auto a = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    const auto b = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    JointParameters joint;
+    joint.kind = GetParam();
+    joint.first = a;
+    joint.second = b;
+    joint.point = {0.5, 0.2, 0.1};
+    joint.second_point = {0.9, -0.2, 0.6};
+    joint.axis = {1.0, 2.0, -0.5};
+    joint.second_axis = {2.0, -1.0, 0.0};
+    system.add_joint(joint);
+    check(system);
+}
+
+TEST_P(JointDerivatives, OfABodyAndTheWorld) {
+    MultibodySystem system;
+    JointParameters joint;
+    joint.kind = GetParam();
+    joint.first = world_body;
+    joint.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    joint.point = {0.5, 0.2, 0.1};
+    joint.second_point = {0.9, -0.2, 0.6};
+    joint.axis = {1.0, 2.0, -0.5};
+    joint.second_axis = {2.0, -1.0, 0.0};
+    system.add_joint(joint);
+    check(system);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, JointDerivatives,
+                         testing::Values(JointKind::Spherical, JointKind::Revolute, JointKind::Prismatic,
+                                         JointKind::Cylindrical, JointKind::Universal, JointKind::Fixed,
+                                         JointKind::PointOnPlane, JointKind::Distance));
+
+struct Sizes {
+    JointKind kind;
+    std::int32_t rows;
+};
+
+TEST(Joints, HoldAtTheStartWithTheirNumberOfRows) {
+    for (const auto& [kind, rows] : {Sizes{JointKind::Spherical, 3},
+                                     {JointKind::Revolute, 5},
+                                     {JointKind::Prismatic, 5},
+                                     {JointKind::Cylindrical, 4},
+                                     {JointKind::Universal, 4},
+                                     {JointKind::Fixed, 6},
+                                     {JointKind::PointOnPlane, 1},
+                                     {JointKind::Distance, 1}}) {
+        MultibodySystem system;
+        JointParameters joint;
+        joint.kind = kind;
+        joint.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+        joint.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+        joint.point = {0.5, 0.2, 0.1};
+        joint.second_point = {0.9, -0.2, 0.6};
+        system.add_joint(joint);
+        system.finish();
+        ASSERT_EQ(system.m(), rows);
+        VectorXd C(rows);
+        system.constraint(system.initial_state(), C.data());
+        EXPECT_LE(C.cwiseAbs().maxCoeff(), 1e-15);
+    }
+}
+
+MultibodySystem& with_revolute(MultibodySystem& system, JointKind kind, std::int32_t& joint_index) {
+    JointParameters joint;
+    joint.kind = kind;
+    joint.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    joint.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    joint.point = {0.5, 0.2, 0.1};
+    joint.axis = {1.0, 2.0, -0.5};
+    joint_index = system.add_joint(joint);
+    return system;
+}
+
+TEST(Motors, HaveTheDerivativesTheyClaim) {
+    for (const JointKind kind : {JointKind::Revolute, JointKind::Prismatic})
+        for (const bool speed : {false, true}) {
+            MultibodySystem system;
+            MotorParameters motor;
+            with_revolute(system, kind, motor.joint);
+            motor.speed = speed;
+            motor.motion = Motion::sine(0.4, 0.7, 0.2, 0.1);
+            system.add_motor(motor);
+            EXPECT_NO_THROW(check(system));
+            EXPECT_EQ(system.m(), 6);
+        }
+}
+
+TEST(Gears, HaveTheDerivativesTheyClaimWhileTheirJointsHold) {
+    MultibodySystem system;
+    BodyParameters wheel = tumbling("first", {0.0, 0.0, 0.0});
+    JointParameters joint;
+    joint.kind = JointKind::Revolute;
+    joint.axis = {0.3, -0.5, 1.0};
+    joint.first = system.add_body(tumbling("carrier", {0.0, 0.0, -1.0}));
+    joint.second = system.add_body(wheel);
+    const auto one = system.add_joint(joint);
+    wheel.pose.position = {2.0, 0.0, 0.0};
+    joint.point = {2.0, 0.0, 0.0};
+    joint.second = system.add_body(wheel);
+    const auto two = system.add_joint(joint);
+    JointParameters gear;
+    gear.kind = JointKind::Gear;
+    gear.gear_first = one;
+    gear.gear_second = two;
+    gear.gear_ratio = -2.0 / 3.0;
+    system.add_joint(gear);
+    system.finish();
+    // Turn everything rigidly: the joints still hold. Rates of the wheels about their axes only.
+    State state = system.initial_state();
+    VectorXd lambda = VectorXd::Zero(system.m());
+    lambda[system.m() - 1] = 1.3;
+    for (std::size_t i = 0; i < state.v.size(); ++i) state.v[i] = 0.0;
+    expect_derivatives(system, state, lambda);
+}
+
+TEST(Springs, HaveTheStiffnessAndDampingTheyClaim) {
+    MultibodySystem system;
+    SpringParameters spring;
+    spring.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    spring.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    spring.first_point = {0.2, 0.4, 0.1};
+    spring.second_point = {0.9, -0.1, 0.7};
+    spring.stiffness = 30.0;
+    spring.damping = 2.0;
+    spring.rest_length = 0.4;
+    system.add_spring(spring);
+    spring.first = world_body;
+    system.add_spring(spring);
+    check(system);
+}
+
+TEST(Bushings, HaveTheStiffnessAndDampingTheyClaim) {
+    MultibodySystem system;
+    BushingParameters bushing;
+    bushing.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    bushing.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    bushing.point = {0.4, 0.1, 0.3};
+    bushing.stiffness = {10.0, 20.0, 30.0};
+    bushing.damping = {1.0, 2.0, 3.0};
+    bushing.turn_stiffness = {4.0, 5.0, 6.0};
+    bushing.turn_damping = {0.4, 0.5, 0.6};
+    system.add_bushing(bushing);
+    check(system);
+}
+
+TEST(Loads, TurnWithNothingButTheirPoint) {
+    MultibodySystem system;
+    LoadParameters load;
+    load.body = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    load.force = {Motion::constant(3.0), Motion::sine(1.0, 0.3), Motion::linear(1.0, 2.0)};
+    load.torque = {Motion::constant(0.5), Motion(), Motion::constant(-0.7)};
+    load.point = {0.3, 0.3, 0.1};
+    system.add_load(load);
+    check(system);
+}
+
+MultibodySystem& with_nodes(MultibodySystem& system, int count) {
+    const std::vector<Vector3> positions = {
+        {0.0, 0.0, 0.0}, {1.0, 0.1, 0.0}, {0.0, 1.2, 0.1}, {0.1, 0.0, 0.9}, {1.0, 1.0, 1.0}};
+    for (int k = 0; k < count; ++k) {
+        NodeParameters node;
+        node.position = positions[static_cast<std::size_t>(k)];
+        node.fixed = k == 4;
+        system.add_node(node);
+    }
+    return system;
+}
+
+TEST(Elements, HaveTheStiffnessAndDampingTheyClaim) {
+    for (const ElementModel model : {ElementModel::Corotational, ElementModel::StVenantKirchhoff})
+        for (const double damping_time : {0.0, 0.1}) {
+            MultibodySystem system;
+            with_nodes(system, 5);
+            const ElasticMaterial material{100.0, 0.3, 10.0, damping_time};
+            system.add_tetrahedron({0, 1, 2, 3}, material, model);
+            system.add_tetrahedron({1, 2, 3, 4}, material, model);
+            check(system);
+        }
+}
+
+TEST(Elements, DoNotFeelRigidMotion) {
+    for (const ElementModel model : {ElementModel::Corotational, ElementModel::StVenantKirchhoff}) {
+        MultibodySystem system;
+        with_nodes(system, 4);
+        system.set_gravity({0.0, 0.0, 0.0});
+        system.add_tetrahedron({0, 1, 2, 3}, {100.0, 0.3, 10.0, 0.1}, model);
+        system.finish();
+        State state = system.initial_state();
+        // Turned by a right angle about z, moved, and spinning about z: x' = (−y, x, z) + d, v = (−y', x', 0) + e.
+        for (int k = 0; k < 4; ++k) {
+            const double x = state.q[3 * k], y = state.q[3 * k + 1];
+            state.q[3 * k] = -y + 5.0;
+            state.q[3 * k + 1] = x - 3.0;
+            state.v[3 * k] = -state.q[3 * k + 1] + 2.0;
+            state.v[3 * k + 1] = state.q[3 * k] + 1.0;
+        }
+        VectorXd f = VectorXd::Zero(12);
+        system.add_force(state, 1.0, f.data());
+        EXPECT_LE(f.cwiseAbs().maxCoeff(), 1e-12);
+        EXPECT_NEAR(system.energy(state), system.kinetic_energy(state), 1e-12);
+    }
+}
+
+TEST(Elements, RefuseToBeInverted) {
+    MultibodySystem system;
+    with_nodes(system, 4);
+    EXPECT_THROW(system.add_tetrahedron({0, 2, 1, 3}, {}), InputError);
+    EXPECT_THROW(system.add_tetrahedron({0, 1, 2, 2}, {}), InputError);
+    EXPECT_THROW(system.add_tetrahedron({0, 1, 2, 9}, {}), InputError);
+    EXPECT_THROW(system.add_tetrahedron({0, 1, 2, 3}, {1e6, 0.5, 1000.0, 0.0}), InputError);
+}
+
+TEST(Cables, HaveTheStiffnessAndDampingTheyClaim) {
+    MultibodySystem system;
+    with_nodes(system, 5);
+    CableParameters cable;
+    cable.young = 100.0;
+    cable.area = 0.5;
+    cable.damping_time = 0.2;
+    for (const auto& nodes : {std::array<std::int32_t, 2>{0, 1}, {1, 2}, {2, 3}, {3, 4}}) {
+        cable.nodes = nodes;
+        cable.rest_length = 0.3;  // taut
+        system.add_cable(cable);
+        cable.rest_length = 9.0;  // slack
+        system.add_cable(cable);
+    }
+    check(system);
+}
+
+TEST(Group, IncrementsFromTinyToHuge) {
+    MultibodySystem system;
+    system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    NodeParameters node;
+    node.mass = 1.0;
+    system.add_node(node);
+    system.finish();
+    const State state = system.initial_state();
+    for (const double size : {1e-9, 1e-5, 1e-3, 0.03, 0.1, 1.0, 3.0}) {
+        VectorXd delta(9);
+        delta << 0.3, -0.2, 0.1, 0.6 * size, -0.64 * size, 0.48 * size, 1.0, 2.0, 3.0;
+        expect_group(system, state, delta);
+    }
+    // Beyond half a turn the increment goes on; a whole turn is none.
+    VectorXd turn = VectorXd::Zero(9);
+    turn.segment<3>(3) << 0.0, 200.0 * M_PI, 0.0;
+    const State same = tests::moved(system, state, turn);
+    for (std::size_t i = 0; i < state.q.size(); ++i) EXPECT_NEAR(std::abs(same.q[i]), std::abs(state.q[i]), 1e-12);
+}
+
+TEST(Group, QuaternionsKeepTheirLength) {
+    MultibodySystem system;
+    system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    system.finish();
+    State state = system.initial_state();
+    const std::vector<double> delta = {0.0, 0.0, 0.0, 0.013, -0.11, 0.07};
+    for (int k = 0; k < 1000000; ++k) system.increment(state.q.data(), delta.data(), state.q.data());
+    double square = 0.0;
+    for (std::size_t i = 3; i < 7; ++i) square += state.q[i] * state.q[i];
+    EXPECT_NEAR(square, 1.0, 1e-15);
+}
+
+}  // namespace
+}  // namespace delassus

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "support/atomic_file.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <array>
+#include <csignal>
+#include <fstream>
+
+#include "delassus/error.hpp"
+#include "support/problem_equality.hpp"
+#include "support/run_command.hpp"
+
+namespace delassus::tests {
+namespace {
+namespace fs = std::filesystem;
+
+void write_plainly(const fs::path& file, const std::string& text) {
+    std::ofstream(file) << text;
+}
+
+std::ptrdiff_t entries_of(const fs::path& folder) {
+    return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+}
+
+/// No file of this process may grow beyond so many bytes while this lives: a disk that is full.
+class FullDisk {
+public:
+    explicit FullDisk(rlim_t bytes) {
+        old_handler_ = std::signal(SIGXFSZ, SIG_IGN);
+        getrlimit(RLIMIT_FSIZE, &old_);
+        const rlimit limited{bytes, old_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limited);
+    }
+    FullDisk(const FullDisk&) = delete;
+    FullDisk& operator=(const FullDisk&) = delete;
+    ~FullDisk() {
+        setrlimit(RLIMIT_FSIZE, &old_);
+        std::signal(SIGXFSZ, old_handler_);
+    }
+
+private:
+    rlimit old_{};
+    void (*old_handler_)(int);
+};
+
+TEST(AtomicFile, WritesAndReplaces) {
+    const ScratchFolder scratch;
+    write_file_atomically(scratch / "file", "one");
+    write_file_atomically(scratch / "file", "two");
+    EXPECT_EQ(text_of(scratch / "file"), "two");
+    EXPECT_EQ(entries_of(scratch.path()), 1);
+}
+
+TEST(AtomicFile, AFailingWriteLeavesTheOldFile) {
+    const ScratchFolder scratch;
+    write_file_atomically(scratch / "file", "old");
+    std::string sentence;
+    {
+        const FullDisk full(1000);
+        sentence = sentence_of<InputError>([&] { write_file_atomically(scratch / "file", std::string(100000, 'x')); });
+    }
+    expect_sentence(sentence, "file cannot be written|large");
+    EXPECT_EQ(text_of(scratch / "file"), "old");
+    EXPECT_EQ(entries_of(scratch.path()), 1);
+}
+
+TEST(AtomicFile, RefusesFoldersAndMissingParents) {
+    const ScratchFolder scratch;
+    expect_sentence(sentence_of<InputError>([&] { write_file_atomically(scratch.path(), "x"); }), "is a folder");
+    expect_sentence(sentence_of<InputError>([&] { write_file_atomically(scratch / "none/file", "x"); }),
+                    "there is no folder|none");
+}
+
+constexpr std::array<std::string_view, 1> own = {"own"};
+
+TEST(AtomicFolder, AppearsOnCommitOnly) {
+    const ScratchFolder scratch;
+    {
+        AtomicFolder folder(scratch / "out", own);
+        write_plainly(folder.path() / "own", "1");
+        EXPECT_FALSE(fs::exists(scratch / "out"));
+        folder.commit();
+    }
+    EXPECT_EQ(text_of(scratch / "out/own"), "1");
+    {
+        AtomicFolder folder(scratch / "out/", own);  // abandoned
+        write_plainly(folder.path() / "own", "2");
+    }
+    EXPECT_EQ(text_of(scratch / "out/own"), "1");
+    {
+        AtomicFolder folder(scratch / "out/", own);
+        write_plainly(folder.path() / "own", "3");
+        folder.commit();
+    }
+    EXPECT_EQ(text_of(scratch / "out/own"), "3");
+    EXPECT_EQ(entries_of(scratch.path()), 1);
+}
+
+TEST(AtomicFolder, NeverReplacesWhatIsNotItsOwn) {
+    const ScratchFolder scratch;
+    fs::create_directory(scratch / "out");
+    EXPECT_NO_THROW(AtomicFolder(scratch / "out", own));  // empty
+    write_plainly(scratch / "out/thesis.tex", "years of work");
+    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "out", own); }), "thesis.tex|would be lost");
+    write_plainly(scratch / "file", "");
+    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "file", own); }), "not a folder");
+    fs::create_directories(scratch / "deep/own");
+    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "deep", own); }), "own|would be lost");
+}
+
+}  // namespace
+}  // namespace delassus::tests

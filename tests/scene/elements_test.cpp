@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Elastic blocks and cables in scene files.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "delassus/scene.hpp"
+#include "delassus/simulation.hpp"
+
+namespace delassus::tests {
+namespace {
+
+const std::string head = "step: 0.001\nend: 0.1\n";
+const std::string block = "elastic_blocks:\n  - {name: b, edges: [0.4, 0.2, 0.2], cells: [4, 2, 2], young: 1.0e+6";
+
+std::string refusal(const std::string& yaml) {
+    try {
+        static_cast<void>(parse_scene(yaml, "s.yaml"));
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "taken";
+}
+
+TEST(ElasticScene, BlockHasItsNodesItsSurfaceAndItsMass) {
+    const Scene scene = parse_scene(head + block + ", density: 500, fixed_faces: [x_min]}\n", "s.yaml");
+    const auto& system = *scene.systems[0].system;
+    EXPECT_EQ(system.node_count(), 5 * 3 * 3);
+    EXPECT_EQ(system.n(), 3 * 4 * 3 * 3) << "the nodes of one face are fixed";
+    // Two triangles for each side of a brick on the surface: 2 (4·2 + 4·2 + 2·2) sides.
+    const auto surface = system.element_surface();
+    EXPECT_EQ(surface.size(), 80U);
+    // Seen from outside: the volume by the divergence theorem is that of the block.
+    const State state = system.initial_state();
+    double volume = 0.0;
+    for (const auto& triangle : surface) {
+        const auto a = system.node_position(state, triangle[0]), b = system.node_position(state, triangle[1]),
+                   c = system.node_position(state, triangle[2]);
+        volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                   a[2] * (b[0] * c[1] - b[1] * c[0])) /
+                  6.0;
+    }
+    EXPECT_NEAR(volume, 0.4 * 0.2 * 0.2, 1e-15);
+    MatrixAssembler M;
+    M.begin(system.n(), system.n());
+    system.add_mass(state, 1.0, M);
+    double mass = 0.0;
+    for (const double value : M.finish().value) mass += value / 3.0;
+    EXPECT_LT(mass, 500 * volume);
+    EXPECT_GT(mass, 0.8 * 500 * volume) << "what is missing is the share of the fixed face";
+}
+
+TEST(ElasticScene, BlockSlidesAgainstFriction) {
+#ifndef DELASSUS_HAS_FCL
+    GTEST_SKIP() << "this build has no collision";
+#endif
+    Scene scene = parse_scene(
+        head + "solver: {name: pgs, law: coulomb, tolerance: 1.0e-9}\nmaterials: {rubber: {friction: 0.3}}\n" +
+            "bodies:\n  - {name: ground, fixed: true, shapes: [{plane: {}, material: rubber}]}\n" + block +
+            ", corner: [0, 0, 0.005], damping_time: 0.001, velocity: [1, 0, 0], contact: {radius: 0.005, "
+            "material: rubber}}\n",
+        "s.yaml");
+    const Registry registry;
+    Simulation simulation(scene.systems[0], registry);
+    const double before = simulation.record().momentum[0];
+    while (!simulation.finished()) simulation.step();
+    EXPECT_EQ(simulation.totals().unsolved_steps, 0);
+    EXPECT_EQ(simulation.totals().most_contacts, 15);
+    // μ g t of each kilogram's momentum, while the block settles on the ground.
+    EXPECT_NEAR(before - simulation.record().momentum[0], 0.3 * 9.81 * 0.1 * 16.0, 0.02 * 16.0);
+}
+
+TEST(ElasticScene, CableHangsByItsTension) {
+    // A weight of 1 kg on a cable of E A = 1e5 N, 1 m: it settles m g L/(E A) lower.
+    Scene scene = parse_scene(
+        "step: 0.001\nend: 2\nnodes:\n  - {name: top, fixed: true}\n  - {name: weight, mass: 1, position: [0, 0, -1]}\n"
+        "cables:\n  - {name: rope, nodes: [top, weight], young: 1.0e+9, area: 1.0e-4, density: 0, damping_time: "
+        "0.01}\n",
+        "s.yaml");
+    const Registry registry;
+    Simulation simulation(scene.systems[0], registry);
+    while (!simulation.finished()) simulation.step();
+    const auto& system = *scene.systems[0].system;
+    EXPECT_NEAR(system.node_position(simulation.state(), 1)[2], -1.0 - 9.81 / 1e5, 1e-9);
+    EXPECT_EQ(simulation.totals().plugin_solves, 0) << "no rows, no solver";
+}
+
+TEST(ElasticScene, WrongOnesAreToldInOneSentence) {
+    EXPECT_EQ(refusal(head + block + ", yong: 1}\n"),
+              "s.yaml, line 4: an elastic block has no key \"yong\"; did you mean \"young\"?");
+    EXPECT_EQ(refusal(head + block + ", fixed_faces: [x_mn]}\n"),
+              "s.yaml, line 4: there is no face \"x_mn\"; did you mean \"x_min\"?");
+    EXPECT_EQ(refusal(head + block + ", model: corotationl}\n"),
+              "s.yaml, line 4: there is no element model \"corotationl\"; did you mean \"corotational\"?");
+    EXPECT_EQ(refusal(head + block + ", contact: {radius: 0.1}}\n"),
+              "s.yaml, line 4: \"contact\" lacks the key \"material\"");
+    EXPECT_EQ(refusal(head + "elastic_blocks:\n  - {name: b, edges: [1, 1, 1]}\n"),
+              "s.yaml, line 4: elastic block \"b\" lacks the key \"cells\"");
+    EXPECT_EQ(refusal(head + "elastic_blocks:\n  - {name: b, edges: [1, 0, 1], cells: [1, 1, 1]}\n"),
+              "s.yaml, line 4: the edges of the elastic block \"b\" must be positive and finite");
+    EXPECT_EQ(refusal(head + block + ", poisson: 0.5}\n"),
+              "s.yaml, line 4: Poisson's ratio is 0.5; it must lie between -1 and 0.5");
+    EXPECT_EQ(refusal(head + "nodes: [{name: a, mass: 1}]\ncables: [{name: c, nodes: [a, b]}]\n"),
+              "s.yaml, line 4: \"nodes\" names \"b\", but there is no such node");
+}
+
+}  // namespace
+}  // namespace delassus::tests

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a scene becomes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "delassus/scene.hpp"
+
+namespace delassus::tests {
+namespace {
+
+const std::string head = "step: 0.01\nend: 1\n";
+
+TEST(Scene, DefaultsAreThoseOfTheDocumentation) {
+    const auto scene = parse_scene(head + "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]", "s");
+    ASSERT_EQ(scene.systems.size(), 1u);
+    const auto& system = scene.systems[0];
+    EXPECT_EQ(system.name, "main");
+    EXPECT_EQ(system.integrator, "euler_implicit_linearized");
+    EXPECT_TRUE(system.solver.name.empty());
+    EXPECT_EQ(system.system->n(), 6);
+}
+
+TEST(Scene, MassAndInertiaFollowFromShapes) {
+    const auto scene = parse_scene(head + R"(bodies:
+  - {name: ball, density: 2, shapes: [{sphere: {radius: 0.5}}]}
+  - {name: box, mass: 12, position: [9, 0, 0], shapes: [{box: {size: [1, 2, 3]}}]}
+  - {name: rod, mass: 2, position: [18, 0, 0], shapes: [{cylinder: {radius: 0.1, length: 2}, orientation: {axis: [0, 1, 0], angle: 90}}]}
+  - name: dumbbell
+    mass: 2
+    position: [27, 0, 0]
+    shapes: [{sphere: {radius: 0.5}, position: [1, 0, 0]}, {sphere: {radius: 0.5}, position: [-1, 0, 0]}]
+  - {name: capsule, mass: 1, position: [36, 0, 0], shapes: [{capsule: {radius: 0.5, length: 1.0e-9}}]}
+)",
+                                   "s");
+    const auto& bodies = scene.systems[0].bodies;
+    const double mass = 2.0 * 4.0 / 3.0 * std::numbers::pi * 0.125;
+    EXPECT_NEAR(bodies[0].mass, mass, 1e-12);
+    EXPECT_NEAR(bodies[0].inertia.yy, 0.4 * mass * 0.25, 1e-12);
+    EXPECT_NEAR(bodies[1].inertia.xx, 4.0 + 9.0, 1e-12);
+    EXPECT_NEAR(bodies[1].inertia.zz, 1.0 + 4.0, 1e-12);
+    EXPECT_NEAR(bodies[2].inertia.xx, 0.5 * 2 * 0.01, 1e-12);  // along z in its own frame, along x in the body's
+    EXPECT_NEAR(bodies[2].inertia.zz, 2 * (0.01 / 4 + 1.0 / 3), 1e-12);
+    EXPECT_NEAR(bodies[3].inertia.xx, 2 * 0.4 * 0.25, 1e-12);
+    EXPECT_NEAR(bodies[3].inertia.yy, 2 * (0.4 * 0.25 + 1.0), 1e-12);
+    EXPECT_NEAR(bodies[4].inertia.xx, 0.4 * 0.25, 1e-8);  // nearly a ball
+}
+
+TEST(Scene, CapsuleAgreesWithItsParts) {
+    const auto scene =
+        parse_scene(head + "bodies: [{name: c, density: 1, shapes: [{capsule: {radius: 0.5, length: 2}}]}]", "s");
+    const auto& body = scene.systems[0].bodies[0];
+    // A cylinder, and two half balls with their centroids 3r/8 beyond its ends.
+    const double r = 0.5, cylinder = std::numbers::pi * r * r * 2, half = 2.0 / 3.0 * std::numbers::pi * r * r * r;
+    const double centroid = 3.0 / 8.0 * r;
+    EXPECT_NEAR(body.mass, cylinder + 2 * half, 1e-12);
+    EXPECT_NEAR(body.inertia.zz, 0.5 * cylinder * r * r + 2 * 0.4 * half * r * r, 1e-12);
+    const double half_across = half * (0.4 * r * r - centroid * centroid + std::pow(1 + centroid, 2));
+    EXPECT_NEAR(body.inertia.xx, cylinder * (r * r / 4 + 1.0 / 3) + 2 * half_across, 1e-12);
+}
+
+TEST(Scene, RepeatsFillAGrid) {
+    const auto scene = parse_scene(head + R"(bodies:
+  - name: "b_{i}_{j}_{k}"
+    mass: 1
+    inertia: {xx: 1, yy: 1, zz: 1}
+    position: [1, 0, 0]
+    repeat: {count: [2, 3, 4], spacing: [1, 2, 3]}
+joints:
+  - {name: "j_{i}", kind: spherical, first: "b_{i}_0_0", second: "b_{i+1}_0_0", point: [1.5, 0, 0], repeat: {count: 1}}
+)",
+                                   "s");
+    const auto& system = scene.systems[0];
+    ASSERT_EQ(system.bodies.size(), 24u);
+    const auto index = system.system->find_body("b_1_2_3");
+    ASSERT_NE(index, world_body);
+    EXPECT_EQ(system.bodies[static_cast<std::size_t>(index)].pose.position, (Vector3{2, 4, 9}));
+    EXPECT_EQ(system.joints[0].second, system.system->find_body("b_1_0_0"));
+}
+
+TEST(Scene, LeavesOutWhatCannotMove) {
+    const auto scene = parse_scene(head + R"(bodies:
+  - {name: a, fixed: true}
+  - {name: b, fixed: true}
+  - {name: c, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}
+joints: [{name: frame, kind: fixed, first: a, second: b}, {name: hinge, kind: revolute, first: b, second: c}]
+springs: [{name: rope, first: a, second: b, second_point: [1, 0, 0], stiffness: 1}]
+loads: [{name: wind, body: a, force: [1, 0, 0]}]
+)",
+                                   "s");
+    const auto& system = scene.systems[0];
+    EXPECT_EQ(system.system->m(), 5);
+    EXPECT_FALSE(system.system->has_stiffness());
+    ASSERT_EQ(system.left_out.size(), 3u);
+    EXPECT_EQ(system.left_out[0].what, "joint \"frame\"");
+    EXPECT_EQ(system.left_out[0].reason, "both ends are fixed");
+    EXPECT_EQ(system.left_out[2].reason, "its body is fixed");
+}
+
+TEST(Scene, CommandLineComesFirst) {
+    SceneOverrides overrides;
+    overrides.solver = "pgs(omega=1.2)";
+    overrides.integrator = "rk4";
+    overrides.end = 7;
+    overrides.step = 0.5;
+    const auto scene = parse_scene(
+        "solver: {name: apgd, tolerance: 1.0e-5, options: {a: 1}}\nintegrator: {name: hht, options: {alpha: 0}}\n"
+        "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]",
+        "s", overrides);
+    const auto& system = scene.systems[0];
+    EXPECT_EQ(system.solver.name, "pgs");
+    EXPECT_EQ(system.solver.options, (OptionTexts{{"omega", "1.2"}}));
+    EXPECT_EQ(system.solver.tolerance, 1e-5);
+    EXPECT_EQ(system.integrator, "rk4");
+    EXPECT_TRUE(system.integrator_options.empty());
+    EXPECT_EQ(system.end, 7);
+    EXPECT_EQ(system.step, 0.5);
+}
+
+TEST(Scene, CanonicalTextKnowsAllButTheEnd) {
+    const std::string body = "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
+    const auto text = [&](const std::string& yaml) { return parse_scene(yaml + body, "s").canonical; };
+    EXPECT_EQ(text("step: 1\nend: 1\n"), text("step: 1\nend: 2\n"));
+    EXPECT_EQ(text("step: 1\nend: 1\n"), text("# a comment\nstep:   1\ntitle: x\nend: 1\n"));
+    EXPECT_NE(text("step: 1\nend: 1\n"), text("step: 2\nend: 1\n"));
+}
+
+}  // namespace
+}  // namespace delassus::tests

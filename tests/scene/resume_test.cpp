@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Going on from a saved state gives the same bits as never having stopped.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "delassus/error.hpp"
+#include "scene/checkpoint.hpp"
+#include "support/run_command.hpp"
+#include "support/scenes.hpp"
+
+namespace delassus::tests {
+namespace {
+
+std::vector<std::uint64_t> bits(const std::vector<double>& values) {
+    std::vector<std::uint64_t> result;
+    for (const double value : values) result.push_back(std::bit_cast<std::uint64_t>(value));
+    return result;
+}
+
+struct Case {
+    const char *scene, *integrator;
+    double step;
+};
+
+void PrintTo(const Case& one, std::ostream* out) {
+    *out << one.scene << " " << one.integrator;
+}
+
+class Resume : public testing::TestWithParam<Case> {};
+
+TEST_P(Resume, GivesTheSameBits) {
+    constexpr int first = 23, all = 60;
+    SceneOverrides overrides;
+    overrides.integrator = GetParam().integrator;
+    overrides.step = GetParam().step;
+    overrides.end = 10;
+    const auto read = [&] { return read_scene(example_scene(GetParam().scene), overrides); };
+    Running whole(read()), stopped(read()), resumed(read());
+    for (int i = 0; i < all; ++i) whole.simulation.step();
+    for (int i = 0; i < first; ++i) stopped.simulation.step();
+
+    const ScratchFolder scratch;
+    const auto file = scratch / "checkpoint.json";
+    write_checkpoint({"scene", {{"main", stopped.simulation.save(), {0.5}}}}, file);
+    auto checkpoint = read_checkpoint(file);
+    EXPECT_EQ(checkpoint.systems[0].frame_times, std::vector<double>{0.5});
+    resumed.simulation.load(checkpoint.systems[0].simulation);
+    EXPECT_EQ(resumed.simulation.record().step, first);
+    for (int i = first; i < all; ++i) resumed.simulation.step();
+
+    const auto expected = whole.simulation.save(), got = resumed.simulation.save();
+    EXPECT_EQ(bits(got.state.q), bits(expected.state.q));
+    EXPECT_EQ(bits(got.state.v), bits(expected.state.v));
+    EXPECT_EQ(bits(got.memory), bits(expected.memory));
+    EXPECT_EQ(got.totals.solver_iterations, expected.totals.solver_iterations);
+    EXPECT_EQ(got.totals.energy, expected.totals.energy);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Scene, Resume,
+    testing::Values(Case{"pendulum", "euler_implicit_linearized", 0.002}, Case{"pendulum", "euler_implicit", 0.0005},
+                    Case{"pendulum", "trapezoidal", 0.0005}, Case{"pendulum", "trapezoidal_linearized", 0.0005},
+                    Case{"pendulum", "newmark", 0.0005}, Case{"pendulum", "hht", 0.0005},
+                    Case{"heavy_top", "generalized_alpha", 0.0005}, Case{"four_bar", "generalized_alpha", 0.002},
+                    Case{"bouncing_ball", "euler_implicit_linearized", 0.02},
+                    Case{"brick_wall", "euler_implicit_linearized", 0.002},
+                    Case{"sphere_pile", "euler_implicit_linearized", 0.01}),
+    [](const auto& parameter) { return std::string(parameter.param.scene) + "_" + parameter.param.integrator; });
+
+TEST(Checkpoint, DamagedFilesAreRefused) {
+    const ScratchFolder scratch;
+    const auto file = scratch / "checkpoint.json";
+    const auto told = [&](const std::string& text) -> std::string {
+        std::ofstream(file) << text;
+        try {
+            static_cast<void>(read_checkpoint(file));
+        } catch (const InputError& error) {
+            return std::string(error.what()).substr(file.string().size() + 2);
+        }
+        return "taken";
+    };
+    EXPECT_EQ(told("{"), "the checkpoint is damaged");
+    EXPECT_EQ(told("{\"format\": \"x\", \"version\": 1}"),
+              "the checkpoint cannot be used: it is no checkpoint of Delassus");
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 2}"),
+              "the checkpoint cannot be used: it was written by another version of Delassus");
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 1, \"scene\": \"\", \"systems\": [{\"name\": "
+                   "\"a\", \"step\": 1, \"t\": \"3ff\"}]}"),
+              "the checkpoint cannot be used: a number is damaged");
+}
+
+TEST(Checkpoint, OfAnotherSystemIsRefused) {
+    Running pendulum(read_scene(example_scene("pendulum"))), top(read_scene(example_scene("four_bar")));
+    EXPECT_THROW(pendulum.simulation.load(top.simulation.save()), InputError);
+}
+
+TEST(Simulation, LastStepIsShorterWhereTheEndIsNoMultiple) {
+    SceneOverrides overrides;
+    overrides.step = 0.03;
+    overrides.end = 0.1;
+    Running run(read_scene(example_scene("pendulum"), overrides));
+    run.finish();
+    EXPECT_EQ(run.simulation.record().step, 4);
+    EXPECT_DOUBLE_EQ(run.simulation.state().t, 0.1);
+}
+
+TEST(Simulation, FailedStepLeavesTheLastState) {
+    SceneOverrides overrides;
+    overrides.integrator = "euler_implicit(max_newton_iterations=1)";
+    Running run(read_scene(example_scene("heavy_top"), overrides));
+    const State before = run.simulation.state();
+    try {
+        while (true) run.simulation.step();
+    } catch (const StepFailure& failure) {
+        EXPECT_NE(std::string(failure.what()).find("system \"main\", step 1 from t = 0 s: "), std::string::npos)
+            << failure.what();
+    }
+    EXPECT_EQ(bits(run.simulation.state().q), bits(before.q));
+    EXPECT_EQ(run.simulation.record().step, 0);
+}
+
+}  // namespace
+}  // namespace delassus::tests

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs the `delassus` command as a user would.
+#pragma once
+
+#include <sys/wait.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <unistd.h>
+
+namespace delassus::tests {
+
+/// A folder of its own for one test, removed at the end.
+class ScratchFolder {
+public:
+    ScratchFolder() {
+        static std::atomic<int> count{0};
+        path_ = std::filesystem::temp_directory_path() /
+                ("delassus-test-" + std::to_string(getpid()) + "-" + std::to_string(count++));
+        std::filesystem::create_directories(path_);
+    }
+    ~ScratchFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    ScratchFolder(const ScratchFolder&) = delete;
+    ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+    [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
+inline std::string text_of(const std::filesystem::path& file) {
+    std::ifstream stream(file);
+    std::ostringstream text;
+    text << stream.rdbuf();
+    return text.str();
+}
+
+struct CommandResult {
+    int exit_code = -1;  ///< 128 + signal if it was killed
+    std::string out, err;
+};
+
+/// arguments as typed in a shell after the program's path.
+inline CommandResult run_shell(const std::string& line) {
+    const ScratchFolder scratch;
+    const std::string full = "( " + line + " ) >" + (scratch / "out").string() + " 2>" + (scratch / "err").string();
+    const int status = std::system(full.c_str());
+    CommandResult result;
+    result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    result.out = text_of(scratch / "out");
+    result.err = text_of(scratch / "err");
+    return result;
+}
+
+inline CommandResult run_command(const std::string& arguments) {
+    return run_shell(std::string(DELASSUS_COMMAND) + " " + arguments);
+}
+
+inline std::string example(const std::string& name) {
+    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "problems" / name).string();
+}
+
+}  // namespace delassus::tests

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus convert: between problem folders and FCLib files.
+#include <fmt/format.h>
+
+#include "command.hpp"
+#include "delassus/problem_files.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+struct ConvertArguments {
+    std::filesystem::path input, output;
+    std::string law;
+};
+
+int convert(const ConvertArguments& arguments) {
+    Problem problem = read_problem(arguments.input);
+    if (!arguments.law.empty()) problem.law = law_of(arguments.law);
+    write_problem(problem, arguments.output);
+    fmt::print("{}: n = {}, m = {}\n", arguments.output.string(), problem.n(), problem.m());
+    return exit_solved;
+}
+
+}  // namespace
+
+void add_convert(CLI::App& program, Action& action) {
+    auto arguments = std::make_shared<ConvertArguments>();
+    auto* command = program.add_subcommand(
+        "convert", "Convert a problem; the form is told by the name: .hdf5 is FCLib, else a folder");
+    command->add_option("input", arguments->input, "Problem folder or FCLib file")->required()->type_name("IN");
+    command->add_option("output", arguments->output, "Problem folder or FCLib file")->required()->type_name("OUT");
+    command
+        ->add_option("--law", arguments->law,
+                     "Friction law of the result: associated | coulomb (FCLib files mean coulomb)")
+        ->type_name("LAW");
+    command->callback([arguments, &action] { action.run = [arguments] { return convert(*arguments); }; });
+}
+
+}  // namespace delassus::command

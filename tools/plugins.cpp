@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus plugins list | info | check | describe
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "check/conformance.hpp"
+#include "command.hpp"
+#include "delassus/error.hpp"
+#include "delassus/needs.hpp"
+#include "process/stdout_guard.hpp"
+#include "process/supervision.hpp"
+#include "support/atomic_file.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct PluginsArguments {
+    std::vector<std::filesystem::path> plugin_path;
+    std::string plugin;
+    bool json = false, sidecar = false, schema = false, markdown = false;
+};
+
+/// The table solver × what it can take, for the README: one row a plugin.
+void print_capability_table(const Registry& registry) {
+    struct Column {
+        std::string_view title;
+        std::uint64_t bits;
+    };
+    constexpr Column columns[] = {
+        {"free", DELASSUS_CAN_FREE},
+        {"nonnegative", DELASSUS_CAN_NONNEGATIVE},
+        {"box", DELASSUS_CAN_BOX},
+        {"friction, associated", DELASSUS_CAN_FRICTION | DELASSUS_CAN_ASSOCIATED},
+        {"friction, Coulomb", DELASSUS_CAN_FRICTION | DELASSUS_CAN_COULOMB},
+        {"H diagonal or blocks", DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS},
+        {"H sparse definite", DELASSUS_CAN_H_DEFINITE},
+        {"H semidefinite", DELASSUS_CAN_H_SEMIDEFINITE},
+        {"H indefinite", DELASSUS_CAN_H_INDEFINITE},
+        {"H unsymmetric", DELASSUS_CAN_H_UNSYMMETRIC},
+        {"reduced", DELASSUS_CAN_REDUCED},
+        {"compliance E", DELASSUS_CAN_COMPLIANCE},
+        {"redundant rows", DELASSUS_CAN_REDUNDANT},
+        {"warm start", DELASSUS_CAN_WARM_START},
+        {"MPI", DELASSUS_CAN_DISTRIBUTED},
+    };
+    fmt::print("| solver |");
+    for (const auto& column : columns) fmt::print(" {} |", column.title);
+    fmt::print("\n|---|");
+    for (std::size_t k = 0; k < std::size(columns); ++k) fmt::print(":-:|");
+    fmt::print("\n");
+    for (const auto& plugin : registry.plugins()) {
+        fmt::print("| [{0}](plugins/{0}/README.md) |", plugin.name);
+        for (const auto& column : columns) fmt::print(" {} |", plugin.missing(column.bits) == 0 ? "●" : "");
+        fmt::print("\n");
+    }
+}
+
+/// A section of docs/solvers.md: what the descriptor says, as Markdown.
+void print_section(const PluginInfo& plugin) {
+    fmt::print("## {}\n\n{}. Licence: {}.\n\nCan: {}.\n\n", plugin.name, plugin.description, plugin.licence,
+               fmt::join(capability_names(plugin.capabilities), ", "));
+    if (plugin.options.empty()) return;
+    fmt::print("| option | default | value | |\n|---|---|---|---|\n");
+    for (const auto& option : plugin.options)
+        fmt::print("| `{}` | `{}` | {}{}{} | {} |\n", option.key, option.default_value, option.domain(),
+                   option.unit.empty() ? "" : ", ", option.unit, option.doc);
+    fmt::print("\n");
+}
+
+int list(const PluginsArguments& arguments) {
+    const Registry registry(absolute(arguments.plugin_path));
+    if (arguments.markdown) {
+        print_capability_table(registry);
+        return exit_solved;
+    }
+    if (arguments.json) {
+        Json json = {{"plugins", Json::array()}, {"rejected", Json::array()}, {"not_built", Json::array()}};
+        for (const auto& plugin : registry.plugins()) {
+            Json row = Json::parse(sidecar_text(plugin));
+            row["path"] = plugin.library.string();
+            json["plugins"].push_back(std::move(row));
+        }
+        for (const auto& row : registry.rejected())
+            json["rejected"].push_back({{"path", row.path.string()}, {"reason", row.reason}});
+        for (const auto& row : registry.unbuilt())
+            json["not_built"].push_back({{"name", row.name}, {"reason", row.reason}});
+        fmt::print("{}\n", json.dump(2));
+        return exit_solved;
+    }
+    for (const auto& plugin : registry.plugins())
+        fmt::print("{:<10} {:<8} {}\n", plugin.name, plugin.version, plugin.description);
+    if (registry.plugins().empty()) fmt::print("no plugins were found in {}\n", registry.folders().back().string());
+    if (!registry.unbuilt().empty()) fmt::print("\nNot built here:\n");
+    for (const auto& row : registry.unbuilt()) fmt::print("{:<10} {}\n", row.name, row.reason);
+    if (!registry.rejected().empty()) fmt::print("\nRejected:\n");
+    for (const auto& row : registry.rejected()) fmt::print("{}: {}\n", row.path.string(), row.reason);
+    return exit_solved;
+}
+
+bool is_path(const std::string& text) {
+    return text.find('/') != std::string::npos || text.ends_with(".so");
+}
+
+/// Loads a library that may crash or print.
+PluginInfo info_of_library(const std::string& library) {
+    install_crash_handler(fmt::format("the plugin {}", library), exit_not_converged);
+    const StdoutGuard guard;
+    return Plugin::load(library)->info();
+}
+
+PluginInfo info_of(const PluginsArguments& arguments) {
+    if (is_path(arguments.plugin)) return info_of_library(arguments.plugin);
+    return Registry(absolute(arguments.plugin_path)).find(arguments.plugin);
+}
+
+int info(const PluginsArguments& arguments) {
+    const PluginInfo plugin = info_of(arguments);
+    if (arguments.schema) {
+        fmt::print("{}", options_schema(plugin.name, plugin.options));
+        return exit_solved;
+    }
+    if (arguments.markdown) {
+        print_section(plugin);
+        return exit_solved;
+    }
+    if (arguments.json) {
+        fmt::print("{}", sidecar_text(plugin));
+        return exit_solved;
+    }
+    fmt::print("{} {}: {}\n", plugin.name, plugin.version, plugin.description);
+    fmt::print("library  {}\nlicence  {}\ncan      {}\n", plugin.library.string(), plugin.licence,
+               fmt::join(capability_names(plugin.capabilities), " "));
+    if (!plugin.options.empty()) fmt::print("options\n");
+    for (const auto& option : plugin.options)
+        fmt::print("  {}={}\n      {} ({}{}{})\n", option.key, option.default_value, option.doc, option.domain(),
+                   option.unit.empty() ? "" : ", in ", option.unit);
+    return exit_solved;
+}
+
+int check(const PluginsArguments& arguments) {
+    const std::filesystem::path library =
+        is_path(arguments.plugin) ? std::filesystem::path(arguments.plugin)
+                                  : Registry(absolute(arguments.plugin_path)).find(arguments.plugin).library;
+    const auto report = check::run_conformance(std::filesystem::absolute(library));
+    if (arguments.json) {
+        fmt::print("{}", check::to_json(report));
+    } else {
+        check::print(report);
+    }
+    return report.passed() ? exit_solved : exit_not_converged;
+}
+
+int describe(const PluginsArguments& arguments) {
+    const PluginInfo info = info_of_library(arguments.plugin);
+    const auto text = sidecar_text(info);
+    if (arguments.sidecar) {
+        write_file_atomically(std::filesystem::path(info.library).replace_extension(".json"), text);
+    } else {
+        fmt::print("{}", text);
+    }
+    return exit_solved;
+}
+
+}  // namespace
+
+void add_plugins(CLI::App& program, Action& action) {
+    auto arguments = std::make_shared<PluginsArguments>();
+    auto* plugins = program.add_subcommand("plugins", "List, describe and check solver plugins");
+    plugins->require_subcommand(1);
+    const auto on_call = [&action, arguments](int (*run)(const PluginsArguments&)) {
+        return [&action, arguments, run] { action.run = [arguments, run] { return run(*arguments); }; };
+    };
+
+    auto* list_command =
+        plugins->add_subcommand("list", "List the plugins that can be chosen by name, and those rejected");
+    add_plugin_path(*list_command, arguments->plugin_path);
+    list_command->add_flag("--json", arguments->json, "Print JSON");
+    list_command->add_flag("--markdown", arguments->markdown, "Print the table solver × what it can take as Markdown");
+    list_command->callback(on_call(list));
+
+    auto* info_command = plugins->add_subcommand("info", "Show what a plugin can take, and its options");
+    info_command->add_option("plugin", arguments->plugin, "Name of a plugin, or path of a shared library")->required();
+    add_plugin_path(*info_command, arguments->plugin_path);
+    info_command->add_flag("--json", arguments->json, "Print JSON");
+    info_command->add_flag("--schema", arguments->schema, "Print the JSON Schema of its options");
+    info_command->add_flag("--markdown", arguments->markdown, "Print a section of the documentation as Markdown");
+    info_command->callback(on_call(info));
+
+    auto* check_command = plugins->add_subcommand("check", "Run the conformance suite over a plugin");
+    check_command->add_option("plugin", arguments->plugin, "Name of a plugin, or path of a shared library")->required();
+    add_plugin_path(*check_command, arguments->plugin_path);
+    check_command->add_flag("--json", arguments->json, "Print JSON");
+    check_command->callback(on_call(check));
+
+    auto* describe_command =
+        plugins->add_subcommand("describe", "Print the sidecar of a shared library, or write it beside it");
+    describe_command->add_option("plugin", arguments->plugin, "Path of a shared library")->required();
+    describe_command->add_flag("--sidecar", arguments->sidecar, "Write it beside the library");
+    describe_command->callback(on_call(describe));
+}
+
+}  // namespace delassus::command

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus run: a scene, step by step.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+
+#include "command.hpp"
+#include "delassus/error.hpp"
+#include "delassus/simulation.hpp"
+#include "process/stdout_guard.hpp"
+#include "process/supervision.hpp"
+#include "scene/run_folder.hpp"
+#include "scene/run_report.hpp"
+#include "scene_arguments.hpp"
+#include "support/text_file.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct RunArguments {
+    SceneArguments scene;
+    std::filesystem::path output, resume;
+    std::int64_t every = 1, dump = 0;
+    bool json = false;
+};
+
+double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// A line on a terminal that says how far a run is and when it will be done; nothing where there is no terminal.
+class Progress {
+public:
+    explicit Progress(const std::vector<Simulation>& simulations)
+        : simulations_(simulations), terminal_(isatty(STDERR_FILENO) != 0), start_(done()) {}
+
+    void show() {
+        if (!terminal_ || seconds_since(shown_) < 0.1) return;
+        shown_ = Clock::now();
+        const double all = total(), now = done(), part = all > 0.0 ? now / all : 1.0;
+        std::int64_t steps = 0;
+        for (const auto& simulation : simulations_) steps += simulation.record().step;
+        const double rate = (now - start_) / seconds_since(begin_);
+        const std::string left = rate > 0.0 ? fmt::format("{:.0f} s left", (all - now) / rate) : std::string();
+        fmt::print(stderr, "\r  {:3.0f} %  t = {:.4g} s  {} steps  {} contacts  {:12}", 100.0 * part,
+                   simulations_[0].state().t, steps, simulations_[0].record().contacts, left);
+        written_ = true;
+    }
+    void clear() {
+        if (written_) fmt::print(stderr, "\r{:78}\r", "");
+    }
+
+private:
+    [[nodiscard]] double total() const {
+        double sum = 0.0;
+        for (const auto& simulation : simulations_) sum += simulation.system().end;
+        return sum;
+    }
+    [[nodiscard]] double done() const {
+        double sum = 0.0;
+        for (const auto& simulation : simulations_) sum += simulation.state().t;
+        return sum;
+    }
+
+    const std::vector<Simulation>& simulations_;
+    bool terminal_, written_ = false;
+    double start_;
+    Clock::time_point begin_ = Clock::now(), shown_ = begin_;
+};
+
+/// The system that is farthest behind, or none if all have reached their ends.
+std::optional<std::size_t> next_system(const std::vector<Simulation>& simulations) {
+    std::optional<std::size_t> next;
+    for (std::size_t i = 0; i < simulations.size(); ++i)
+        if (!simulations[i].finished() && (!next || simulations[i].state().t < simulations[*next].state().t)) next = i;
+    return next;
+}
+
+struct Run {
+    RunOutcome outcome;
+    int exit_code = exit_solved;
+};
+
+/// Steps until the end, an interrupt or a failure.
+Run advance(std::vector<Simulation>& simulations, RunFolder* folder) {
+    Run run;
+    run.outcome.status = "finished";
+    const auto begin = Clock::now();
+    Progress progress(simulations);
+    try {
+        for (auto next = next_system(simulations); next; next = next_system(simulations)) {
+            if (interrupted()) {
+                run.outcome.status = "interrupted";
+                run.outcome.message =
+                    fmt::format("stopped at t = {:.9g} s; --resume goes on from there", simulations[*next].state().t);
+                run.exit_code = exit_not_converged;
+                break;
+            }
+            simulations[*next].step();
+            if (folder != nullptr) folder->add_step(*next);
+            progress.show();
+        }
+    } catch (const StepFailure& error) {
+        run.outcome = {"failed", error.what(), 0.0};
+        run.exit_code = exit_not_converged;
+    } catch (const Unsupported& error) {
+        run.outcome = {"failed", error.what(), 0.0};
+        run.exit_code = exit_unsupported;
+    }
+    progress.clear();
+    run.outcome.seconds = seconds_since(begin);
+    for (const auto& simulation : simulations) {
+        const auto& totals = simulation.totals();
+        if (totals.unsolved_steps == 0 || run.exit_code != exit_solved) continue;
+        run.outcome.status = "unsolved";
+        run.outcome.message = fmt::format("{} of {} steps missed the solver's tolerance, first {}",
+                                          totals.unsolved_steps, simulation.record().step, totals.first_unsolved);
+        run.exit_code = exit_not_converged;
+    }
+    return run;
+}
+
+void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outcome) {
+    for (auto& simulation : simulations) {
+        const auto& system = simulation.system();
+        const auto& totals = simulation.totals();
+        fmt::print("{}: {} steps of {} to t = {:.6g} s in {:.3g} s\n", system.name, simulation.record().step,
+                   system.integrator, simulation.state().t, totals.seconds);
+        if (std::isfinite(totals.energy))
+            fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
+        fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
+                   totals.worst_penetration, totals.most_contacts);
+        if (totals.plugin_solves == 0) {
+            fmt::print("  no solver was needed\n");
+        } else {
+            fmt::print("  {}: {} solves, {} iterations, {:.3g} s, worst natural error {:.1e}\n",
+                       fmt::join(simulation.solver().loaded(), ", "), totals.plugin_solves, totals.solver_iterations,
+                       totals.solver_seconds, totals.worst_natural);
+        }
+    }
+    if (outcome.status != "finished") fmt::print("{}\n", outcome.status);
+}
+
+int run(const RunArguments& arguments) {
+    if (arguments.every < 1) throw InputError("--every must be at least 1");
+    if (arguments.dump < 0) throw InputError("--dump-problems must be at least 1");
+    const bool resume = !arguments.resume.empty();
+    if (resume && !arguments.output.empty() && arguments.output != arguments.resume)
+        throw InputError("--resume goes on in its own folder; leave out -o");
+    if (arguments.dump > 0 && arguments.output.empty() && !resume)
+        throw InputError("--dump-problems writes into the folder of -o; give one");
+
+    Scene scene = read(arguments.scene);
+    const Registry registry(absolute(arguments.scene.plugin_path));
+    std::vector<Simulation> simulations;
+    simulations.reserve(scene.systems.size());
+    for (auto& system : scene.systems) simulations.emplace_back(system, registry);
+
+    std::unique_ptr<RunFolder> folder;
+    if (resume) {
+        folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every);
+    } else if (!arguments.output.empty()) {
+        folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
+                                             arguments.every);
+    }
+    if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
+
+    install_interrupt_handler();
+    install_crash_handler("a solver plugin", exit_not_converged);
+    StdoutGuard guard;
+    const Run result = advance(simulations, folder.get());
+    if (const auto bytes = guard.release())
+        fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
+
+    const std::string report =
+        run_report_json(arguments.scene.file.filename().string(), scene, simulations, result.outcome);
+    if (folder) {
+        folder->checkpoint();
+        folder->write_report(report);
+    }
+    if (arguments.json) {
+        fmt::print("{}", report);
+    } else {
+        print_summary(simulations, result.outcome);
+    }
+    if (!result.outcome.message.empty()) fmt::print(stderr, "delassus: {}\n", result.outcome.message);
+    return result.exit_code;
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Action& action) {
+    auto arguments = std::make_shared<RunArguments>();
+    auto* command = program.add_subcommand("run", "Simulate a scene");
+    add_scene_arguments(*command, arguments->scene);
+    command->add_option("-o,--output", arguments->output, "Folder for trajectory.h5, VTK files, checkpoint, report")
+        ->type_name("DIR");
+    command->add_option("--every", arguments->every, "Write the state of every N-th step [1]")->type_name("N");
+    command->add_option("--dump-problems", arguments->dump, "Write the problem of every N-th step as a problem folder")
+        ->type_name("N");
+    command->add_option("--resume", arguments->resume, "Go on with the run in this folder")->type_name("DIR");
+    command->add_flag("--json", arguments->json, "Print the report as JSON");
+    command->callback([arguments, &action] { action.run = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace delassus::command

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus solve: one problem, one solver.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <optional>
+
+#include "command.hpp"
+#include "delassus/config.hpp"
+#include "delassus/distributed.hpp"
+#include "delassus/error.hpp"
+#include "delassus/problem_files.hpp"
+#include "delassus/solver.hpp"
+#include "process/stdout_guard.hpp"
+#include "process/supervision.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+struct SolveArguments {
+    std::filesystem::path problem;
+    std::string solver;
+    std::vector<std::string> settings;
+    std::string law;
+    std::optional<double> tolerance, time_limit;
+    std::optional<std::int64_t> max_iterations;
+    std::filesystem::path warm_start, solution, config;
+    std::vector<std::filesystem::path> plugin_path;
+    bool json = false, curve = false;
+};
+
+/// The file's configuration with the flags on top.
+Config configuration(const SolveArguments& arguments) {
+    Config config = arguments.config.empty() ? Config{} : read_config(arguments.config);
+    auto& solver = config.solver;
+    if (!arguments.solver.empty() && arguments.solver != solver.name) {
+        solver.name = arguments.solver;
+        solver.options.clear();  // another solver's options mean nothing to this one
+    }
+    if (solver.name.empty()) throw InputError("no solver was named: give --solver NAME, or a --config with one");
+    for (const auto& setting : arguments.settings) {
+        auto [key, text] = parse_setting(setting);
+        solver.options.insert_or_assign(std::move(key), std::move(text));
+    }
+    if (arguments.tolerance) solver.tolerance = arguments.tolerance;
+    if (arguments.time_limit) solver.time_limit = arguments.time_limit;
+    if (arguments.max_iterations) solver.max_iterations = arguments.max_iterations;
+    if (!arguments.law.empty()) solver.law = law_of(arguments.law);
+    auto folders = absolute(arguments.plugin_path);
+    folders.insert(folders.end(), config.plugin_path.begin(), config.plugin_path.end());
+    config.plugin_path = std::move(folders);
+    return config;
+}
+
+void print_report(const SolveReport& report) {
+    fmt::print("{} with {} {}: {}", report.problem, report.solver, report.version, name_of(report.status));
+    fmt::print(" after {} iterations, {:.3g} s setup + {:.3g} s solve\n", report.iterations, report.seconds_setup,
+               report.seconds_solve);
+    if (!report.message.empty()) fmt::print("  {}\n", report.message);
+    const auto& error = report.error;
+    fmt::print("  error  natural {:.2e}  balance {:.2e}  cone {:.2e}  dual {:.2e}  gap {:.2e}  siconos {:.2e}\n",
+               error.natural, error.balance, error.cone, error.dual, error.gap, error.siconos);
+}
+
+int solve(const SolveArguments& arguments) {
+    const Config config = configuration(arguments);
+    const Registry registry(config.plugin_path);
+    SolveSettings settings = config.solver.settings();
+    settings.record_curve = arguments.curve;
+
+    Problem data = read_problem(arguments.problem);
+    if (config.solver.law) data.law = *config.solver.law;
+    const PreparedProblem problem(std::move(data));
+    Solution solution;
+    if (!arguments.warm_start.empty()) {
+        solution = read_solution(arguments.warm_start, problem.problem().n(), problem.problem().m());
+        settings.warm_start = true;
+    }
+
+    const std::string& name = config.solver.name;
+    const bool terminal = isatty(STDERR_FILENO) != 0 && process_rank() == 0;
+    settings.cancelled = interrupted;
+    if (terminal) {
+        settings.record_curve = true;
+        settings.on_progress = [](const CurveSample& sample) {
+            fmt::print(stderr, "\r  iteration {}  {:.1f} s  natural {:.2e} ", sample.iteration, sample.seconds,
+                       sample.natural);
+        };
+    }
+    install_interrupt_handler();
+    install_crash_handler(fmt::format("the solver {}", name), exit_not_converged);
+
+    StdoutGuard guard;
+    SolveReport report;
+    {
+        const Watchdog watchdog(
+            settings.time_limit + std::max(2.0, settings.time_limit),
+            fmt::format("the solver {} did not answer long after its time limit of {} s", name, settings.time_limit),
+            exit_not_converged);
+        Solver solver = make_solver(registry, config.solver);
+        report = solver.solve(problem, solution, settings);
+    }
+    if (const auto bytes = guard.release())
+        fmt::print(stderr, "delassus: the solver {} wrote {} bytes to standard output; they were dropped\n", name,
+                   bytes);
+    if (terminal) fmt::print(stderr, "\r{:60}\r", "");
+    if (!arguments.curve) report.curve.clear();
+
+    if (process_rank() == 0) {
+        const std::string json = to_json(report);
+        if (!arguments.solution.empty()) write_solution(solution, json, arguments.solution);
+        if (arguments.json) {
+            fmt::print("{}", json);
+        } else {
+            print_report(report);
+        }
+    }
+    return report.status == Status::Solved ? exit_solved : exit_not_converged;
+}
+
+}  // namespace
+
+void add_solve(CLI::App& program, Action& action) {
+    auto arguments = std::make_shared<SolveArguments>();
+    auto* command = program.add_subcommand("solve", "Solve a problem with one solver");
+    command->add_option("problem", arguments->problem, "Problem folder, or FCLib file (.hdf5)")
+        ->required()
+        ->type_name("PROBLEM");
+    command->add_option("--solver", arguments->solver, "Name of a plugin, or path of a shared library")
+        ->type_name("NAME|LIB");
+    command->add_option("--set", arguments->settings, "Option of the solver; see `delassus plugins info NAME`")
+        ->type_name("KEY=VALUE")
+        ->expected(1)
+        ->take_all();
+    command->add_option("--law", arguments->law, "Friction law in place of the problem's own: associated | coulomb")
+        ->type_name("LAW");
+    command->add_option("--tolerance", arguments->tolerance, "Natural error to reach [1e-8]")->type_name("REAL");
+    command->add_option("--max-iterations", arguments->max_iterations, "Limit of iterations [1000000]")->type_name("N");
+    command->add_option("--time-limit", arguments->time_limit, "Limit of the solver's own time [none]")
+        ->type_name("SECONDS");
+    command->add_option("--warm-start", arguments->warm_start, "Solution folder to start from")->type_name("DIR");
+    command->add_option("--solution", arguments->solution, "Folder to write the solution to")->type_name("DIR");
+    command->add_option("--config", arguments->config, "YAML file with the same settings; flags override it")
+        ->type_name("FILE");
+    add_plugin_path(*command, arguments->plugin_path);
+    command->add_flag("--curve", arguments->curve, "Add the error-against-time curve to the report");
+    command->add_flag("--json", arguments->json, "Print the report as JSON");
+    command->callback([arguments, &action] { action.run = [arguments] { return solve(*arguments); }; });
+}
+
+}  // namespace delassus::command

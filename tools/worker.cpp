@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus worker: the other side of `delassus compare`; not for people.
+#include "bench/worker.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <iostream>
+#include <iterator>
+
+#include "command.hpp"
+
+namespace delassus::command {
+
+void add_worker(CLI::App& program, Action& action) {
+    auto* command = program.add_subcommand("worker", "Answers one request of `delassus compare`");
+    command->group("");  // hidden from --help
+    command->callback([&action] {
+        action.run = [] {
+            const std::string request(std::istreambuf_iterator<char>(std::cin), {});
+            return bench::run_worker(request, fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 10));
+        };
+    });
+}
+
+}  // namespace delassus::command
