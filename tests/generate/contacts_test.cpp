@@ -14,8 +14,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using testing::dense;
-using testing::rank;
+using tests::dense;
+using tests::rank;
 
 constexpr double kGravity = 9.81;
 

@@ -13,7 +13,7 @@
 namespace delassus {
 namespace {
 
-using testing::dense;
+using tests::dense;
 
 std::string message_of(std::string_view kind, const std::map<std::string, double>& values) {
     try {

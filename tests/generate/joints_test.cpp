@@ -14,8 +14,8 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using testing::dense;
-using testing::rank;
+using tests::dense;
+using tests::rank;
 
 // A drift of ±ε s moves every body by ±ε v. So the central difference of C = h b is D v, with v from M v = a (no
 // gravity). The difference is exact up to ε² times third derivatives. For a rod in its body frame a = M v − h ω × J ω:

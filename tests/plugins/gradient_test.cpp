@@ -20,6 +20,7 @@
 namespace delassus {
 namespace {
 
+using tests::dense;
 using tests::diagonal_matrix;
 using tests::identity;
 using tests::point_on_plane;

@@ -18,6 +18,8 @@
 namespace delassus {
 namespace {
 
+using tests::dense;
+
 const Registry& registry() {
     static const Registry instance;
     return instance;
