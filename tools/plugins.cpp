@@ -6,6 +6,7 @@
 
 #include "check/conformance.hpp"
 #include "command.hpp"
+#include "delassus/config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/needs.hpp"
 #include "process/stdout_guard.hpp"
@@ -93,16 +94,16 @@ int list(const PluginsArguments& arguments) {
     }
     for (const auto& plugin : registry.plugins())
         fmt::print("{:<10} {:<8} {}\n", plugin.name, plugin.version, plugin.description);
+    if (!registry.plugins().empty()) {
+        const PluginInfo chooser = solver_info(registry, "auto");
+        fmt::print("{:<10} {:<8} {}\n", chooser.name, chooser.version, chooser.description);
+    }
     if (registry.plugins().empty()) fmt::print("no plugins were found in {}\n", registry.folders().back().string());
     if (!registry.unbuilt().empty()) fmt::print("\nNot built here:\n");
     for (const auto& row : registry.unbuilt()) fmt::print("{:<10} {}\n", row.name, row.reason);
     if (!registry.rejected().empty()) fmt::print("\nRejected:\n");
     for (const auto& row : registry.rejected()) fmt::print("{}: {}\n", row.path.string(), row.reason);
     return exit_solved;
-}
-
-bool is_path(const std::string& text) {
-    return text.find('/') != std::string::npos || text.ends_with(".so");
 }
 
 /// Loads a library that may crash or print.
@@ -113,8 +114,8 @@ PluginInfo info_of_library(const std::string& library) {
 }
 
 PluginInfo info_of(const PluginsArguments& arguments) {
-    if (is_path(arguments.plugin)) return info_of_library(arguments.plugin);
-    return Registry(absolute(arguments.plugin_path)).find(arguments.plugin);
+    if (is_library_path(arguments.plugin)) return info_of_library(arguments.plugin);
+    return solver_info(Registry(absolute(arguments.plugin_path)), arguments.plugin);
 }
 
 int info(const PluginsArguments& arguments) {
@@ -132,7 +133,8 @@ int info(const PluginsArguments& arguments) {
         return exit_solved;
     }
     fmt::print("{} {}: {}\n", plugin.name, plugin.version, plugin.description);
-    fmt::print("library  {}\nlicence  {}\ncan      {}\n", plugin.library.string(), plugin.licence,
+    if (!plugin.library.empty()) fmt::print("library  {}\n", plugin.library.string());
+    fmt::print("licence  {}\ncan      {}\n", plugin.licence,
                fmt::join(capability_names(plugin.capabilities), " "));
     if (!plugin.options.empty()) fmt::print("options\n");
     for (const auto& option : plugin.options)
@@ -143,8 +145,8 @@ int info(const PluginsArguments& arguments) {
 
 int check(const PluginsArguments& arguments) {
     const std::filesystem::path library =
-        is_path(arguments.plugin) ? std::filesystem::path(arguments.plugin)
-                                  : Registry(absolute(arguments.plugin_path)).find(arguments.plugin).library;
+        is_library_path(arguments.plugin) ? std::filesystem::path(arguments.plugin)
+                                          : Registry(absolute(arguments.plugin_path)).find(arguments.plugin).library;
     const auto report = check::run_conformance(std::filesystem::absolute(library));
     if (arguments.json) {
         fmt::print("{}", check::to_json(report));

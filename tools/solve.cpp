@@ -39,7 +39,7 @@ Config configuration(const SolveArguments& arguments) {
         solver.name = arguments.solver;
         solver.options.clear();  // another solver's options mean nothing to this one
     }
-    if (solver.name.empty()) throw InputError("no solver was named: give --solver NAME, or a --config with one");
+    if (solver.name.empty()) solver.name = "auto";
     for (const auto& setting : arguments.settings) {
         auto [key, text] = parse_setting(setting);
         solver.options.insert_or_assign(std::move(key), std::move(text));
@@ -128,7 +128,7 @@ void add_solve(CLI::App& program, Action& action) {
     command->add_option("problem", arguments->problem, "Problem folder, or FCLib file (.hdf5)")
         ->required()
         ->type_name("PROBLEM");
-    command->add_option("--solver", arguments->solver, "Name of a plugin, or path of a shared library")
+    command->add_option("--solver", arguments->solver, "Name of a plugin, or path of a shared library [auto]")
         ->type_name("NAME|LIB");
     command->add_option("--set", arguments->settings, "Option of the solver; see `delassus plugins info NAME`")
         ->type_name("KEY=VALUE")

@@ -154,14 +154,9 @@ TEST(Run, BadUseIsExplained) {
     EXPECT_EQ(run_command("run " + scene("pendulum") + " --solver 'pgs(omega=99)'").exit_code, 2);
 }
 
-/// The libraries among these that the dynamic loader maps during a run, from its own log.
+/// The libraries among these that the dynamic loader maps during a run.
 std::set<std::string> mapped(const std::string& arguments) {
-    const ScratchFolder scratch;
-    const auto result = run_shell("LD_DEBUG=files LD_DEBUG_OUTPUT=" + (scratch / "log").string() + " " +
-                                  DELASSUS_COMMAND + " " + arguments);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    std::string log;
-    for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) log += text_of(entry.path());
+    const std::string log = loader_log(arguments);
     std::set<std::string> found;
     for (const char* library : {"apgd.so", "cholmod.so", "minres.so", "mumps.so", "petsc.so", "pgs.so", "spg.so",
                                 "delassus_collision.so", "delassus_trajectory.so", "libhdf5", "libfcl"})

@@ -2,6 +2,7 @@
 // Runs the `delassus` command as a user would.
 #pragma once
 
+#include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <atomic>
@@ -64,6 +65,18 @@ inline CommandResult run_shell(const std::string& line) {
 
 inline CommandResult run_command(const std::string& arguments) {
     return run_shell(std::string(DELASSUS_COMMAND) + " " + arguments);
+}
+
+/// What the dynamic loader says of the libraries that it maps while the command runs.
+inline std::string loader_log(const std::string& arguments) {
+    const ScratchFolder scratch;
+    const auto result = run_shell("LD_DEBUG=files LD_DEBUG_OUTPUT=" + (scratch / "log").string() + " " +
+                                  DELASSUS_COMMAND + " " + arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::string log;
+    for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) log += text_of(entry.path());
+    EXPECT_NE(log.find("libdelassus.so"), std::string::npos) << "the loader's log is empty";
+    return log;
 }
 
 inline std::string example(const std::string& name) {

@@ -24,8 +24,8 @@ namespace delassus {
 
 /// Which solver, and what it may take. What is absent keeps the default of SolveSettings, or the problem's own law.
 struct SolverConfig {
-    std::string name;  ///< a plugin's name, or the path of a shared library; empty if not given
-    OptionTexts options;
+    std::string name;     ///< a plugin's name, "auto", or the path of a shared library; empty if not given
+    OptionTexts options;  ///< the plugin's, and "finish" and "finish_at" of the framework (docs/configuration.md)
     std::optional<double> tolerance;
     std::optional<std::int64_t> max_iterations;
     std::optional<double> time_limit;  ///< seconds
@@ -48,6 +48,14 @@ struct Config {
 
 /// Parses "name" or "name(key=value,key=value)", the form of `delassus compare --solvers`. Throws InputError.
 [[nodiscard]] DELASSUS_API SolverConfig parse_solver(std::string_view text);
+
+/// What is known of a solver without loading it: of a plugin, or of "auto", which can what any of the plugins can.
+/// Throws InputError naming the nearest and all names if there is none.
+[[nodiscard]] DELASSUS_API PluginInfo solver_info(const Registry& registry, const std::string& name);
+
+/// Throws InputError if there is no such solver, or an option is unknown or outside its domain (those of a library
+/// given by its path are checked when it is loaded). Nothing is loaded.
+DELASSUS_API void check_solver(const Registry& registry, const SolverConfig& config);
 
 /// Loads the plugin that the configuration names and makes a solver with its options. The registry must outlive the
 /// solver.

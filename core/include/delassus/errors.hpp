@@ -25,7 +25,7 @@ struct Errors {
 };
 
 /// Measures solutions of one problem, which must outlive it (moves of the problem are fine as long as the meter is
-/// not used meanwhile).
+/// not used meanwhile). One thread at a time.
 ///
 /// S and r need H⁻¹. Where H is singular or indefinite, so that N does not exist, |diag H|⁻¹ stands in for it, with the
 /// mean of the others for a zero entry; for an unsymmetric H they are exact, by LU.
@@ -51,6 +51,10 @@ public:
     [[nodiscard]] DELASSUS_API std::vector<double> velocity_of(std::span<const double> lambda) const;
 
 private:
+    friend class PreparedProblem;
+    /// The problem has new values in the same places.
+    void renew();
+
     struct Implementation;
     std::unique_ptr<Implementation> implementation_;
 };

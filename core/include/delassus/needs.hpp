@@ -32,6 +32,8 @@ enum class Structure {
 /// The inverse; throws InputError on an unknown name.
 [[nodiscard]] DELASSUS_API std::uint64_t capabilities_of(const std::vector<std::string>& names);
 
+class ErrorMeter;
+
 /// A validated problem with its structure, needs and identity, laid out for the plugin border. Owns everything that
 /// raw() points to; cheap to move, not to be copied by accident.
 class PreparedProblem {
@@ -54,11 +56,27 @@ public:
     /// value that is not finite.
     DELASSUS_API void set_right_hand_side(std::vector<double> a, std::vector<double> b);
 
+    /// Takes another problem in the place of this one. Where its entries stand in the same places, memory and analysis
+    /// are used again, and nothing is allocated as long as H is block-diagonal. Throws as the constructor; this object
+    /// is then as it was.
+    DELASSUS_API void renew(const Problem& problem);
+
+    /// Changes the friction law.
+    DELASSUS_API void set_law(Law law);
+
+    /// The same problem under another friction law. Shares the factorisation of H.
+    [[nodiscard]] DELASSUS_API PreparedProblem with_law(Law law) const;
+
+    /// Measures solutions of this problem (delassus/errors.hpp); made at the first call, valid until the right-hand
+    /// side changes. One thread at a time.
+    [[nodiscard]] DELASSUS_API const ErrorMeter& meter() const;
+
     /// The missing needs as a person would say them, e.g. "1421 friction cones, the exact Coulomb law".
     [[nodiscard]] DELASSUS_API std::string describe(std::uint64_t missing) const;
 
 private:
     friend class ErrorMeter;
+    PreparedProblem();
     struct Implementation;
     std::unique_ptr<Implementation> implementation_;
 };

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delassus/export.hpp"
@@ -26,6 +27,11 @@ private:
     PluginInfo info_;
     const delassus_plugin_descriptor* descriptor_ = nullptr;
 };
+
+/// Whether a solver's name is the path of a shared library: it has a slash or ends in .so.
+[[nodiscard]] inline bool is_library_path(std::string_view name) {
+    return name.find('/') != std::string_view::npos || name.ends_with(".so");
+}
 
 /// A plugin, or what was meant to be one, that cannot be used.
 struct RejectedPlugin {

@@ -55,6 +55,23 @@ struct SolveSettings {
     std::function<void(const CurveSample&)> on_sample;
     /// Asked at every progress call; true cancels the solve. May be empty.
     std::function<bool()> cancelled;
+    /// Shown every iterate that the solver shows, on the solver's clock; true ends the solve, as stalled. x may be
+    /// null. May be empty.
+    std::function<bool(std::int64_t iteration, const double* x, const double* lambda)> give_up;
+};
+
+/// One solver of several that worked on a problem one after another.
+struct StageReport {
+    std::string solver;
+    OptionTexts options;  ///< those that were chosen
+    Law law = Law::Associated;
+    std::string reason;  ///< why this solver, now
+    double tolerance = 0.0;
+    Status status = Status::Error;
+    std::string message;
+    std::int64_t iterations = 0;
+    double seconds = 0.0;  ///< setup and solve
+    double natural = 0.0;  ///< reached, under the problem's own law
 };
 
 /// What happened. Every number in `error` was computed by the core.
@@ -72,19 +89,23 @@ struct SolveReport {
     double claimed_residual = std::numeric_limits<double>::quiet_NaN();
     Errors error;
     std::vector<CurveSample> curve;
+    std::vector<StageReport> stages;  ///< empty if one solver did it all
 };
 
 /// The report as JSON text, with the fields' names as a user of --json sees them (docs/report.md).
 [[nodiscard]] DELASSUS_API std::string to_json(const SolveReport& report);
 
-/// A solver made from a plugin, for its whole life: it keeps its analysis and factorisation from one solve to the next
-/// and renews what the problem's identity says has changed. Used by one thread at a time.
+/// A solver made from a plugin, or from several in stages, for its whole life: it keeps its analysis and factorisation
+/// from one solve to the next and renews what the problem's identity says has changed. Used by one thread at a time.
 class Solver {
 public:
+    class Implementation;
+
     /// Throws InputError on a bad option, PluginError if the plugin cannot make a solver. With a registry, refusals
     /// name the solvers that could; it must outlive the solver.
     DELASSUS_API explicit Solver(std::shared_ptr<const Plugin> plugin, OptionTexts options = {},
                                  const Registry* registry = nullptr);
+    explicit Solver(std::unique_ptr<Implementation> implementation);
     DELASSUS_API ~Solver();
     DELASSUS_API Solver(Solver&&) noexcept;
     DELASSUS_API Solver& operator=(Solver&&) noexcept;
@@ -99,7 +120,6 @@ public:
     DELASSUS_API SolveReport solve(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings);
 
 private:
-    struct Implementation;
     std::unique_ptr<Implementation> implementation_;
 };
 

@@ -28,7 +28,8 @@ struct SolverEffort {
 };
 
 /// Problems without rows are solved here: x = H⁻¹ a, block by block where H is block-diagonal, else by a factorisation
-/// that is kept while the values of H stay.
+/// that is kept while the values of H stay. What was prepared for a step is kept for the next: where the entries stand
+/// in the same places and H is block-diagonal, a step allocates nothing here.
 class StepSolver {
 public:
     /// An empty config.name means: by need, the first of a preference list that is installed and can
@@ -41,7 +42,7 @@ public:
     /// Solves the problem of a step. solution: the start if warm_start, then the result. Throws Unsupported if the
     /// configured solver cannot take the problem, InputError if the problem is not valid. A solve that does not reach
     /// its tolerance is counted in effort() and in the answer; the best iterate is in solution.
-    DELASSUS_API bool solve(Problem problem, Solution& solution, bool warm_start);
+    DELASSUS_API bool solve(const Problem& problem, Solution& solution, bool warm_start);
 
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;
     DELASSUS_API void reset_effort();
@@ -57,7 +58,7 @@ public:
     };
     /// The parts that solve() would make of the problem, in its order; nothing is loaded and nothing solved. Parts
     /// with m = 0 go to no plugin.
-    [[nodiscard]] DELASSUS_API std::vector<Part> parts(Problem problem) const;
+    [[nodiscard]] DELASSUS_API std::vector<Part> parts(const Problem& problem) const;
     /// The name of the plugin that takes problems with these needs: the configured one, whatever it can, or the first
     /// of the preference list that is installed and can; empty if there is none.
     [[nodiscard]] DELASSUS_API std::string choice(std::uint64_t needs) const;

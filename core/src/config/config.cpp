@@ -9,6 +9,8 @@
 
 #include "config/sections.hpp"
 #include "delassus/error.hpp"
+#include "solver/auto_solver.hpp"
+#include "solver/finished_solver.hpp"
 
 namespace delassus {
 
@@ -118,9 +120,35 @@ SolverConfig parse_solver(std::string_view text) {
     return solver;
 }
 
+PluginInfo solver_info(const Registry& registry, const std::string& name) {
+    return name == auto_name ? auto_info(registry) : registry.find(name);
+}
+
+void check_solver(const Registry& registry, const SolverConfig& config) {
+    OptionTexts options = config.options;
+    const FinishOptions finish = take_finish(options);
+    if (!finish.solver.empty()) check_solver(registry, parse_solver(finish.solver));
+    if (is_library_path(config.name)) {
+        if (!std::filesystem::is_regular_file(config.name))
+            throw InputError(fmt::format("there is no plugin {}", config.name));
+        return;
+    }
+    const PluginInfo info = solver_info(registry, config.name);
+    static_cast<void>(resolve_options(info.name, info.options, options));
+}
+
 Solver make_solver(const Registry& registry, const SolverConfig& config) {
     if (config.name.empty()) throw InputError("no solver was named");
-    return Solver(registry.load(config.name), config.options, &registry);
+    OptionTexts options = config.options;
+    const FinishOptions finish = take_finish(options);
+    const auto make_one = [&](const std::string& name, OptionTexts chosen) {
+        return name == auto_name ? make_auto(registry, std::move(chosen))
+                                 : Solver(registry.load(name), std::move(chosen), &registry);
+    };
+    Solver main = make_one(config.name, std::move(options));
+    if (finish.solver.empty()) return main;
+    const SolverConfig last = parse_solver(finish.solver);
+    return make_finished(std::move(main), make_one(last.name, last.options), finish.tolerance, config.options);
 }
 
 }  // namespace delassus

@@ -8,27 +8,6 @@ namespace delassus {
 
 namespace {
 
-/// Disjoint sets of columns (Tarjan), with halving of paths; the smaller number is the root.
-class Sets {
-public:
-    explicit Sets(std::int32_t count) : parent_(static_cast<std::size_t>(count)) {
-        std::iota(parent_.begin(), parent_.end(), 0);
-    }
-    std::int32_t root(std::int32_t i) {
-        while (at(i) != i) i = at(i) = at(at(i));
-        return i;
-    }
-    void join(std::int32_t a, std::int32_t b) {
-        a = root(a);
-        b = root(b);
-        at(std::max(a, b)) = std::min(a, b);
-    }
-
-private:
-    std::int32_t& at(std::int32_t i) { return parent_[static_cast<std::size_t>(i)]; }
-    std::vector<std::int32_t> parent_;
-};
-
 /// Calls visit(position in values) for the entries of a row.
 template <class Visitor>
 void for_each_entry(const SparseMatrix& matrix, std::int32_t row, Visitor&& visit) {
@@ -39,50 +18,84 @@ void for_each_entry(const SparseMatrix& matrix, std::int32_t row, Visitor&& visi
 
 }  // namespace
 
-Islands::Islands(const Problem& problem) : problem_(problem), first_row_{0} {
+// Paths are halved; the smaller number is the root.
+std::int32_t Islands::root(std::int32_t column) {
+    const auto up = [&](std::int32_t i) -> std::int32_t& { return parent_[static_cast<std::size_t>(i)]; };
+    while (up(column) != column) column = up(column) = up(up(column));
+    return column;
+}
+
+void Islands::join(std::int32_t first, std::int32_t second) {
+    first = root(first);
+    second = root(second);
+    parent_[static_cast<std::size_t>(std::max(first, second))] = std::min(first, second);
+}
+
+Island& Islands::next_island() {
+    if (count_ == islands_.size()) islands_.emplace_back();
+    Island& island = islands_[count_++];
+    island.columns.clear();
+    island.cones.clear();
+    return island;
+}
+
+void Islands::find(const Problem& problem) {
+    problem_ = &problem;
+    count_ = 0;
     const auto n = problem.n();
+    first_row_.assign(1, 0);
     for (const Cone& cone : problem.cones) first_row_.push_back(first_row_.back() + cone.rows);
-    Sets sets(n);
+    parent_.resize(static_cast<std::size_t>(n));
+    std::iota(parent_.begin(), parent_.end(), 0);
     for (std::int32_t i = 0; i < n; ++i)
-        for_each_entry(problem.H, i, [&](std::size_t k) { sets.join(i, problem.H.column[k]); });
-    std::vector<std::int32_t> cone_column(problem.cones.size(), -1);  // any column of the cone's rows
+        for_each_entry(problem.H, i, [&](std::size_t k) { join(i, problem.H.column[k]); });
+    cone_column_.assign(problem.cones.size(), -1);  // any column of the cone's rows
     for (std::size_t c = 0; c < problem.cones.size(); ++c)
         for (auto row = first_row_[c]; row < first_row_[c + 1]; ++row)
             for_each_entry(problem.D, row, [&](std::size_t k) {
                 if (problem.D.value[k] == 0.0) return;
-                if (cone_column[c] < 0) cone_column[c] = problem.D.column[k];
-                sets.join(cone_column[c], problem.D.column[k]);
+                if (cone_column_[c] < 0) cone_column_[c] = problem.D.column[k];
+                join(cone_column_[c], problem.D.column[k]);
             });
 
-    std::vector<bool> touched(static_cast<std::size_t>(n), false);  // by root
-    for (const auto column : cone_column)
-        if (column >= 0) touched[static_cast<std::size_t>(sets.root(column))] = true;
-    std::vector<std::int32_t> number(static_cast<std::size_t>(n), -1);  // of the island, by root
+    touched_.assign(static_cast<std::size_t>(n), 0);  // by root
+    for (const auto column : cone_column_)
+        if (column >= 0) touched_[static_cast<std::size_t>(root(column))] = 1;
+    number_.assign(static_cast<std::size_t>(n), -1);  // of the island, by root
     place_.resize(static_cast<std::size_t>(n));
-    Island untouched;
+    untouched_.columns.clear();
     for (std::int32_t i = 0; i < n; ++i) {
-        const auto root = static_cast<std::size_t>(sets.root(i));
-        if (touched[root] && number[root] < 0) {
-            number[root] = static_cast<std::int32_t>(islands_.size());
-            islands_.emplace_back();
+        const auto r = static_cast<std::size_t>(root(i));
+        if (touched_[r] && number_[r] < 0) {
+            number_[r] = static_cast<std::int32_t>(count_);
+            next_island();
         }
-        Island& island = touched[root] ? islands_[static_cast<std::size_t>(number[root])] : untouched;
+        Island& island = touched_[r] ? islands_[static_cast<std::size_t>(number_[r])] : untouched_;
         place_[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(island.columns.size());
         island.columns.push_back(i);
     }
-    for (std::size_t c = 0; c < cone_column.size(); ++c) {
-        if (cone_column[c] < 0) continue;
-        const auto root = static_cast<std::size_t>(sets.root(cone_column[c]));
-        islands_[static_cast<std::size_t>(number[root])].cones.push_back(static_cast<std::int32_t>(c));
+    for (std::size_t c = 0; c < cone_column_.size(); ++c) {
+        if (cone_column_[c] < 0) continue;
+        const auto r = static_cast<std::size_t>(root(cone_column_[c]));
+        islands_[static_cast<std::size_t>(number_[r])].cones.push_back(static_cast<std::int32_t>(c));
     }
-    if (!untouched.columns.empty()) islands_.push_back(std::move(untouched));
+    if (!untouched_.columns.empty()) next_island().columns = untouched_.columns;
 }
 
-Problem Islands::part(const Island& island) const {
-    Problem part;
-    part.name = problem_.name;
-    part.law = problem_.law;
-    part.source = problem_.source;
+void Islands::part(const Island& island, Problem& part) const {
+    const Problem& whole = *problem_;
+    part.name = whole.name;
+    part.law = whole.law;
+    part.source = whole.source;
+    for (SparseMatrix* matrix : {&part.H, &part.D}) {
+        matrix->rows = 0;
+        matrix->columns = static_cast<std::int32_t>(island.columns.size());
+        matrix->row_start.assign(1, 0);
+        matrix->column.clear();
+        matrix->value.clear();
+    }
+    part.a.clear();
+    part.b.clear();
     const auto append_row = [&](const SparseMatrix& from, std::int32_t row, SparseMatrix& to) {
         for_each_entry(from, row, [&](std::size_t k) {
             if (from.value[k] == 0.0 && &to == &part.D) return;  // it may link to another part
@@ -92,29 +105,28 @@ Problem Islands::part(const Island& island) const {
         to.row_start.push_back(to.entries());
         ++to.rows;
     };
-    part.H.columns = part.D.columns = static_cast<std::int32_t>(island.columns.size());
     for (const auto column : island.columns) {
-        append_row(problem_.H, column, part.H);
-        part.a.push_back(problem_.a[static_cast<std::size_t>(column)]);
+        append_row(whole.H, column, part.H);
+        part.a.push_back(whole.a[static_cast<std::size_t>(column)]);
     }
-    for (const auto c : island.cones) {
-        const auto cone = static_cast<std::size_t>(c);
-        part.cones.push_back(problem_.cones[cone]);
+    part.cones.resize(island.cones.size());
+    for (std::size_t k = 0; k < island.cones.size(); ++k) {
+        const auto cone = static_cast<std::size_t>(island.cones[k]);
+        part.cones[k] = whole.cones[cone];
         for (auto row = first_row_[cone]; row < first_row_[cone + 1]; ++row) {
-            append_row(problem_.D, row, part.D);
-            part.b.push_back(problem_.b[static_cast<std::size_t>(row)]);
+            append_row(whole.D, row, part.D);
+            part.b.push_back(whole.b[static_cast<std::size_t>(row)]);
         }
     }
-    return part;
 }
 
-Solution Islands::take(const Island& island, const Solution& whole) const {
-    Solution part;
+void Islands::take(const Island& island, const Solution& whole, Solution& part) const {
+    part.x.clear();
+    part.lambda.clear();
     for (const auto column : island.columns) part.x.push_back(whole.x[static_cast<std::size_t>(column)]);
     for (const auto c : island.cones)
         part.lambda.insert(part.lambda.end(), whole.lambda.begin() + first_row_[static_cast<std::size_t>(c)],
                            whole.lambda.begin() + first_row_[static_cast<std::size_t>(c) + 1]);
-    return part;
 }
 
 void Islands::put(const Island& island, const Solution& part, Solution& whole) const {
@@ -122,7 +134,7 @@ void Islands::put(const Island& island, const Solution& part, Solution& whole) c
         whole.x[static_cast<std::size_t>(island.columns[i])] = part.x[i];
     auto next = part.lambda.begin();
     for (const auto c : island.cones) {
-        const auto rows = problem_.cones[static_cast<std::size_t>(c)].rows;
+        const auto rows = problem_->cones[static_cast<std::size_t>(c)].rows;
         std::copy(next, next + rows, whole.lambda.begin() + first_row_[static_cast<std::size_t>(c)]);
         next += rows;
     }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "delassus/problem.hpp"
@@ -17,23 +18,33 @@ struct Island {
 
 /// The parts of a problem without E, by their first columns; those without cones are gathered in one part at the end,
 /// if there are any. Cones whose rows have no entries (between fixed bodies) belong to none: nothing that a solver does
-/// changes them. Refers to the problem. Linear in its entries, all parts together.
+/// changes them. Linear in its entries, all parts together. Arrays are kept from problem to problem.
 class Islands {
 public:
-    explicit Islands(const Problem& problem);
+    /// Finds the parts of a problem, which must outlive their use.
+    void find(const Problem& problem);
 
-    [[nodiscard]] const std::vector<Island>& list() const { return islands_; }
-    /// The problem of one part.
-    [[nodiscard]] Problem part(const Island& island) const;
+    [[nodiscard]] std::span<const Island> list() const { return {islands_.data(), count_}; }
+    /// The problem of one part, in place of what was in part.
+    void part(const Island& island, Problem& part) const;
     /// The entries of the whole that belong to a part, and back.
-    [[nodiscard]] Solution take(const Island& island, const Solution& whole) const;
+    void take(const Island& island, const Solution& whole, Solution& part) const;
     void put(const Island& island, const Solution& part, Solution& whole) const;
 
 private:
-    const Problem& problem_;
+    std::int32_t root(std::int32_t column);
+    void join(std::int32_t first, std::int32_t second);
+    Island& next_island();
+
+    const Problem* problem_ = nullptr;
     std::vector<std::int32_t> first_row_;  // of each cone, and the end
     std::vector<std::int32_t> place_;      // of each column in its part
-    std::vector<Island> islands_;
+    std::vector<std::int32_t> parent_;     // disjoint sets of columns (Tarjan)
+    std::vector<std::int32_t> cone_column_, number_;
+    std::vector<char> touched_;
+    std::vector<Island> islands_;  // of which count_ are in use
+    std::size_t count_ = 0;
+    Island untouched_;
 };
 
 }  // namespace delassus

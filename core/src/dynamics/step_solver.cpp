@@ -5,9 +5,10 @@
 
 #include <Eigen/SparseLU>
 #include <algorithm>
+#include <deque>
 #include <fstream>
-#include <iterator>
 #include <map>
+#include <optional>
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/problem_view.hpp"
@@ -39,27 +40,37 @@ std::vector<double> solve_by_lu(const PreparedProblem& problem) {
 
 }  // namespace
 
+/// What is kept of a part of the problem from one step to the next.
+struct KeptPart {
+    Problem data;  // unused where the whole problem is one part
+    std::optional<PreparedProblem> prepared;
+    Solution solution;
+};
+
 struct StepSolver::Implementation {
-    Implementation(const Registry& known, SolverConfig chosen) : registry(known), config(std::move(chosen)) {
-        settings = config.settings();
-    }
+    Implementation(const Registry& known, SolverConfig chosen)
+        : registry(known), config(std::move(chosen)), settings(config.settings()), preferred(preferences(known)) {}
 
     Solver& named(const std::string& name, std::size_t instance) {
-        SolverConfig one = config;
-        one.name = name;
-        std::vector<Solver> more;
-        for (std::size_t k = solvers.contains(name) ? solvers[name].size() : 0; k <= instance; ++k)
-            more.push_back(make_solver(registry, one));
         auto& instances = solvers[name];
-        std::move(more.begin(), more.end(), std::back_inserter(instances));
+        while (instances.size() <= instance) {
+            SolverConfig one = config;
+            one.name = name;
+            instances.push_back(make_solver(registry, one));
+        }
         return instances[instance];
     }
 
     [[nodiscard]] std::string choice(std::uint64_t needs) const {
         if (!config.name.empty()) return config.name;
+        const auto can = [&](const std::string& name) {
+            return std::any_of(registry.plugins().begin(), registry.plugins().end(), [&](const PluginInfo& plugin) {
+                return plugin.name == name && plugin.missing(needs) == 0;
+            });
+        };
+        const auto found = std::find_if(preferred.begin(), preferred.end(), can);
+        if (found != preferred.end()) return *found;
         const auto capable = registry.capable(needs);
-        for (const auto& name : preferences(registry))
-            if (std::find(capable.begin(), capable.end(), name) != capable.end()) return name;
         return capable.empty() ? std::string() : capable.front();
     }
 
@@ -70,7 +81,7 @@ struct StepSolver::Implementation {
             fmt::format("no installed solver can take the step's problem: {}", problem.describe(problem.needs())));
     }
 
-    bool solve_part(Problem problem, Solution& solution, bool warm_start, std::size_t number);
+    bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -78,7 +89,11 @@ struct StepSolver::Implementation {
     const Registry& registry;
     SolverConfig config;
     SolveSettings settings;
+    std::vector<std::string> preferred;
     std::map<std::string, std::vector<Solver>> solvers;  // instances by the number of the part
+    Islands islands;
+    std::deque<KeptPart> parts;  // by the number of the part
+    Solution start;
     SolverEffort effort;
 };
 
@@ -86,40 +101,61 @@ StepSolver::StepSolver(const Registry& registry, SolverConfig config)
     : implementation_(std::make_unique<Implementation>(registry, std::move(config))) {}
 StepSolver::~StepSolver() = default;
 
-// The parts of a problem are solved one by one, each kind of part by a solver instance of its own: the k-th part of a
-// step is, as long as bodies keep their neighbours, the k-th of the next, and its analysis can be used again.
-bool StepSolver::solve(Problem problem, Solution& solution, bool warm_start) {
+// The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as
+// long as bodies keep their neighbours, the k-th of the next, and what was prepared and analysed for it is used again.
+bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
     auto& self = *implementation_;
-    if (self.config.law) problem.law = *self.config.law;
-    if (on_problem) on_problem(problem);
+    if (on_problem && self.config.law && *self.config.law != problem.law) {
+        Problem seen = problem;
+        seen.law = *self.config.law;
+        on_problem(seen);
+    } else if (on_problem) {
+        on_problem(problem);
+    }
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
-    if (m == 0 || problem.E.rows > 0) return self.solve_part(std::move(problem), solution, warm_start, 0);
+    if (m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
 
-    const Islands islands(problem);
-    if (islands.list().size() == 1 && islands.list()[0].cones.size() == problem.cones.size())
-        return self.solve_part(std::move(problem), solution, warm_start, 0);
-    if (!warm_start) solution = {std::vector<double>(n, 0.0), std::vector<double>(m, 0.0)};
-    const Solution start = solution;
+    self.islands.find(problem);
+    const auto list = self.islands.list();
+    if (list.size() == 1 && list[0].cones.size() == problem.cones.size())
+        return self.solve_part(problem, solution, warm_start, 0);
+    if (!warm_start) {
+        solution.x.assign(n, 0.0);
+        solution.lambda.assign(m, 0.0);
+    }
+    self.start = solution;
     std::fill(solution.lambda.begin(), solution.lambda.end(), 0.0);  // of rows that belong to no part
     bool solved = true;
-    std::size_t number = 0;
-    for (const Island& island : islands.list()) {
-        Solution part = islands.take(island, start);
-        solved = self.solve_part(islands.part(island), part, warm_start, number++) && solved;
-        islands.put(island, part, solution);
+    for (std::size_t number = 0; number < list.size(); ++number) {
+        if (number == self.parts.size()) self.parts.emplace_back();
+        KeptPart& part = self.parts[number];
+        self.islands.take(list[number], self.start, part.solution);
+        self.islands.part(list[number], part.data);
+        solved = self.solve_part(part.data, part.solution, warm_start, number) && solved;
+        self.islands.put(list[number], part.solution, solution);
     }
     return solved;
 }
 
-bool StepSolver::Implementation::solve_part(Problem problem, Solution& solution, bool warm_start, std::size_t number) {
-    const PreparedProblem prepared(std::move(problem));
-    if (prepared.problem().m() == 0) {
+bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& solution, bool warm_start,
+                                            std::size_t number) {
+    if (number == parts.size()) parts.emplace_back();
+    auto& kept = parts[number].prepared;
+    const Law law = config.law.value_or(problem.law);
+    if (!kept) {
+        kept.emplace(problem);
+    } else {
+        kept->renew(problem);
+    }
+    if (law != problem.law) kept->set_law(law);
+    const PreparedProblem& prepared = *kept;
+    if (problem.m() == 0) {
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
                               structure == Structure::Definite || structure == Structure::Reduced;
-        solution.x = definite ? ErrorMeter(prepared).velocity_of({}) : solve_by_lu(prepared);
+        solution.x = definite ? prepared.meter().velocity_of({}) : solve_by_lu(prepared);
         solution.lambda.clear();
         return true;
     }
@@ -139,15 +175,21 @@ bool StepSolver::Implementation::solve_part(Problem problem, Solution& solution,
     return false;
 }
 
-std::vector<StepSolver::Part> StepSolver::parts(Problem problem) const {
-    if (implementation_->config.law) problem.law = *implementation_->config.law;
-    const auto part_of = [](const PreparedProblem& prepared) {
-        return Part{prepared.problem().n(), prepared.problem().m(), prepared.structure(), prepared.needs()};
+std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
+    const auto part_of = [this](const Problem& part) {
+        PreparedProblem prepared(part);
+        if (const auto law = implementation_->config.law) prepared.set_law(*law);
+        return Part{part.n(), part.m(), prepared.structure(), prepared.needs()};
     };
-    if (problem.m() == 0 || problem.E.rows > 0) return {part_of(PreparedProblem(std::move(problem)))};
-    const Islands islands(problem);
+    if (problem.m() == 0 || problem.E.rows > 0) return {part_of(problem)};
+    Islands islands;
+    islands.find(problem);
     std::vector<Part> result;
-    for (const Island& island : islands.list()) result.push_back(part_of(PreparedProblem(islands.part(island))));
+    Problem part;
+    for (const Island& island : islands.list()) {
+        islands.part(island, part);
+        result.push_back(part_of(part));
+    }
     return result;
 }
 std::string StepSolver::choice(std::uint64_t needs) const {

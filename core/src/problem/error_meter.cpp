@@ -4,6 +4,7 @@
 #include <Eigen/SparseLU>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "delassus/error.hpp"
 #include "delassus/errors.hpp"
@@ -24,8 +25,9 @@ struct Mobility {
     Vector r;
 };
 
-Mobility of_definite(const sdk::ProblemView& problem, const sdk::DelassusOperator& N) {
-    return {N.diagonal(), N.free_velocity(problem)};
+void take_definite(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, Mobility& mobility) {
+    mobility.diagonal = N.diagonal();
+    N.free_velocity(problem, mobility.r);
 }
 
 void add_compliance(const sdk::ProblemView& problem, Vector& diagonal) {
@@ -81,39 +83,45 @@ double ratio(double numerator, double denominator) {
 struct ErrorMeter::Implementation {
     explicit Implementation(const PreparedProblem::Implementation& prepared_problem)
         : prepared(prepared_problem), view(prepared.raw) {
-        Mobility mobility;
+        take_mobility();
+    }
+
+    void take_mobility() {
         if (prepared.operator_of_definite) {
-            mobility = of_definite(view, *prepared.operator_of_definite);
+            take_definite(view, *prepared.operator_of_definite, mobility);
         } else if (prepared.structure == Structure::Unsymmetric) {
             mobility = of_unsymmetric(view);
         } else {
             mobility = of_singular(view);
         }
         r_norm = mobility.r.norm();
-        residual = sdk::NaturalResidual(view, mobility.diagonal, mobility.r);
+        residual.assign(view, mobility.diagonal, mobility.r);
     }
 
-    [[nodiscard]] Vector constraint_velocity(const VectorView& x, const VectorView& lambda) const {
-        Vector u = view.b;
-        if (view.n > 0) u.noalias() += view.D * x;
-        if (view.E.nonZeros() > 0) u.noalias() += view.E * lambda;
-        return u;
+    /// u = D x + E λ + b, in the scratch vector.
+    const Vector& constraint_velocity(const VectorView& x, const VectorView& lambda) const {
+        plain_u = view.b;
+        if (view.n > 0) plain_u.noalias() += view.D * x;
+        if (view.E.nonZeros() > 0) plain_u.noalias() += view.E * lambda;
+        return plain_u;
     }
 
-    /// u with the De Saxcé term where the law asks for it.
-    [[nodiscard]] Vector judged_velocity(Vector u) const {
-        if (!view.coulomb) return u;
+    /// plain_u with the De Saxcé term where the law asks for it.
+    const Vector& judged_velocity() const {
+        judged_u = plain_u;
+        if (!view.coulomb) return judged_u;
         for (const auto& cone : view.cones)
             if (cone.kind == DELASSUS_CONE_FRICTION)
-                u[cone.first_row] += sdk::FrictionCone::de_saxce(cone, u.data() + cone.first_row);
-        return u;
+                judged_u[cone.first_row] += sdk::FrictionCone::de_saxce(cone, plain_u.data() + cone.first_row);
+        return judged_u;
     }
 
     /// Errors::rounding. A product of k terms is off by at most k ε times the product of the absolute values (Higham,
     /// Accuracy and Stability of Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts
     /// for one.
     [[nodiscard]] double rounding(const VectorView& x, const VectorView& lambda) const {
-        Vector magnitude = view.b.cwiseAbs();
+        Vector& magnitude = work;
+        magnitude = view.b.cwiseAbs();
         for (Eigen::Index row = 0; row < view.m; ++row) {
             for (sdk::SparseRowsView::InnerIterator entry(view.D, row); entry; ++entry)
                 magnitude[row] += std::abs(entry.value() * x[entry.col()]);
@@ -130,13 +138,22 @@ struct ErrorMeter::Implementation {
 
     const PreparedProblem::Implementation& prepared;
     sdk::ProblemView view;
+    Mobility mobility;
     sdk::NaturalResidual residual;
     double r_norm = 0.0;
+    // Kept so that measuring again allocates nothing.
+    mutable Vector plain_u, judged_u, work, momentum, impulse;
 };
 
 ErrorMeter::ErrorMeter(const PreparedProblem& problem)
     : implementation_(std::make_unique<Implementation>(*problem.implementation_)) {}
 ErrorMeter::~ErrorMeter() = default;
+
+void ErrorMeter::renew() {
+    auto& self = *implementation_;
+    std::construct_at(&self.view, self.prepared.raw);  // maps cannot be assigned
+    self.take_mobility();
+}
 
 Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const double> lambda_values) const {
     const auto& self = *implementation_;
@@ -147,21 +164,22 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
                                      x_values.size(), lambda_values.size(), problem.n, problem.m));
     const VectorView x(x_values.data(), problem.n);
     const VectorView lambda(lambda_values.data(), problem.m);
-    const Vector plain_u = self.constraint_velocity(x, lambda);
-    const Vector u = self.judged_velocity(plain_u);
+    const Vector& plain_u = self.constraint_velocity(x, lambda);
+    const Vector& u = self.judged_velocity();
 
     Errors errors;
     errors.natural = self.residual.natural(lambda, plain_u);
     errors.rounding = self.rounding(x, lambda);
     if (problem.n > 0) {
-        const Vector momentum = problem.H * x;
-        const Vector impulse = problem.D.transpose() * lambda;
+        Vector &momentum = self.momentum, &impulse = self.impulse;
+        momentum.noalias() = problem.H * x;
+        impulse.noalias() = problem.D.transpose() * lambda;
         errors.balance = ratio((momentum - impulse - problem.a).norm(),
                                std::max({momentum.norm(), impulse.norm(), problem.a.norm()}));
     }
 
     double cone_sum = 0.0, dual_sum = 0.0, gap_sum = 0.0, siconos_sum = 0.0;
-    Vector work(problem.m);
+    Vector& work = self.work;
     for (std::size_t c = 0; c < problem.cones.size(); ++c) {
         const auto& cone = problem.cones[c];
         const auto& operations = sdk::operations_of(cone);

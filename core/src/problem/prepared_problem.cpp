@@ -40,7 +40,9 @@ std::uint64_t need_of(Structure structure) {
 
 }  // namespace
 
-PreparedProblem::PreparedProblem(Problem problem) : implementation_(std::make_unique<Implementation>()) {
+PreparedProblem::PreparedProblem() : implementation_(std::make_unique<Implementation>()) {}
+
+PreparedProblem::PreparedProblem(Problem problem) : PreparedProblem() {
     auto& self = *implementation_;
     self.problem = std::move(problem);
     const auto n = self.problem.n();
@@ -84,21 +86,113 @@ void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<dou
     self.problem.b = std::move(b);
     self.raw.a = self.problem.a.data();
     self.raw.b = self.problem.b.data();
+    if (self.meter) self.meter->renew();
+}
+
+void PreparedProblem::set_law(Law law) {
+    auto& self = *implementation_;
+    self.problem.law = law;
+    self.raw.law = static_cast<std::int32_t>(law);
+    self.set_law_needs();
+    if (self.meter) self.meter->renew();
+}
+
+PreparedProblem PreparedProblem::with_law(Law law) const {
+    const auto& from = *implementation_;
+    PreparedProblem copy;
+    auto& to = *copy.implementation_;
+    to.problem = from.problem;
+    to.problem.law = law;
+    to.structure = from.structure;
+    to.operator_of_definite = from.operator_of_definite;
+    to.lay_out();
+    to.raw.needs = from.raw.needs;
+    to.set_law_needs();
+    to.raw.pattern_id = from.raw.pattern_id;
+    to.raw.values_id = from.raw.values_id;
+    return copy;
+}
+
+const ErrorMeter& PreparedProblem::meter() const {
+    auto& meter = implementation_->meter;
+    if (!meter) meter = std::make_unique<ErrorMeter>(*this);
+    return *meter;
+}
+
+void PreparedProblem::renew(const Problem& other) {
+    auto& self = *implementation_;
+    if (!self.same_places(other)) {
+        *this = PreparedProblem(other);
+        return;
+    }
+    validate(other);
+    const bool same_H = self.problem.H.value == other.H.value;
+    const bool same_rows = same_H && self.problem.D.value == other.D.value && self.problem.E.value == other.E.value;
+    self.copy_values(other);
+    if (!same_rows) {
+        const sdk::ProblemView view(self.raw);
+        if (same_H && self.operator_of_definite.use_count() == 1) {
+            self.operator_of_definite->refresh(view);
+        } else {
+            self.detect_structure();
+        }
+        self.derive_needs();
+        self.identify();
+    } else {
+        self.set_law_needs();
+    }
+    if (self.meter) self.meter->renew();
+}
+
+bool PreparedProblem::Implementation::same_places(const Problem& other) const {
+    const auto same = [](const SparseMatrix& here, const SparseMatrix& there) {
+        if (there.rows == 0 && there.columns == 0) return here.value.empty();  // absent, here a zero matrix
+        return here.rows == there.rows && here.columns == there.columns && here.row_start == there.row_start &&
+               here.column == there.column;
+    };
+    return raw.n == other.n() && raw.m == other.m() && same(problem.H, other.H) && same(problem.D, other.D) &&
+           same(problem.E, other.E) &&
+           std::equal(problem.cones.begin(), problem.cones.end(), other.cones.begin(), other.cones.end(),
+                      [](const Cone& here, const Cone& there) {
+                          return here.kind == there.kind && here.rows == there.rows &&
+                                 here.lo.size() == there.lo.size() && here.hi.size() == there.hi.size();
+                      });
+}
+
+void PreparedProblem::Implementation::copy_values(const Problem& other) {
+    problem.H.value = other.H.value;
+    problem.D.value = other.D.value;
+    problem.E.value = other.E.value;
+    problem.a = other.a;
+    problem.b = other.b;
+    problem.cones = other.cones;
+    problem.law = other.law;
+    problem.name = other.name;
+    problem.source = other.source;
+    problem.notes = other.notes;
+    point_to_arrays();
 }
 
 void PreparedProblem::Implementation::lay_out() {
     blocks = connected_components(problem.H);
-    std::int32_t first_row = 0;
-    for (const Cone& cone : problem.cones) {
-        const bool box = cone.kind == ConeKind::Box;
-        cones.push_back({static_cast<std::int32_t>(cone.kind), first_row, cone.rows, 0, cone.mu,
-                         box ? cone.lo.data() : nullptr, box ? cone.hi.data() : nullptr});
-        first_row += cone.rows;
-    }
     raw.struct_size = sizeof raw;
-    raw.law = static_cast<std::int32_t>(problem.law);
     raw.n = problem.n();
     raw.m = problem.m();
+    cones.resize(problem.cones.size());
+    point_to_arrays();
+}
+
+void PreparedProblem::Implementation::point_to_arrays() {
+    std::int32_t first_row = 0;
+    for (std::size_t c = 0; c < cones.size(); ++c) {
+        const Cone& cone = problem.cones[c];
+        const bool box = cone.kind == ConeKind::Box;
+        cones[c] = {
+            static_cast<std::int32_t>(cone.kind), first_row, cone.rows, 0, cone.mu, box ? cone.lo.data() : nullptr,
+            box ? cone.hi.data() : nullptr};
+        first_row += cone.rows;
+    }
+    raw.law = static_cast<std::int32_t>(problem.law);
     raw.H = raw_of(problem.H);
     raw.D = raw_of(problem.D);
     raw.E = raw_of(problem.E);
@@ -113,13 +207,19 @@ void PreparedProblem::Implementation::lay_out() {
 
 // A candidate by pattern counts as definite once its factorisation succeeds with pivots that are not rounding.
 void PreparedProblem::Implementation::detect_structure() {
+    const Structure before = structure;
     structure = structure_by_pattern(problem.H, blocks);
+    std::shared_ptr<sdk::DelassusOperator> candidate = std::move(operator_of_definite);
+    operator_of_definite.reset();
     if (structure == Structure::Unsymmetric) return;
     raw.needs = need_of(structure);
     const sdk::ProblemView view(raw);
-    auto candidate = std::make_unique<sdk::DelassusOperator>();
     try {
-        candidate->analyze(view);
+        // One that was there has analysed the same pattern.
+        if (!candidate || before != structure || candidate.use_count() > 1) {
+            candidate = std::make_shared<sdk::DelassusOperator>();
+            candidate->analyze(view);
+        }
         candidate->factorize(view);
         if (candidate->inverse().smallest_relative_pivot() > 1e-14) {
             operator_of_definite = std::move(candidate);
@@ -133,10 +233,15 @@ void PreparedProblem::Implementation::detect_structure() {
 void PreparedProblem::Implementation::derive_needs() {
     raw.needs = need_of(structure);
     for (const auto& cone : cones) raw.needs |= sdk::operations_of(cone).capability;
+    set_law_needs();
+    if (raw.n > 0 && problem.E.entries() > 0) raw.needs |= DELASSUS_CAN_COMPLIANCE;
+    if (raw.n > 0 && raw.m > 0 && redundancy(problem.D, problem.E)) raw.needs |= DELASSUS_CAN_REDUNDANT;
+}
+
+void PreparedProblem::Implementation::set_law_needs() {
+    raw.needs &= ~static_cast<std::uint64_t>(DELASSUS_CAN_COULOMB | DELASSUS_CAN_ASSOCIATED);
     if (raw.needs & DELASSUS_CAN_FRICTION)
         raw.needs |= problem.law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED;
-    if (raw.n > 0 && problem.E.entries() > 0) raw.needs |= DELASSUS_CAN_COMPLIANCE;
-    if (raw.n > 0 && raw.m > 0 && has_redundant_rows(problem.D, problem.E)) raw.needs |= DELASSUS_CAN_REDUNDANT;
 }
 
 void PreparedProblem::Implementation::identify() {

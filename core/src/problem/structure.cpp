@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
-#include <unordered_map>
 
 #include "delassus/sdk/problem_view.hpp"
 #include "problem/symmetry.hpp"
@@ -95,16 +94,34 @@ Structure structure_of_singular(const SparseMatrix& H, const BlockPartition& blo
     return factor.info() == Eigen::Success ? Structure::Semidefinite : Structure::Indefinite;
 }
 
-bool has_redundant_rows(const SparseMatrix& D, const SparseMatrix& E) {
-    std::vector<char> touched(static_cast<std::size_t>(D.columns), 0);
-    std::unordered_multimap<std::uint64_t, std::size_t> seen;
+bool RedundancyCheck::operator()(const SparseMatrix& D, const SparseMatrix& E) {
+    touched_.assign(static_cast<std::size_t>(D.columns), 0);
+    directions_.clear();
     std::int64_t rigid_rows = 0;
-    const auto parallel = [&](std::size_t p, std::size_t q) {
-        const auto p_begin = static_cast<std::size_t>(D.row_start[p]);
-        const auto q_begin = static_cast<std::size_t>(D.row_start[q]);
-        const auto length = static_cast<std::size_t>(D.row_start[p + 1]) - p_begin;
-        if (length != static_cast<std::size_t>(D.row_start[q + 1]) - q_begin) return false;
-        for (std::size_t k = 0; k < length; ++k) {
+    for (std::int32_t row = 0; row < D.rows; ++row) {
+        if (E.rows > 0 && E.row_start[row] != E.row_start[row + 1]) continue;
+        ++rigid_rows;
+        const auto begin = D.row_start[row];
+        const auto end = D.row_start[row + 1];
+        if (begin == end) return true;
+        if (D.value[begin] == 0.0) continue;
+        Hash hash;
+        for (auto k = begin; k < end; ++k) touched_[static_cast<std::size_t>(D.column[k])] = 1;
+        hash.add(D.column.data() + begin, static_cast<std::size_t>(end - begin) * sizeof(std::int32_t));
+        // The ratio to the row's first entry, rounded so that parallel rows meet in one bucket as a rule.
+        for (auto k = begin; k < end; ++k) {
+            const auto ratio = static_cast<float>(D.value[k] / D.value[begin]);
+            hash.add(&ratio, sizeof ratio);
+        }
+        directions_.push_back({hash.value(), row});
+    }
+    if (rigid_rows > std::count(touched_.begin(), touched_.end(), 1)) return true;
+
+    const auto parallel = [&](std::int32_t p, std::int32_t q) {
+        const auto p_begin = D.row_start[p], q_begin = D.row_start[q];
+        const auto length = D.row_start[p + 1] - p_begin;
+        if (length != D.row_start[q + 1] - q_begin) return false;
+        for (std::int32_t k = 0; k < length; ++k) {
             if (D.column[p_begin + k] != D.column[q_begin + k]) return false;
             const double left = D.value[p_begin + k] * D.value[q_begin];
             const double right = D.value[q_begin + k] * D.value[p_begin];
@@ -112,28 +129,13 @@ bool has_redundant_rows(const SparseMatrix& D, const SparseMatrix& E) {
         }
         return true;
     };
-    for (std::size_t row = 0; row < static_cast<std::size_t>(D.rows); ++row) {
-        if (E.rows > 0 && E.row_start[row] != E.row_start[row + 1]) continue;
-        ++rigid_rows;
-        const auto begin = D.row_start[row];
-        const auto end = D.row_start[row + 1];
-        if (begin == end) return true;
-        if (D.value[static_cast<std::size_t>(begin)] == 0.0) continue;
-        Hash hash;
-        for (auto k = begin; k < end; ++k) touched[static_cast<std::size_t>(D.column[static_cast<std::size_t>(k)])] = 1;
-        hash.add(D.column.data() + begin, static_cast<std::size_t>(end - begin) * sizeof(std::int32_t));
-        // The ratio to the row's first entry, rounded so that parallel rows meet in one bucket as a rule.
-        for (auto k = begin; k < end; ++k) {
-            const auto ratio =
-                static_cast<float>(D.value[static_cast<std::size_t>(k)] / D.value[static_cast<std::size_t>(begin)]);
-            hash.add(&ratio, sizeof ratio);
-        }
-        const auto [first, last] = seen.equal_range(hash.value());
-        for (auto candidate = first; candidate != last; ++candidate)
-            if (parallel(row, candidate->second)) return true;
-        seen.emplace(hash.value(), row);
-    }
-    return rigid_rows > std::count(touched.begin(), touched.end(), 1);
+    std::sort(directions_.begin(), directions_.end(), [](const Direction& first, const Direction& second) {
+        return first.hash != second.hash ? first.hash < second.hash : first.row < second.row;
+    });
+    for (std::size_t i = 0; i < directions_.size(); ++i)
+        for (std::size_t j = i + 1; j < directions_.size() && directions_[j].hash == directions_[i].hash; ++j)
+            if (parallel(directions_[i].row, directions_[j].row)) return true;
+    return false;
 }
 
 void Hash::add(const void* data, std::size_t bytes) {

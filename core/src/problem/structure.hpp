@@ -31,8 +31,20 @@ struct BlockPartition {
 [[nodiscard]] Structure structure_of_singular(const SparseMatrix& H, const BlockPartition& blocks);
 
 /// Whether rows of D without compliance are certain to depend on one another: more of them than columns that they
-/// touch, one of them empty, or two of them parallel. A cheap certificate, not a rank: false means "not known".
-[[nodiscard]] bool has_redundant_rows(const SparseMatrix& D, const SparseMatrix& E);
+/// touch, one of them empty, or two of them parallel. A cheap certificate, not a rank: false means "not known". Keeps
+/// its scratch arrays from call to call.
+class RedundancyCheck {
+public:
+    [[nodiscard]] bool operator()(const SparseMatrix& D, const SparseMatrix& E);
+
+private:
+    struct Direction {
+        std::uint64_t hash;  ///< equal for parallel rows, as a rule
+        std::int32_t row;
+    };
+    std::vector<char> touched_;
+    std::vector<Direction> directions_;
+};
 
 /// Hash of numbers, for the identities of patterns and values.
 class Hash {

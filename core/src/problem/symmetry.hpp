@@ -41,18 +41,30 @@ void visit_with_transpose(const SparseMatrix& matrix, Visit visit) {
     }
 }
 
+/// The value at a place; 0 where a well-formed matrix has no entry.
+inline double entry_of(const SparseMatrix& matrix, std::int32_t row, std::int32_t column) {
+    const auto begin = matrix.column.begin() + matrix.row_start[row];
+    const auto end = matrix.column.begin() + matrix.row_start[row + 1];
+    const auto found = std::lower_bound(begin, end, column);
+    return found != end && *found == column ? matrix.value[static_cast<std::size_t>(found - matrix.column.begin())]
+                                            : 0.0;
+}
+
+/// Allocates nothing.
 inline Asymmetry asymmetry_of(const SparseMatrix& matrix) {
     double largest = 0.0;
     for (const double v : matrix.value) largest = std::max(largest, std::abs(v));
     Asymmetry result;
     if (largest == 0.0) return result;
-    visit_with_transpose(matrix, [&](std::int32_t row, std::int32_t column, double value, double mirrored) {
-        // Divided first, since the difference of two large entries may overflow.
-        const double difference = std::abs(value / largest - mirrored / largest);
-        if (difference > result.relative || (result.row < 0 && value != mirrored)) {
-            result = {std::max(difference, result.relative), row, column};
+    for (std::int32_t row = 0; row < matrix.rows; ++row) {
+        for (std::int32_t k = matrix.row_start[row]; k < matrix.row_start[row + 1]; ++k) {
+            const double value = matrix.value[k], mirrored = entry_of(matrix, matrix.column[k], row);
+            // Divided first, since the difference of two large entries may overflow.
+            const double difference = std::abs(value / largest - mirrored / largest);
+            if (difference > result.relative || (result.row < 0 && value != mirrored))
+                result = {std::max(difference, result.relative), row, matrix.column[k]};
         }
-    });
+    }
     return result;
 }
 

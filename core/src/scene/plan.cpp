@@ -251,8 +251,7 @@ private:
             const bool chosen = name == system_.solver.name;
             keep(fmt::format("solver {}", name),
                  chosen ? "the scene names it" : "the first of the preference list that can take the problems");
-            const bool file = name.find('/') != std::string::npos || name.ends_with(".so");
-            plan_.libraries.push_back(file ? name : registry_.find(name).library.filename().string());
+            plan_.libraries.push_back(is_library_path(name) ? name : registry_.find(name).library.filename().string());
         }
     }
 

@@ -27,10 +27,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
     try {
         // Checked here without loading the plugin, which may never be needed.
-        const auto& name = system.solver.name;
-        const bool file = name.find('/') != std::string::npos || name.ends_with(".so");
-        if (!name.empty() && !file)
-            static_cast<void>(resolve_options(name, registry.find(name).options, system.solver.options));
+        if (!system.solver.name.empty()) check_solver(registry, system.solver);
         timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
     } catch (const InputError& error) {
         throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));

@@ -34,6 +34,21 @@ std::string to_json(const SolveReport& report) {
                    {"dual", json_number(report.error.dual)},
                    {"gap", json_number(report.error.gap)},
                    {"rounding", json_number(report.error.rounding)}}}};
+    if (!report.stages.empty()) {
+        Json stages = Json::array();
+        for (const auto& stage : report.stages)
+            stages.push_back({{"solver", stage.solver},
+                              {"options", stage.options},
+                              {"law", name_of(stage.law)},
+                              {"reason", stage.reason},
+                              {"tolerance", stage.tolerance},
+                              {"status", name_of(stage.status)},
+                              {"message", stage.message},
+                              {"iterations", stage.iterations},
+                              {"seconds", stage.seconds},
+                              {"natural", json_number(stage.natural)}});
+        json["stages"] = std::move(stages);
+    }
     if (!report.curve.empty()) {
         Json curve = Json::array();
         for (const auto& sample : report.curve) curve.push_back({sample.iteration, sample.seconds, sample.natural});

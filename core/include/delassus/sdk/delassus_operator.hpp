@@ -20,6 +20,9 @@ public:
         compute_blocks(problem);
     }
 
+    /// As factorize, where the values of H are those of the last factorisation: only D and E are new.
+    void refresh(const ProblemView& problem) { compute_blocks(problem); }
+
     /// result ← N λ; both m.
     void apply(const ProblemView& problem, const Vector& lambda, Vector& result) const {
         if (problem.n > 0) {
@@ -34,13 +37,18 @@ public:
 
     /// r = D H⁻¹ a + b: the constraint velocities without reactions; m.
     [[nodiscard]] Vector free_velocity(const ProblemView& problem) const {
-        Vector r = problem.b;
+        Vector r;
+        free_velocity(problem, r);
+        return r;
+    }
+    /// The same into r, which is resized.
+    void free_velocity(const ProblemView& problem, Vector& r) const {
+        r = problem.b;
         if (problem.n > 0) {
             work_ = problem.a;
             inverse_.apply(work_);
             r.noalias() += problem.D * work_;
         }
-        return r;
     }
 
     /// x = H⁻¹ (a + Dᵀ λ); n.
@@ -94,13 +102,12 @@ private:
 
     // D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
     void add_inertia(const ProblemView& problem) {
-        std::vector<std::vector<std::pair<std::int32_t, double>>> rows;
+        rows_.resize(largest_block);
         std::size_t c = 0;
         inverse_.for_each_half_solved_row(
             problem.D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
                 while (row >= problem.cones[c].first_row + problem.cones[c].rows) ++c;
                 const delassus_cone& cone = problem.cones[c];
-                if (row == cone.first_row) rows.clear();
                 double square = 0.0;
                 for (const auto i : reach) square += work[i] * work[i];
                 diagonal_[row] += square;
@@ -111,12 +118,12 @@ private:
                 block[local * width + local] += square;
                 for (std::size_t other = 0; other < local; ++other) {
                     double product = 0.0;
-                    for (const auto& [i, value] : rows[other]) product += value * work[i];
+                    for (const auto& [i, value] : rows_[other]) product += value * work[i];
                     block[local * width + other] += product;
                     block[other * width + local] += product;
                 }
-                auto& kept = rows.emplace_back();
-                kept.reserve(reach.size());
+                auto& kept = rows_[local];
+                kept.clear();
                 for (const auto i : reach) kept.emplace_back(i, work[i]);
             });
     }
@@ -138,6 +145,7 @@ private:
     }
 
     HInverse inverse_;
+    std::vector<std::vector<std::pair<std::int32_t, double>>> rows_;  // of one block at a time
     Vector diagonal_;
     std::vector<double> blocks_;
     std::vector<std::ptrdiff_t> block_offset_;

@@ -111,13 +111,12 @@ public:
     /// indices in reach.
     template <class Visitor>
     void for_each_half_solved_row(const SparseRowsView& D, Visitor&& visit) const {
-        Vector work = Vector::Zero(n_);
-        std::vector<std::int32_t> reach;
-        std::vector<std::int32_t> mark(static_cast<std::size_t>(n_), -1);
+        row_work_.setZero(n_);
+        mark_.assign(static_cast<std::size_t>(n_), -1);
         for (Eigen::Index row = 0; row < D.rows(); ++row) {
-            half_solve_row(D, row, work, reach, mark);
-            visit(row, reach, work);
-            for (const auto i : reach) work[i] = 0.0;
+            half_solve_row(D, row, row_work_, reach_, mark_);
+            visit(row, reach_, row_work_);
+            for (const auto i : reach_) row_work_[i] = 0.0;
         }
     }
 
@@ -134,6 +133,9 @@ public:
     [[nodiscard]] std::int64_t factorizations() const { return factorizations_; }
 
 private:
+    /// Of the diagonal blocks that the host shows (DELASSUS_CAN_H_BLOCKS).
+    static constexpr int largest_block = 16;
+    using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, largest_block, largest_block>;
     using Factor = Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>>;
 
     // H is symmetric, so its compressed rows are its compressed columns.
@@ -161,24 +163,26 @@ private:
         }
         inverse_.resize(static_cast<Eigen::Index>(offset_.back()));
         root_.resize(static_cast<Eigen::Index>(offset_.back()));
-        Eigen::MatrixXd block;
+        Block block, inverse_of_root;
         for (std::size_t k = 0; k < block_count(); ++k) {
             const Eigen::Index size = start_[k + 1] - start_[k];
+            if (size > largest_block) throw std::invalid_argument("a block of H is larger than the host allows");
             block.setZero(size, size);
             for (Eigen::Index i = 0; i < size; ++i) {
                 for (SparseRowsView::InnerIterator entry(problem.H, index_[static_cast<std::size_t>(start_[k] + i)]);
                      entry; ++entry)
                     block(i, position_[static_cast<std::size_t>(entry.col())]) = entry.value();
             }
-            const Eigen::LLT<Eigen::MatrixXd> factor(block);
+            const Eigen::LLT<Block> factor(block);
             if (factor.info() != Eigen::Success)
                 throw NumericalFailure("block " + std::to_string(k) + " of H is not positive definite");
             for (Eigen::Index i = 0; i < size; ++i) record_pivot(factor.matrixLLT()(i, i), block(i, i));
             const auto offset = static_cast<Eigen::Index>(offset_[k]);
-            const Eigen::MatrixXd inverse_of_root = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
+            inverse_of_root.setIdentity(size, size);
+            factor.matrixL().solveInPlace(inverse_of_root);
             Eigen::Map<Eigen::MatrixXd>(root_.data() + offset, size, size) = inverse_of_root;
             Eigen::Map<Eigen::MatrixXd>(inverse_.data() + offset, size, size).noalias() =
-                inverse_of_root.transpose() * inverse_of_root;
+                inverse_of_root.transpose().lazyProduct(inverse_of_root);
         }
     }
 
@@ -198,7 +202,7 @@ private:
     }
 
     void apply_blocks(Vector& v) const {
-        Vector gathered;
+        Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, largest_block, 1> gathered;
         for (std::size_t k = 0; k < block_count(); ++k) {
             const Eigen::Index size = start_[k + 1] - start_[k];
             const std::int32_t* index = index_.data() + start_[k];
@@ -282,6 +286,8 @@ private:
     std::unique_ptr<Factor> sparse_;
     double smallest_relative_pivot_ = 1.0;
     std::int64_t analyses_ = 0, factorizations_ = 0;
+    mutable Vector row_work_;  // of for_each_half_solved_row
+    mutable std::vector<std::int32_t> reach_, mark_;
 };
 
 }  // namespace delassus::sdk

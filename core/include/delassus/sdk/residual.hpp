@@ -20,21 +20,23 @@ namespace delassus::sdk {
 
 /// s_c for every block, from the diagonal of N. A block without mobility (zero trace) takes the mean trace of the
 /// others.
-inline std::vector<double> block_scaling(std::span<const delassus_cone> cones, const Vector& diagonal) {
-    std::vector<double> mean_diagonal(cones.size());
+inline void block_scaling(std::span<const delassus_cone> cones, const Vector& diagonal, std::vector<double>& scaling) {
+    scaling.resize(cones.size());
     double sum = 0.0;
     std::size_t positive = 0;
     for (std::size_t c = 0; c < cones.size(); ++c) {
-        mean_diagonal[c] = diagonal.segment(cones[c].first_row, cones[c].rows).sum() / cones[c].rows;
-        if (mean_diagonal[c] > 0.0) {
-            sum += mean_diagonal[c];
+        scaling[c] = diagonal.segment(cones[c].first_row, cones[c].rows).sum() / cones[c].rows;
+        if (scaling[c] > 0.0) {
+            sum += scaling[c];
             ++positive;
         }
     }
     const double fallback = positive > 0 ? sum / static_cast<double>(positive) : 1.0;
-    std::vector<double> scaling(cones.size());
-    for (std::size_t c = 0; c < cones.size(); ++c)
-        scaling[c] = 1.0 / std::sqrt(mean_diagonal[c] > 0.0 ? mean_diagonal[c] : fallback);
+    for (double& s : scaling) s = 1.0 / std::sqrt(s > 0.0 ? s : fallback);
+}
+inline std::vector<double> block_scaling(std::span<const delassus_cone> cones, const Vector& diagonal) {
+    std::vector<double> scaling;
+    block_scaling(cones, diagonal, scaling);
     return scaling;
 }
 
@@ -44,10 +46,15 @@ public:
     NaturalResidual() = default;
 
     /// diagonal: of N, m. r: m.
-    NaturalResidual(const ProblemView& problem, const Vector& diagonal, const Vector& r)
-        : cones_(problem.cones.begin(), problem.cones.end()),
-          coulomb_(problem.coulomb),
-          scaling_(block_scaling(problem.cones, diagonal)) {
+    NaturalResidual(const ProblemView& problem, const Vector& diagonal, const Vector& r) {
+        assign(problem, diagonal, r);
+    }
+
+    /// In place of what was there; allocates nothing if that was of the same sizes.
+    void assign(const ProblemView& problem, const Vector& diagonal, const Vector& r) {
+        cones_.assign(problem.cones.begin(), problem.cones.end());
+        coulomb_ = problem.coulomb;
+        block_scaling(problem.cones, diagonal, scaling_);
         double sum = 0.0;
         for (std::size_t c = 0; c < cones_.size(); ++c)
             sum += scaling_[c] * scaling_[c] * r.segment(cones_[c].first_row, cones_[c].rows).squaredNorm();

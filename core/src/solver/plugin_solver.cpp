@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A solver that is one plugin: the border, and the clock that stands still while the host measures.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "solver/solver_implementation.hpp"
+
+namespace delassus {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Curve samples are spaced by this factor in time.
+constexpr double sample_spacing = 1.02;
+
+/// A stopwatch that can be stopped while the host does work of its own.
+class Stopwatch {
+public:
+    void start() {
+        begin_ = Clock::now();
+        running_ = true;
+    }
+    void stop() {
+        if (running_) seconds_ += std::chrono::duration<double>(Clock::now() - begin_).count();
+        running_ = false;
+    }
+    [[nodiscard]] double seconds() const { return seconds_; }
+
+private:
+    Clock::time_point begin_;
+    double seconds_ = 0.0;
+    bool running_ = false;
+};
+
+/// What stands behind the progress callback during one solve.
+struct Listener {
+    const SolveSettings& settings;
+    const ErrorMeter* meter;  // null unless the curve is recorded
+    SolveReport& report;
+    Stopwatch& watch;
+    double seconds_before;  // setup
+    double next_sample = 0.0;
+    Clock::time_point next_display = Clock::now();
+    std::string failure = {};
+    bool given_up = false;
+
+    [[nodiscard]] double elapsed() const { return seconds_before + watch.seconds(); }
+
+    std::int32_t hear(std::int64_t iteration, const double* x, const double* lambda) {
+        const double seconds = elapsed();
+        report.iterations = iteration;
+        if (meter && seconds >= next_sample) {
+            const CurveSample sample{iteration, seconds, meter->natural(x, lambda)};
+            next_sample = seconds * sample_spacing;
+            if (std::isfinite(sample.natural)) {
+                report.curve.push_back(sample);
+                if (settings.on_sample) settings.on_sample(sample);
+            }
+        }
+        if (settings.on_progress && Clock::now() >= next_display) {
+            settings.on_progress(report.curve.empty() ? CurveSample{iteration, seconds, NAN} : report.curve.back());
+            next_display = Clock::now() + std::chrono::milliseconds(100);
+        }
+        if (settings.cancelled && settings.cancelled()) return DELASSUS_STOP_CANCEL;
+        return seconds >= settings.time_limit ? DELASSUS_STOP_TIME : DELASSUS_CONTINUE;
+    }
+
+    // The border: the clock stops, and nothing is thrown through the plugin.
+    static std::int32_t callback(void* context, std::int64_t iteration, const double* x,
+                                 const double* lambda) noexcept {
+        auto& self = *static_cast<Listener*>(context);
+        std::int32_t answer = DELASSUS_STOP_CANCEL;
+        try {
+            self.given_up = self.given_up || (self.settings.give_up && self.settings.give_up(iteration, x, lambda));
+            self.watch.stop();
+            answer = self.hear(iteration, x, lambda);
+            if (self.given_up && answer == DELASSUS_CONTINUE) answer = DELASSUS_STOP_CANCEL;
+        } catch (const std::exception& error) {
+            self.watch.stop();
+            self.failure = error.what();
+        }
+        self.watch.start();
+        return answer;
+    }
+};
+
+Status status_of(std::int32_t raw) {
+    switch (raw) {
+        case DELASSUS_SOLVED:
+            return Status::Solved;
+        case DELASSUS_ITERATION_LIMIT:
+            return Status::IterationLimit;
+        case DELASSUS_TIME_LIMIT:
+            return Status::TimeLimit;
+        case DELASSUS_STALLED:
+            return Status::Stalled;
+        case DELASSUS_INFEASIBLE:
+            return Status::Infeasible;
+        case DELASSUS_NUMERICAL_FAILURE:
+            return Status::NumericalFailure;
+        case DELASSUS_CANCELLED:
+            return Status::Cancelled;
+        default:
+            return Status::Error;
+    }
+}
+
+class PluginSolver : public Solver::Implementation {
+public:
+    PluginSolver(std::shared_ptr<const Plugin> loaded, OptionTexts texts, const Registry* known)
+        : plugin(std::move(loaded)), chosen(std::move(texts)), registry(known) {
+        const auto resolved = resolve_options(plugin->info().name, plugin->info().options, chosen);
+        std::vector<delassus_option_value> values;
+        for (const auto& value : resolved) {
+            const bool textual = value.type == DELASSUS_OPTION_CHOICE || value.type == DELASSUS_OPTION_TEXT;
+            values.push_back(
+                {value.key.c_str(), value.type, 0, value.integer, value.real, textual ? value.text.c_str() : nullptr});
+        }
+        const auto status =
+            guarded([&] { return border().create(values.data(), static_cast<std::int32_t>(values.size()), &solver); });
+        if (status != DELASSUS_SOLVED || !solver)
+            throw InputError(fmt::format("{} cannot be set up: {}", plugin->info().name, last_error(nullptr)));
+    }
+
+    ~PluginSolver() override {
+        if (solver) guarded([&] { return border().destroy(solver), DELASSUS_SOLVED; });
+    }
+
+    [[nodiscard]] const PluginInfo& info() const override { return plugin->info(); }
+    [[nodiscard]] const OptionTexts& options() const override { return chosen; }
+
+    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) override {
+        const std::uint64_t needs = needs_of(problem, settings);
+        if (const auto missing = info().missing(needs))
+            return fmt::format("{} cannot solve {}: {}{}.", info().name, quoted_name(problem),
+                               problem.describe(missing), registry ? who_can(*registry, needs) : std::string());
+        if (!border().accepts) return {};
+        char reason[512] = "";
+        const auto answer = guarded([&] { return border().accepts(solver, &problem.raw(), reason, sizeof reason); });
+        if (answer == 1 && thrown.empty()) return {};
+        reason[sizeof reason - 1] = '\0';
+        return fmt::format("{} cannot solve {}: {}.", info().name, quoted_name(problem),
+                           !thrown.empty() ? thrown
+                           : *reason       ? reason
+                                           : "it gave no reason");
+    }
+
+    void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+             SolveReport& report) override;
+
+private:
+    [[nodiscard]] const delassus_plugin_descriptor& border() const { return plugin->descriptor(); }
+
+    /// Runs an operation of the plugin. Exceptions are not allowed through the border, but a plugin that throws all the
+    /// same must not take the host down.
+    template <class Operation>
+    std::int32_t guarded(Operation&& operation) {
+        thrown.clear();
+        try {
+            return operation();
+        } catch (const std::exception& error) {
+            thrown = fmt::format("it threw an exception through the plugin border: {}", error.what());
+        } catch (...) {
+            thrown = "it threw an exception through the plugin border";
+        }
+        return DELASSUS_ERROR;
+    }
+
+    [[nodiscard]] std::string last_error(void* instance) {
+        if (!thrown.empty()) return thrown;
+        const char* text = border().last_error(instance);
+        return text && *text ? text : "it gave no reason";
+    }
+
+    /// Renews the analysis and the factorisation as far as the problem's identity asks.
+    std::int32_t set_up(const PreparedProblem& problem) {
+        const auto& raw = problem.raw();
+        if (analyzed && pattern_id == raw.pattern_id && values_id == raw.values_id) return DELASSUS_SOLVED;
+        if (!analyzed || pattern_id != raw.pattern_id) {
+            analyzed = false;
+            if (const auto status = guarded([&] { return border().analyze(solver, &raw); }); status != DELASSUS_SOLVED)
+                return status;
+        }
+        analyzed = false;
+        const auto status = guarded([&] { return border().factorize(solver, &raw); });
+        analyzed = status == DELASSUS_SOLVED;
+        pattern_id = raw.pattern_id;
+        values_id = raw.values_id;
+        return status;
+    }
+
+    std::shared_ptr<const Plugin> plugin;
+    OptionTexts chosen;
+    const Registry* registry;
+    void* solver = nullptr;
+    bool analyzed = false;
+    std::uint64_t pattern_id = 0, values_id = 0;
+    std::string thrown;
+};
+
+void PluginSolver::run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                       SolveReport& report) {
+    Stopwatch setup, watch;
+    setup.start();
+    std::int32_t raw_status = set_up(problem);
+    setup.stop();
+    report.seconds_setup = setup.seconds();
+
+    delassus_outcome outcome{};
+    outcome.struct_size = sizeof outcome;
+    outcome.residual = NAN;
+    bool given_up = false;
+    if (raw_status == DELASSUS_SOLVED) {
+        const ErrorMeter* meter = settings.record_curve ? &problem.meter() : nullptr;
+        Listener listener{settings, meter, report, watch, report.seconds_setup};
+        const delassus_request request{
+            sizeof request,      settings.warm_start ? 1 : 0, settings.tolerance, settings.max_iterations,
+            settings.time_limit, &Listener::callback,         &listener};
+        watch.start();
+        raw_status = guarded([&] {
+            return border().solve(solver, &problem.raw(), &request, solution.x.data(), solution.lambda.data(),
+                                  &outcome);
+        });
+        watch.stop();
+        if (!listener.failure.empty()) throw Error(listener.failure);
+        if (thrown.empty()) report.iterations = outcome.iterations;
+        given_up = listener.given_up;
+    }
+    report.seconds_solve = watch.seconds();
+    report.analyses = outcome.analyses;
+    report.factorizations = outcome.factorizations;
+    report.claimed_residual = outcome.residual;
+    report.status = status_of(raw_status);
+    if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
+    if (outcome.message) report.message = outcome.message;
+    if (report.status == Status::Error || report.status == Status::NumericalFailure)
+        report.message = fmt::format("{}: {}", info().name, last_error(solver));
+    if (settings.record_curve)
+        report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
+}
+
+}  // namespace
+
+Solver::Solver(std::shared_ptr<const Plugin> plugin, OptionTexts options, const Registry* registry)
+    : implementation_(std::make_unique<PluginSolver>(std::move(plugin), std::move(options), registry)) {}
+
+}  // namespace delassus

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solver/ranking.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "delassus/error.hpp"
+#include "support/nearest_name.hpp"
+#include "support/text_file.hpp"
+
+namespace delassus {
+
+namespace {
+
+using Json = nlohmann::json;
+
+void check_keys(const Json& object, const std::vector<std::string_view>& known, std::string_view where) {
+    if (!object.is_object()) throw InputError(fmt::format("{} must be an object", where));
+    for (const auto& [key, value] : object.items())
+        if (std::find(known.begin(), known.end(), key) == known.end())
+            throw InputError(fmt::format("{} has no key \"{}\"{}", where, key, nearest_name_hint(key, known)));
+}
+
+Structure structure_of(const std::string& name) {
+    for (const auto structure : {Structure::Reduced, Structure::Diagonal, Structure::Blocks, Structure::Definite,
+                                 Structure::Semidefinite, Structure::Indefinite, Structure::Unsymmetric})
+        if (name == name_of(structure)) return structure;
+    throw InputError(fmt::format("there is no structure \"{}\" of H", name));
+}
+
+RankedStage read_stage(const Json& json) {
+    check_keys(json, {"solver", "options", "tolerance", "max_iterations", "watched", "law", "reason"}, "a stage");
+    RankedStage ranked;
+    ranked.solver = json.at("solver").get<std::string>();
+    if (json.contains("options")) ranked.options = json.at("options").get<OptionTexts>();
+    ranked.stage.reason = json.at("reason").get<std::string>();
+    ranked.stage.tolerance = json.value("tolerance", 0.0);
+    ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
+    ranked.stage.watched = json.value("watched", false);
+    if (json.contains("law")) ranked.stage.law = law_of(json.at("law").get<std::string>());
+    return ranked;
+}
+
+RankingRule read_rule(const Json& json) {
+    check_keys(json, {"name", "when", "stages"}, "a rule");
+    RankingRule rule;
+    rule.name = json.at("name").get<std::string>();
+    const Json& when = json.at("when");
+    check_keys(when, {"linear", "law", "structure", "m", "tolerance"}, fmt::format("\"when\" of \"{}\"", rule.name));
+    if (when.contains("linear")) {
+        rule.any_cones = false;
+        rule.linear = when.at("linear").get<bool>();
+    }
+    if (when.contains("law")) rule.laws = {law_of(when.at("law").get<std::string>())};
+    if (when.contains("structure"))
+        for (const auto& name : when.at("structure")) rule.structures.push_back(structure_of(name));
+    if (when.contains("m")) {
+        rule.smallest_m = when.at("m").at(0).get<std::int32_t>();
+        if (!when.at("m").at(1).is_null()) rule.largest_m = when.at("m").at(1).get<std::int32_t>();
+    }
+    if (when.contains("tolerance")) {
+        if (!when.at("tolerance").at(0).is_null()) rule.smallest_tolerance = when.at("tolerance").at(0).get<double>();
+        if (!when.at("tolerance").at(1).is_null()) rule.largest_tolerance = when.at("tolerance").at(1).get<double>();
+    }
+    for (const auto& stage : json.at("stages")) rule.stages.push_back(read_stage(stage));
+    return rule;
+}
+
+}  // namespace
+
+bool RankingRule::matches(const PreparedProblem& problem, double tolerance) const {
+    const auto& data = problem.problem();
+    const auto among = [](const auto& list, auto value) {
+        return list.empty() || std::find(list.begin(), list.end(), value) != list.end();
+    };
+    const bool is_linear =
+        std::all_of(data.cones.begin(), data.cones.end(), [](const Cone& cone) { return cone.kind == ConeKind::Free; });
+    return (any_cones || linear == is_linear) && among(laws, data.law) && among(structures, problem.structure()) &&
+           data.m() >= smallest_m && data.m() <= largest_m && tolerance >= smallest_tolerance &&
+           tolerance <= largest_tolerance;
+}
+
+Ranking::Ranking(const std::filesystem::path& file) {
+    try {
+        const Json json = Json::parse(read_file(file));
+        check_keys(json, {"format", "made_by", "rules"}, "a ranking");
+        if (json.at("format") != 1) throw InputError("its format is not 1");
+        for (const auto& rule : json.at("rules")) rules_.push_back(read_rule(rule));
+        if (rules_.empty() || !json.at("rules").back().at("when").empty())
+            throw InputError("its last rule must match everything: \"when\": {}");
+    } catch (const Json::exception& error) {
+        throw InputError(fmt::format("the ranking {} cannot be read: {}", file.string(), error.what()));
+    } catch (const InputError& error) {
+        throw InputError(fmt::format("the ranking {} cannot be used: {}", file.string(), error.what()));
+    }
+}
+
+const RankingRule& Ranking::rule(const PreparedProblem& problem, double tolerance) const {
+    return *std::find_if(rules_.begin(), rules_.end(),
+                         [&](const RankingRule& rule) { return rule.matches(problem, tolerance); });
+}
+
+}  // namespace delassus

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "delassus/solver.hpp"
+
+namespace delassus {
+
+/// What stands behind a Solver: one plugin, or several in stages. Settings are checked and the starting point is in
+/// place when run() is called; the result is judged afterwards.
+class Solver::Implementation {
+public:
+    Implementation() = default;
+    virtual ~Implementation() = default;
+    Implementation(const Implementation&) = delete;
+    Implementation& operator=(const Implementation&) = delete;
+
+    [[nodiscard]] virtual const PluginInfo& info() const = 0;
+    /// The options that were chosen.
+    [[nodiscard]] virtual const OptionTexts& options() const = 0;
+    /// See Solver::refusal.
+    [[nodiscard]] virtual std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) = 0;
+    /// Solves; fills the report's status, message, counts, times, curve and stages.
+    virtual void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                     SolveReport& report) = 0;
+};
+
+/// "\"pile\"", or "the problem" if it has no name.
+[[nodiscard]] std::string quoted_name(const PreparedProblem& problem);
+
+/// What a solver must be able to do for this problem and these settings: DELASSUS_CAN_* bits.
+[[nodiscard]] std::uint64_t needs_of(const PreparedProblem& problem, const SolveSettings& settings);
+
+/// ". Can: a, b" or ". No installed solver can", for the end of a refusal.
+[[nodiscard]] std::string who_can(const Registry& registry, std::uint64_t needs);
+
+}  // namespace delassus

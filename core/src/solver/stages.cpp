@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solver/stages.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace delassus {
+
+DecreaseWatch::DecreaseWatch(double tolerance, std::int64_t max_iterations)
+    : tolerance_(tolerance), max_iterations_(max_iterations) {}
+
+bool DecreaseWatch::hopeless(std::int64_t iteration, double natural) {
+    if (!std::isfinite(natural)) return false;
+    bool fails = false;
+    if (last_ > 0 && natural > tolerance_) {
+        const double doubled = std::log2(static_cast<double>(iteration) / static_cast<double>(last_));
+        const double rate = std::log2(natural / last_error_) / doubled;  // per doubling; negative if it falls
+        const double doublings = std::log2(tolerance_ / natural) / rate;
+        fails =
+            rate >= 0.0 || std::exp2(doublings) * static_cast<double>(iteration) > static_cast<double>(max_iterations_);
+    }
+    failed_ = fails ? failed_ + 1 : 0;
+    last_ = iteration;
+    last_error_ = natural;
+    next_ = 2 * iteration;
+    return failed_ >= 2;
+}
+
+StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                         SolveReport& report)
+    : problem_(problem), best_(solution), settings_(settings), report_(report), started_(settings.warm_start) {
+    if (started_) natural_ = problem_.meter().measure(best_.x, best_.lambda).natural;
+}
+
+bool StageRunner::run(Solver& solver, const Stage& stage) {
+    const Law law = stage.law.value_or(problem_.problem().law);
+    std::optional<PreparedProblem> other;
+    if (law != problem_.problem().law) other = problem_.with_law(law);
+    const PreparedProblem& problem = other ? *other : problem_;
+
+    const bool warm = started_ && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
+    const double tolerance = stage.tolerance > 0.0 ? stage.tolerance : settings_.tolerance;
+    DecreaseWatch watch(tolerance, stage.max_iterations);
+    const SolveSettings settings = settings_of(stage, watch, warm, problem);
+    Solution solution = warm ? best_ : Solution{};
+    const SolveReport result = solver.solve(problem, solution, settings);
+
+    const Errors error = other ? problem_.meter().measure(solution.x, solution.lambda) : result.error;
+    // A stage with the other law is there for its end point, whatever that is worth under the problem's own.
+    if (!started_ || error.natural < natural_ || other) {
+        best_ = std::move(solution);
+        natural_ = error.natural;
+        started_ = true;
+    }
+    add({result.solver, result.options, law, stage.reason, tolerance, result.status, result.message, result.iterations,
+         result.seconds_setup + result.seconds_solve, error.natural},
+        result);
+    if (result.status == Status::Cancelled) return true;
+    if (std::max(error.natural, error.balance) <= settings_.tolerance ||
+        (result.status == Status::Solved && tolerance == settings_.tolerance && !other)) {
+        report_.status = Status::Solved;
+        return true;
+    }
+    if (report_.iterations >= settings_.max_iterations) {
+        report_.status = Status::IterationLimit;
+        return true;
+    }
+    if (report_.seconds_setup + report_.seconds_solve >= settings_.time_limit) {
+        report_.status = Status::TimeLimit;
+        return true;
+    }
+    if (report_.status == Status::Solved) report_.status = Status::Stalled;  // as far as this stage was to go
+    return false;
+}
+
+SolveSettings StageRunner::settings_of(const Stage& stage, DecreaseWatch& watch, bool warm,
+                                       const PreparedProblem& problem) const {
+    SolveSettings settings = settings_;
+    if (stage.tolerance > 0.0) settings.tolerance = std::max(stage.tolerance, settings_.tolerance);
+    settings.max_iterations = std::min(stage.max_iterations, settings_.max_iterations - report_.iterations);
+    const double seconds_before = report_.seconds_setup + report_.seconds_solve;
+    settings.time_limit = settings_.time_limit - seconds_before;
+    settings.warm_start = warm;
+    const auto shifted = [iterations = report_.iterations, seconds_before](CurveSample sample) {
+        sample.iteration += iterations;
+        sample.seconds += seconds_before;
+        return sample;
+    };
+    if (settings_.on_progress)
+        settings.on_progress = [this, shifted](const CurveSample& sample) { settings_.on_progress(shifted(sample)); };
+    // The curve is one of the problem's own law; of a stage with the other it has the end only.
+    if (&problem != &problem_) settings.record_curve = false;
+    if (settings_.on_sample)
+        settings.on_sample = [this, shifted](const CurveSample& sample) { settings_.on_sample(shifted(sample)); };
+    if (stage.watched)
+        settings.give_up = [&watch, &problem](std::int64_t iteration, const double* x, const double* lambda) {
+            return watch.due(iteration) && watch.hopeless(iteration, problem.meter().natural(x, lambda));
+        };
+    return settings;
+}
+
+void StageRunner::add(const StageReport& stage, const SolveReport& result) {
+    for (CurveSample sample : result.curve) {
+        sample.iteration += report_.iterations;
+        sample.seconds += report_.seconds_setup + report_.seconds_solve;
+        report_.curve.push_back(sample);
+    }
+    if (settings_.record_curve && result.curve.empty())
+        report_.curve.push_back({report_.iterations + stage.iterations,
+                                 report_.seconds_setup + report_.seconds_solve + stage.seconds, stage.natural});
+    report_.status = result.status;
+    report_.iterations += result.iterations;
+    report_.seconds_setup += result.seconds_setup;
+    report_.seconds_solve += result.seconds_solve;
+    report_.analyses += result.analyses;
+    report_.factorizations += result.factorizations;
+    report_.claimed_residual = result.claimed_residual;
+    report_.stages.push_back(stage);
+}
+
+std::string StageRunner::sentence() const {
+    std::string text;
+    for (const auto& stage : report_.stages) {
+        if (!text.empty()) text += ", ";
+        text += fmt::format("{} ({}{} iterations, {:.1e}{})", stage.solver,
+                            stage.law == problem_.problem().law ? "" : fmt::format("{}, ", name_of(stage.law)),
+                            stage.iterations, stage.natural,
+                            stage.status == Status::Solved ? "" : fmt::format(", {}", name_of(stage.status)));
+    }
+    return text;
+}
+
+}  // namespace delassus

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Several solvers on one problem, one after another: each starts from the best that was reached before it.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "delassus/solver.hpp"
+
+namespace delassus {
+
+/// What one solver is to do before the next takes over.
+struct Stage {
+    std::string reason;      ///< why this solver, now: for the report
+    double tolerance = 0.0;  ///< natural error that ends the stage; 0: the one that was asked for
+    std::int64_t max_iterations = std::numeric_limits<std::int64_t>::max();
+    /// The stage is given up when, at the measured decrease, it would not reach its tolerance within max_iterations
+    /// (see DecreaseWatch).
+    bool watched = false;
+    /// The law that the stage solves with, if not the problem's own, which judges the result all the same.
+    std::optional<Law> law = {};
+};
+
+/// Foretells by measurement whether an iteration will reach a tolerance in time. At iterations k₀, 2k₀, 4k₀, … the
+/// natural error e is taken. Where it fell by the factor ρ during the last doubling, a further log(tolerance/e)/log ρ
+/// doublings are needed: exact for the algebraic rates e ~ k^(−p) of first-order methods, and too many for linear ones,
+/// so that a forecast is trusted only when it fails twice in a row. Iterations, not seconds: the same on every machine.
+class DecreaseWatch {
+public:
+    DELASSUS_API DecreaseWatch(double tolerance, std::int64_t max_iterations);
+
+    /// Whether this iteration is one to measure at.
+    [[nodiscard]] bool due(std::int64_t iteration) const { return iteration >= next_; }
+    /// Takes the error at an iteration that is due; true if the tolerance is out of reach.
+    DELASSUS_API bool hopeless(std::int64_t iteration, double natural);
+
+private:
+    double tolerance_;
+    std::int64_t max_iterations_;
+    std::int64_t next_ = 16, last_ = 0;
+    double last_error_ = std::numeric_limits<double>::infinity();
+    int failed_ = 0;
+};
+
+/// Runs stages on one problem and adds them up in its report.
+class StageRunner {
+public:
+    /// solution: the start if settings.warm_start; the best so far at any time. All must outlive the runner.
+    StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings, SolveReport& report);
+
+    /// Runs one stage. True if nothing is left to do: solved, cancelled, or a limit of the whole solve reached.
+    bool run(Solver& solver, const Stage& stage);
+
+    /// The natural error of the best so far; infinity before the first stage of a cold start.
+    [[nodiscard]] double natural() const { return natural_; }
+
+    /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".
+    [[nodiscard]] std::string sentence() const;
+
+private:
+    [[nodiscard]] SolveSettings settings_of(const Stage& stage, DecreaseWatch& watch, bool warm,
+                                            const PreparedProblem& problem) const;
+    void add(const StageReport& stage, const SolveReport& result);
+
+    const PreparedProblem& problem_;
+    Solution& best_;
+    const SolveSettings& settings_;
+    SolveReport& report_;
+    double natural_ = std::numeric_limits<double>::infinity();
+    bool started_ = false;
+};
+
+}  // namespace delassus

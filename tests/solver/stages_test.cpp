@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Solvers in stages: `finish`, `auto`, and the forecast that ends a stage.
+#include "solver/stages.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "delassus/config.hpp"
+#include "delassus/error.hpp"
+#include "delassus/problem_files.hpp"
+#include "support/run_command.hpp"
+#include "support/small_problems.hpp"
+
+namespace delassus::tests {
+namespace {
+
+const Registry& registry() {
+    static const Registry instance;
+    return instance;
+}
+
+/// Feeds e(k) at the iterations that the watch asks for; the iteration at which it gives up, or -1.
+template <class Error>
+std::int64_t given_up_at(DecreaseWatch watch, Error error, std::int64_t last) {
+    for (std::int64_t k = 0; k <= last; ++k)
+        if (watch.due(k) && watch.hopeless(k, error(static_cast<double>(k)))) return k;
+    return -1;
+}
+
+TEST(DecreaseWatch, ForetellsAlgebraicRates) {
+    const auto algebraic = [](double k) { return 1.0 / (k * k); };
+    // 1/k² reaches 1e-6 after 1000 iterations.
+    EXPECT_EQ(given_up_at(DecreaseWatch(1e-6, 1001), algebraic, 1000), -1);
+    EXPECT_EQ(given_up_at(DecreaseWatch(1e-6, 900), algebraic, 1000), 64);
+}
+
+TEST(DecreaseWatch, GivesUpWhereNothingFalls) {
+    EXPECT_EQ(given_up_at(
+                  DecreaseWatch(1e-6, 1000000), [](double) { return 0.1; }, 1000),
+              64);
+    EXPECT_EQ(given_up_at(
+                  DecreaseWatch(1e-6, 1000000), [](double k) { return std::exp(-0.01 * k); }, 2000),
+              -1);
+    EXPECT_EQ(given_up_at(
+                  DecreaseWatch(1e-6, 100), [](double) { return 1e-7; }, 1000),
+              -1)
+        << "it is there already";
+}
+
+SolveReport solve(const SolverConfig& config, const PreparedProblem& problem, Solution& solution,
+                  SolveSettings settings = {}) {
+    if (config.tolerance) settings.tolerance = *config.tolerance;
+    Solver solver = make_solver(registry(), config);
+    return solver.solve(problem, solution, settings);
+}
+
+TEST(Finish, AnotherSolverTakesOver) {
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    SolveSettings settings;
+    settings.record_curve = true;
+    Solution solution;
+    const auto report = solve(parse_solver("spg(finish=apgd,finish_at=1e-2)"), problem, solution, settings);
+    EXPECT_EQ(report.solver, "spg");
+    EXPECT_EQ(report.options.at("finish"), "apgd");
+    ASSERT_EQ(report.status, Status::Solved) << report.message;
+    ASSERT_EQ(report.stages.size(), 2U);
+    EXPECT_EQ(report.stages[0].solver, "spg");
+    EXPECT_LE(report.stages[0].natural, 1e-2);
+    EXPECT_GT(report.stages[0].natural, 1e-8) << "it stops where the finish takes over";
+    EXPECT_EQ(report.stages[1].solver, "apgd");
+    EXPECT_LE(report.error.natural, 1e-8);
+    EXPECT_EQ(report.iterations, report.stages[0].iterations + report.stages[1].iterations);
+    for (std::size_t k = 1; k < report.curve.size(); ++k) {
+        EXPECT_GE(report.curve[k].seconds, report.curve[k - 1].seconds);
+        EXPECT_GE(report.curve[k].iteration, report.curve[k - 1].iteration);
+    }
+    const auto json = nlohmann::json::parse(to_json(report));
+    EXPECT_EQ(json["stages"].size(), 2U);
+}
+
+TEST(Finish, TheFirstGoesOnWhereTheFinishFails) {
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solution solution;
+    // One sweep of pgs does not finish anything.
+    SolverConfig config = parse_solver("apgd(finish=pgs,finish_at=1e-2)");
+    SolveSettings settings;
+    settings.max_iterations = 100000;
+    config.tolerance = 1e-9;
+    const auto report = solve(config, problem, solution, settings);
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    EXPECT_LE(report.error.natural, 1e-9);
+}
+
+TEST(Finish, BadUseIsExplained) {
+    const auto sentence = [](const char* text) {
+        try {
+            check_solver(registry(), parse_solver(text));
+        } catch (const InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(sentence("apgd(finish=spg)"), "");
+    EXPECT_NE(sentence("apgd(finish=spq)").find("did you mean \"spg\""), std::string::npos);
+    EXPECT_NE(sentence("apgd(finish_at=1e-3)").find("finish must name it"), std::string::npos);
+    EXPECT_NE(sentence("apgd(finish=spg,finish_at=2)").find("finish_at"), std::string::npos);
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solution solution;
+    EXPECT_THROW(static_cast<void>(solve(parse_solver("apgd(finish=minres)"), problem, solution)), Unsupported);
+}
+
+std::string ranking(const ScratchFolder& scratch, const std::string& rules) {
+    const auto file = scratch / "ranking.json";
+    std::ofstream(file) << R"({"format": 1, "made_by": "a test", "rules": )" << rules << "}";
+    return file.string();
+}
+
+TEST(Auto, RunsTheStagesOfItsRule) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([
+        {"name": "never", "when": {"linear": true}, "stages": []},
+        {"name": "all", "when": {}, "stages": [
+            {"solver": "pgs", "tolerance": 1e-2, "max_iterations": 500, "watched": true, "reason": "cheap"},
+            {"solver": "absent", "reason": "it is not installed"},
+            {"solver": "minres", "reason": "it cannot"},
+            {"solver": "apgd", "reason": "to the end"}]}])");
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solution solution;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    EXPECT_EQ(report.solver, "auto");
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    ASSERT_EQ(report.stages.size(), 2U) << report.message;
+    EXPECT_EQ(report.stages[0].solver, "pgs");
+    EXPECT_EQ(report.stages[0].reason, "cheap");
+    EXPECT_EQ(report.stages[1].solver, "apgd");
+    EXPECT_EQ(report.message.substr(0, 4), "all:");
+}
+
+// A rule without a solver that gets there: everyone else who can has a try, from the best so far.
+TEST(Auto, GoesOnWithWhoeverCan) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "pgs", "max_iterations": 1, "reason": "hopeless"}]}])");
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solution solution;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    EXPECT_EQ(report.stages[0].solver, "pgs");
+    EXPECT_EQ(report.stages[0].status, Status::IterationLimit);
+    EXPECT_GE(report.stages.size(), 2U);
+}
+
+// A stage may solve under the other law, as a start; the problem's own law judges.
+TEST(Auto, AStageMayTakeTheOtherLaw) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "apgd", "law": "associated", "reason": "a start"},
+        {"solver": "pgs", "reason": "the law itself"}]}])");
+    const PreparedProblem problem(point_on_plane(2.0, 10.0, 8.0, 0.5, Law::Coulomb));
+    Solution solution;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    ASSERT_EQ(report.status, Status::Solved) << report.message;
+    ASSERT_EQ(report.stages.size(), 2U);
+    EXPECT_EQ(report.stages[0].law, Law::Associated);
+    EXPECT_GT(report.stages[0].natural, 1e-3) << "a sliding contact opens under the associated law";
+    EXPECT_NEAR(solution.x[1], (8.0 - 0.5 * 10.0) / 2.0, 1e-7);
+    EXPECT_NEAR(solution.x[0], 0.0, 1e-7);
+}
+
+TEST(Auto, BadRankingsAreRefused) {
+    const ScratchFolder scratch;
+    const auto sentence = [&](const std::string& rules) {
+        try {
+            static_cast<void>(make_solver(registry(), parse_solver("auto(ranking=" + ranking(scratch, rules) + ")")));
+        } catch (const InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(sentence("[]").find("last rule must match everything"), std::string::npos);
+    EXPECT_NE(sentence(R"([{"name": "a", "when": {"lwa": "coulomb"}, "stages": []}])").find("did you mean \"law\""),
+              std::string::npos);
+    EXPECT_NE(sentence(R"([{"name": "a", "when": {"structure": ["thick"]}, "stages": []}])").find("no structure"),
+              std::string::npos);
+    EXPECT_NE(sentence("[{]").find("cannot be read"), std::string::npos);
+    EXPECT_THROW(static_cast<void>(make_solver(registry(), parse_solver("auto(ranking=/no/such/file)"))), InputError);
+    EXPECT_THROW(static_cast<void>(make_solver(registry(), parse_solver("auto(rankin=x)"))), InputError);
+}
+
+}  // namespace
+}  // namespace delassus::tests
