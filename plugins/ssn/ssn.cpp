@@ -9,13 +9,18 @@
 
 namespace delassus::ssn {
 
+using Patience = SemismoothNewton::Patience;
+
 namespace {
 
 constexpr double first_tau = 0.1;
-constexpr double newton_threshold = 1e-2;  // error below which Newton's method is tried without a centre
-constexpr std::int64_t patience = 40;      // solves in which the error must fall by half, or another way is tried
-constexpr double path_goal = 1e-7;         // error of the points on the way between the laws
-constexpr double first_stride = 0.1;       // in θ
+constexpr double newton_threshold = 1e-2;   // error below which Newton's method is tried without a centre
+constexpr std::int64_t direct_solves = 40;  // in which Coulomb's error must fall by half, or the law is followed
+constexpr double last_gain = 0.9;           // to which the error must fall in stall_iterations
+constexpr Patience associated_patience{200, 0.5};
+constexpr Patience path_patience{20, 0.5};
+constexpr double path_goal = 1e-7;    // largest error of the points on the way between the laws
+constexpr double first_stride = 0.1;  // in θ
 constexpr double shortest_stride = 2e-3;
 
 Form form_from(const std::string& choice) {
@@ -57,8 +62,8 @@ sdk::Outcome SemismoothNewton::solve(const sdk::ProblemView& problem, const sdk:
     map_.set_law(problem.coulomb ? 1.0 : 0.0);
     const double size = scaled_.r().norm();
     reference_ = size > 0.0 ? size : 1.0;
-    sdk::ScaledRun run(problem, scaled_, request,
-                       0);  // the stall is found here: the way between the laws looks like one
+    // The stall is found in iterate(): to the monitor, the way between the laws would look like one.
+    sdk::ScaledRun run(problem, scaled_, request, 0);
     move_to(run.start(lambda));
     const bool stopped = run.check(lambda_, velocity_);
     if (!stopped) iterate(run);
@@ -67,27 +72,30 @@ sdk::Outcome SemismoothNewton::solve(const sdk::ProblemView& problem, const sdk:
 
 // Returns where the run asks to stop, or stalls it.
 void SemismoothNewton::iterate(sdk::ScaledRun& run) {
+    const Patience last{stall_iterations_, last_gain};
+    const bool may_follow = map_.law() > 0.0 && follow_law_;
+    const Patience direct{std::min(direct_solves, stall_iterations_), 0.5};
     tau_ = std::min(first_tau, error());
-    if (map_.law() > 0.0 && follow_law_) {
-        if (solve_law(run, 0.0, std::min(patience, stall_iterations_)) == Result::Stopped) return;
-        if (!at_rounding()) {
-            const Vector direct = lambda_;
-            const double before = error();
-            if (follow_law(run) == Result::Stopped) return;
-            map_.set_law(1.0);
-            if (error() > before) move_to(direct);
-            tau_ = std::min(first_tau, error());
-        }
+    if (solve_law(run, 0.0, may_follow ? direct : last) == Result::Stopped) return;
+    while (may_follow && !at_rounding()) {
+        const Vector before = lambda_;
+        const double error_before = error();
+        if (follow_law(run, std::min(path_goal, 0.01 * error_before)) == Result::Stopped) return;
+        map_.set_law(1.0);
+        if (error() > error_before) move_to(before);
+        tau_ = std::min(first_tau, error());
+        if (solve_law(run, 0.0, last) == Result::Stopped) return;
+        if (error() > 0.5 * error_before) break;
     }
-    if (solve_law(run, 0.0, stall_iterations_) == Result::Stopped) return;
     run.stall(at_rounding() ? "rounding ends the gain" : "the error no longer falls");
 }
 
-// θ grows from 0 to 1 in steps that solve_law follows, each from the extrapolation of the last two points.
-SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run) {
+// From the associated law's solution θ grows to 1 in steps that solve_law follows to an error of `goal`, each from the
+// extrapolation of the last two points.
+SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run, double goal) {
     map_.set_law(0.0);
     tau_ = first_tau;
-    if (const Result result = solve_law(run, path_goal, 5 * patience); result != Result::Reached) return result;
+    if (const Result result = solve_law(run, goal, associated_patience); result != Result::Reached) return result;
     double theta = 0.0, stride = first_stride, last_stride = 0.0;
     Vector here = lambda_, before = lambda_;
     while (theta < 1.0) {
@@ -96,7 +104,7 @@ SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run) {
         if (last_stride > 0.0) move_to(here + ((next - theta) / last_stride) * (here - before));
         const std::int64_t since = run.iteration();
         tau_ = std::min(first_tau, 1e-3 * error());
-        const Result result = solve_law(run, path_goal, patience / 2);
+        const Result result = solve_law(run, goal, path_patience);
         if (result == Result::Stopped) return result;
         if (result == Result::Reached) {
             before = here;
@@ -113,9 +121,8 @@ SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run) {
     return Result::Reached;
 }
 
-// Proximal subproblems, and Newton's method on the problem itself where it looks near. patience: solves in which the
-// error must fall by half.
-SemismoothNewton::Result SemismoothNewton::solve_law(sdk::ScaledRun& run, double goal, std::int64_t patience) {
+// Proximal subproblems, and Newton's method on the problem itself where it looks near.
+SemismoothNewton::Result SemismoothNewton::solve_law(sdk::ScaledRun& run, double goal, Patience patience) {
     double threshold = newton_threshold;
     double milestone = error();
     std::int64_t since = run.iteration();
@@ -128,10 +135,10 @@ SemismoothNewton::Result SemismoothNewton::solve_law(sdk::ScaledRun& run, double
             threshold = 0.3 * error();
         }
         if (proximal_step(run) == Result::Stopped) return Result::Stopped;
-        if (const double now = error(); now <= 0.5 * milestone) {
+        if (const double now = error(); now <= patience.gain * milestone) {
             milestone = now;
             since = run.iteration();
-        } else if (run.iteration() - since > patience) {
+        } else if (run.iteration() - since > patience.solves) {
             return Result::Failed;
         }
     }

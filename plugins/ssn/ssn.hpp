@@ -20,6 +20,12 @@ public:
     [[nodiscard]] std::int64_t analyses() const override;
     [[nodiscard]] std::int64_t factorizations() const override;
 
+    /// When a phase gives up: after so many solves without bringing the error to this part of what it was.
+    struct Patience {
+        std::int64_t solves;
+        double gain;
+    };
+
 private:
     enum class Result {
         Reached,  ///< the goal
@@ -29,8 +35,8 @@ private:
 
     // ssn.cpp: the order of the phases
     void iterate(sdk::ScaledRun& run);
-    Result follow_law(sdk::ScaledRun& run);
-    Result solve_law(sdk::ScaledRun& run, double goal, std::int64_t patience);
+    Result follow_law(sdk::ScaledRun& run, double goal);
+    Result solve_law(sdk::ScaledRun& run, double goal, Patience patience);
     [[nodiscard]] bool at_rounding();
 
     // phases.cpp: Newton's method, a proximal subproblem, and their line searches
