@@ -50,6 +50,7 @@ public:
     void load(const ProblemView& problem) {
         r_ = operator_.free_velocity(problem);
         residual_ = NaturalResidual(problem, operator_.diagonal(), r_);
+        coulomb_ = problem.coulomb;
         r_.array() *= p_.array();
         blocks_.clear();
         intervals_.clear();
@@ -97,7 +98,9 @@ public:
                 lambda[i] = std::min(upper_[i], std::max(lower_[i], lambda[i]));
     }
 
-    /// The natural error of λ̂ with û; both m. A row whose p differs from its block's s has the unit step (s/p)² of û.
+    /// The natural error of λ̂ with û without De Saxcé term; both m. With the exact Coulomb law the term is added here:
+    /// a friction block has one scalar p, so that p μ‖u_t‖ = μ‖û_t‖. A row whose p differs from its block's s has the
+    /// unit step (s/p)² of û.
     [[nodiscard]] double natural(const Vector& lambda, const Vector& velocity) const {
         double sum = 0.0;
         std::array<double, largest_block> trial;
@@ -105,6 +108,8 @@ public:
             const double* l = lambda.data() + block.first;
             const double* u = velocity.data() + block.first;
             for (std::int32_t i = 0; i < block.rows; ++i) trial[i] = l[i] - u[i];
+            if (coulomb_ && block.cone.kind == DELASSUS_CONE_FRICTION)
+                trial[0] -= FrictionCone::de_saxce(block.cone, u);
             sdk::project(block.cone, trial.data());
             for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - trial[i]) * (l[i] - trial[i]);
         }
@@ -202,6 +207,7 @@ private:
     BlockRows rows_;    // Ŵ, or D̂ = P D
     BlockRows square_;  // Ê, or all of N̂
     bool whitened_ = true;
+    bool coulomb_ = false;
     mutable Vector work_;
 };
 

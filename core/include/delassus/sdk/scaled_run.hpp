@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "delassus/sdk/monitor.hpp"
 #include "delassus/sdk/scaled_problem.hpp"
@@ -40,6 +42,12 @@ public:
 
     /// Counts a product with N that made no new iterate; true: stop now.
     [[nodiscard]] bool count() { return monitor_.check(iteration_++, nullptr, lambda_, latest_); }
+
+    /// Ends the run as stalled: the method knows of no better iterate, and why.
+    void stall(std::string reason) {
+        monitor_.outcome().status = DELASSUS_STALLED;
+        monitor_.outcome().message = std::move(reason);
+    }
 
     [[nodiscard]] bool stale() const { return stale_; }
     /// The natural error of the latest iterate.
