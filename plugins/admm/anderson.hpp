@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Anderson acceleration of a fixed-point iteration y ← F(y).
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <cstdint>
+
+#include "delassus/sdk/problem_view.hpp"
+
+namespace delassus::admm {
+
+/// With f(y) = F(y) − y, the next point is F(y) − ΔF γ, where γ minimises ‖f − Δf γ‖ over the latest `memory`
+/// differences of f and F: for a linear F this is GMRES in another guise (Anderson 1965; Walker and Ni 2011, "type II";
+/// Fang and Saad 2009).
+class Anderson {
+public:
+    /// memory ≥ 1 differences of vectors of the given size are kept.
+    void reset(Eigen::Index size, int memory);
+
+    /// Forgets all differences; the next point pushed starts anew.
+    void clear() { count_ = 0, has_point_ = false; }
+
+    /// Takes a point's f and F (y itself is F − f).
+    void push(const sdk::Vector& f, const sdk::Vector& F);
+
+    /// next ← the accelerated point from the latest push; false if there is no difference yet, or none that helps.
+    [[nodiscard]] bool extrapolate(sdk::Vector& next);
+
+private:
+    int memory_ = 0, count_ = 0, position_ = 0;
+    bool has_point_ = false;
+    Eigen::MatrixXd df_, dF_;  // size × memory, a ring; each pair divided by ‖Δf‖
+    Eigen::MatrixXd gram_;     // memory × memory: df_ᵀ df_
+    Eigen::MatrixXd matrix_;   // its part in use, regularised
+    Eigen::LDLT<Eigen::MatrixXd> factor_;
+    sdk::Vector f_, F_;  // of the latest point
+    sdk::Vector gamma_;
+};
+
+}  // namespace delassus::admm
