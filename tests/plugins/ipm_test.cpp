@@ -25,7 +25,8 @@ struct Result {
     SolveReport report;
 };
 
-Result solve(const Problem& problem, double tolerance, const OptionMap& options = {}, const Solution* start = nullptr) {
+Result solve(const Problem& problem, double tolerance, const OptionTexts& options = {},
+             const Solution* start = nullptr) {
     const Registry registry;
     Solver solver(registry.load("ipm"), options, &registry);
     Result result;
@@ -40,7 +41,7 @@ Result solve(const Problem& problem, double tolerance, const OptionMap& options 
 }
 
 void expect_answer(const Problem& problem, const std::vector<double>& x, const std::vector<double>& lambda,
-                   const OptionMap& options = {}) {
+                   const OptionTexts& options = {}) {
     const auto [solution, report] = solve(problem, 1e-11, options);
     EXPECT_EQ(report.status, Status::Solved) << report.message;
     ASSERT_EQ(solution.x.size(), x.size());
