@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The cones' side of the interior point method: the iterates ẑ, ŝ in the interior, their scaling, targets and steps.
+//
+// Rows of intervals keep p = ẑ − lower > 0 with w_l > 0 and q = upper − ẑ > 0 with w_u > 0 (those that exist) and
+// ŝ = w_l − w_u; on the central path p w_l = q w_u = τ. Eliminating δw_l, δw_u from the linearised products leaves
+// δs = t − θ δz with θ = w_l/p + w_u/q.
+//
+// Friction blocks hold z and s in the interior of the second-order cone Q; on the central path z ∘ s = τ e. The
+// Nesterov–Todd matrix W (symmetric, W Q = Q) has W z = W⁻¹ s =: ℓ; linearising (W z) ∘ (W⁻¹ s) gives δs = W q − W²δz
+// with q = ℓ \ (what is left of the products). With z̄ = z/√det z, s̄ = s/√det s, J = diag(1, −1, −1) and
+//     γ = √((1 + z̄ᵀs̄)/2),  w̄ = (s̄ + J z̄)/(2γ),  η = (det s/det z)^(1/4)
+// W² = η²(2 w̄ w̄ᵀ − J) (Andersen, Roos and Terlaky 2003; Vandenberghe 2010, section 5.1). With ω = w̄₀ + ‖w̄₁‖ and the
+// direction ŵ of w̄₁ its eigenvectors are c = (1, ±ŵ)/√2 with √θ = η ω^(±1), and (0, t) with √θ = η, t ⊥ ŵ. All work
+// is done in this basis, because θ spans 1/τ to τ at a sliding contact: a diagonal keeps each value to full accuracy
+// where a 3×3 matrix would lose the small ones.
+//
+// At a sliding contact det z = (z₀ − ‖z₁‖)(z₀ + ‖z₁‖) falls below the rounding of z itself. det z, det s and zᵀs are
+// therefore carried along: after a step they follow from the scaled points W z and W⁻¹ s, which are well centred.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "scaled_system.hpp"
+
+namespace delassus::ipm {
+
+using Triple = std::array<double, 3>;
+
+/// The eigenbasis of one friction block's W², by columns, row k of which belongs to ẑ's k-th component.
+using Basis = std::array<Triple, 3>;
+
+class Complementarity {
+public:
+    /// θ of a row that is held where it is.
+    static constexpr double held = 1e40;
+
+    void analyze(const sdk::ProblemView& problem) { groups_ = groups_of(problem); }
+
+    /// Takes the cones' parameters in units of system.
+    void load(const sdk::ProblemView& problem, const ScaledSystem& system);
+
+    /// Starts from ẑ, with ŝ as wanted, both moved into the interior, at least as far from its boundary as the margins.
+    void start(const sdk::Vector& z, const sdk::Vector& s, double z_margin, double s_margin);
+
+    [[nodiscard]] const sdk::Vector& z() const { return z_; }  ///< m
+    [[nodiscard]] const sdk::Vector& s() const { return s_; }  ///< m; zero in held rows
+    [[nodiscard]] bool is_held(Eigen::Index row) const { return held_[static_cast<std::size_t>(row)] != 0; }
+
+    /// τ = (the sum of all products)/(their number); 0 if there are none.
+    [[nodiscard]] double mean_product() const { return degree_ > 0.0 ? products(0.0) / degree_ : 0.0; }
+    /// The same after a step of the given length along the direction.
+    [[nodiscard]] double mean_product(double step) const { return degree_ > 0.0 ? products(step) / degree_ : 0.0; }
+
+    /// Finds W; leaves θ (m) by rows of the eigenbases.
+    void scale(sdk::Vector& theta);
+    /// v ← Qᵀ v, Q v with Q of the eigenbases; m.
+    void to_eigenbasis(sdk::Vector& v) const;
+    void from_eigenbasis(sdk::Vector& v) const;
+    /// Q of a group that is a friction block with μ > 0, otherwise null (the identity).
+    [[nodiscard]] const Basis* basis(std::size_t group) const {
+        return block_of_group_[group] < 0 ? nullptr : &blocks_[static_cast<std::size_t>(block_of_group_[group])].basis;
+    }
+
+    /// t of δs = t − θ δz in the eigenbases (m), aiming at products of zero (Mehrotra's predictor).
+    void target_zero(sdk::Vector& t);
+    /// Aiming at products of tau, with the second-order term of the direction set last (Mehrotra's corrector).
+    void target(double tau, sdk::Vector& t);
+
+    /// Takes δz in the eigenbases, m; δs follows from the target set last.
+    void set_direction(const sdk::Vector& dz);
+    /// The largest step that keeps z and s in their cones; infinite if all do.
+    [[nodiscard]] double longest_step() const;
+    void advance(double step);
+
+    /// z ← its nearest point in the recession cone of the set of ẑ: the directions in which ẑ may grow for ever.
+    void project_to_recession(sdk::Vector& z) const;
+    /// How far s is from the dual of that cone.
+    [[nodiscard]] double distance_to_recession_dual(const sdk::Vector& s) const;
+
+private:
+    struct Interval {
+        std::int32_t row;
+        bool has_lower, has_upper;
+        double lower, upper;
+        double p, wl, q, wu;
+        double tl, tu;        // targets of δw_l, δw_u
+        double dz, dwl, dwu;  // direction
+    };
+    struct Block {
+        std::int32_t first, rows;
+        double det_z, det_s, product;
+        double eta;
+        Triple root_theta;
+        Basis basis;
+        Triple ell, q;  // W z = W⁻¹ s; target
+        Triple dz, ds;  // W δz, W⁻¹ δs
+    };
+
+    void scale_block(Block& block);
+    void renew_products(Block& block) const;
+    [[nodiscard]] double products(double step) const;
+
+    std::vector<Group> groups_;
+    std::vector<std::int32_t> block_of_group_;
+    std::vector<Interval> intervals_;
+    std::vector<Block> blocks_;
+    std::vector<char> held_;
+    std::vector<std::int32_t> free_;  // rows without a bound
+    sdk::Vector z_, s_, held_value_;
+    sdk::Vector direction_;  // δz in the rows' own basis
+    double degree_ = 0.0;
+};
+
+}  // namespace delassus::ipm

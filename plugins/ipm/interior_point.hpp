@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Primal-dual interior point method for the convex problem of the associated law (README.md).
+#pragma once
+
+#include <string>
+
+#include "delassus/sdk/monitor.hpp"
+#include "kkt_system.hpp"
+
+namespace delassus::ipm {
+
+class InteriorPoint : public sdk::Solver {
+public:
+    explicit InteriorPoint(const sdk::OptionValues& options);
+    void analyze(const sdk::ProblemView& problem) override;
+    void factorize(const sdk::ProblemView& problem) override { scaling_.factorize(problem); }
+    sdk::Outcome solve(const sdk::ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
+                       sdk::MutableVectorView lambda) override;
+    [[nodiscard]] std::int64_t analyses() const override { return kkt_.analyses(); }
+    [[nodiscard]] std::int64_t factorizations() const override {
+        return scaling_.factorizations() + kkt_.factorizations();
+    }
+
+private:
+    void start_cold();
+    void start_warm(const sdk::ProblemView& problem, double error);
+    void find_residuals();
+    /// Judges the iterate in true_x_, true_lambda_; true: stop.
+    bool judge(const sdk::ProblemView& problem, sdk::Monitor& monitor, std::int64_t iteration);
+    void iterate(const sdk::ProblemView& problem, sdk::Monitor& monitor);
+    bool step();
+    /// Whether the iteration has stopped getting anywhere.
+    bool is_stuck(double error);
+    /// A lower bound of ‖(x̂, ẑ)‖ over all solutions that the iterates prove; zero if they prove nothing.
+    [[nodiscard]] double proven_size() const;
+
+    Scaling scaling_;
+    Complementarity cones_;
+    KktSystem kkt_;
+    double step_fraction_;
+    std::int64_t stall_iterations_;
+
+    sdk::Vector x_;                                 // x̂
+    sdk::Vector f_, g_;                             // what is left of the two equations
+    sdk::Vector theta_, target_, right_, dx_, dz_;  // of a step
+    sdk::Vector true_x_, true_lambda_, best_x_;     // in the problem's units
+    double least_error_ = 0.0, least_rest_ = 0.0;   // of is_stuck
+    std::int64_t idle_iterations_ = 0;
+};
+
+}  // namespace delassus::ipm

@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "kkt_system.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace delassus::ipm {
+
+namespace {
+
+constexpr double largest_regularization = 1e-4;
+
+std::size_t place_of(const sdk::SparseColumns& matrix, std::int32_t row, std::int32_t column) {
+    const auto* begin = matrix.innerIndexPtr() + matrix.outerIndexPtr()[column];
+    const auto* end = matrix.innerIndexPtr() + matrix.outerIndexPtr()[column + 1];
+    return static_cast<std::size_t>(std::lower_bound(begin, end, row) - matrix.innerIndexPtr());
+}
+
+}  // namespace
+
+void KktSystem::analyze(const sdk::ProblemView& problem) {
+    n_ = problem.n;
+    m_ = problem.m;
+    find_blocks(problem);
+    form_ = settings_.form;
+    if (n_ == 0) {
+        form_ = Form::Reduced;
+    } else if (couples_groups_) {
+        form_ = Form::Augmented;
+    } else if (form_ == Form::Automatic) {
+        form_ = Form::Normal;
+        const sdk::SparseColumns normal = pattern(problem, Form::Normal);
+        const double stored = static_cast<double>(problem.H.nonZeros() + problem.D.nonZeros() + n_ + m_);
+        if (static_cast<double>(normal.nonZeros()) > 8.0 * stored) {
+            SparseFactor trial;
+            trial.analyze(normal, n_);
+            const double fill = trial.entries();
+            trial.analyze(pattern(problem, Form::Augmented), n_);
+            if (trial.entries() < fill) form_ = Form::Augmented;
+        }
+    }
+    matrix_ = pattern(problem, form_);
+    find_places(problem);
+    factor_.analyze(matrix_, form_ == Form::Augmented ? n_ : matrix_.rows());
+    ++analyses_;
+}
+
+void KktSystem::find_blocks(const sdk::ProblemView& problem) {
+    groups_ = groups_of(problem);
+    group_of_row_.resize(static_cast<std::size_t>(m_));
+    d_blocks_.clear();
+    column_.clear();
+    d_slot_.clear();
+    std::size_t values = 0;
+    std::vector<std::int32_t> position(static_cast<std::size_t>(n_));
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+        const Group& group = groups_[g];
+        const std::size_t begin = column_.size();
+        for (std::int32_t i = 0; i < group.rows; ++i) {
+            group_of_row_[static_cast<std::size_t>(group.first + i)] = static_cast<std::int32_t>(g);
+            for (sdk::SparseRowsView::InnerIterator entry(problem.D, group.first + i); entry; ++entry)
+                column_.push_back(static_cast<std::int32_t>(entry.col()));
+        }
+        const auto first = column_.begin() + static_cast<std::ptrdiff_t>(begin);
+        std::sort(first, column_.end());
+        column_.erase(std::unique(first, column_.end()), column_.end());
+        const auto columns = static_cast<std::int32_t>(column_.size() - begin);
+        for (std::int32_t k = 0; k < columns; ++k)
+            position[static_cast<std::size_t>(column_[begin + static_cast<std::size_t>(k)])] = k;
+        for (std::int32_t i = 0; i < group.rows; ++i)
+            for (sdk::SparseRowsView::InnerIterator entry(problem.D, group.first + i); entry; ++entry)
+                d_slot_.push_back(values + static_cast<std::size_t>(
+                                               position[static_cast<std::size_t>(entry.col())] * group.rows + i));
+        d_blocks_.push_back({columns, begin, values, 0});
+        values += static_cast<std::size_t>(columns) * static_cast<std::size_t>(group.rows);
+    }
+    d_value_.assign(values, 0.0);
+    d_rotated_.assign(values, 0.0);
+
+    std::map<std::pair<std::int32_t, std::int32_t>, std::size_t> index;
+    e_blocks_.clear();
+    values = 0;
+    const auto add = [&](std::int32_t row, std::int32_t column) {
+        const auto [found, is_new] = index.try_emplace({row, column}, e_blocks_.size());
+        if (!is_new) return;
+        e_blocks_.push_back({row, column, values, 0});
+        values += static_cast<std::size_t>(groups_[static_cast<std::size_t>(row)].rows *
+                                           groups_[static_cast<std::size_t>(column)].rows);
+    };
+    for (std::size_t g = 0; g < groups_.size(); ++g) add(static_cast<std::int32_t>(g), static_cast<std::int32_t>(g));
+    e_slot_.clear();
+    for (std::int32_t i = 0; i < m_; ++i) {
+        const std::int32_t row = group_of_row_[static_cast<std::size_t>(i)];
+        for (sdk::SparseRowsView::InnerIterator entry(problem.E, i); entry; ++entry) {
+            const std::int32_t column = group_of_row_[static_cast<std::size_t>(entry.col())];
+            if (column > row) {
+                e_slot_.push_back(-1);
+                continue;
+            }
+            add(row, column);
+            const EBlock& block = e_blocks_[index.at({row, column})];
+            const Group &down = groups_[static_cast<std::size_t>(row)],
+                        &across = groups_[static_cast<std::size_t>(column)];
+            e_slot_.push_back(static_cast<std::ptrdiff_t>(block.value) + (entry.col() - across.first) * down.rows +
+                              (i - down.first));
+        }
+    }
+    couples_groups_ = e_blocks_.size() > groups_.size();
+    e_value_.assign(values, 0.0);
+    e_rotated_.assign(values, 0.0);
+}
+
+// The lower triangle with ones for values.
+sdk::SparseColumns KktSystem::pattern(const sdk::ProblemView& problem, Form form) const {
+    const Eigen::Index size = n_ + (form == Form::Normal ? 0 : m_);
+    std::vector<std::vector<std::int32_t>> rows(static_cast<std::size_t>(size));
+    const auto add = [&rows](std::int32_t i, std::int32_t j) {
+        if (i >= j) rows[static_cast<std::size_t>(j)].push_back(i);
+    };
+    for (std::int32_t i = 0; i < n_; ++i) {
+        add(i, i);
+        for (sdk::SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
+            add(i, static_cast<std::int32_t>(entry.col()));
+    }
+    const auto n = static_cast<std::int32_t>(n_);
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+        const DBlock& block = d_blocks_[g];
+        for (std::int32_t k = 0; k < block.columns; ++k) {
+            const std::int32_t column = column_[block.index + static_cast<std::size_t>(k)];
+            if (form == Form::Normal) {
+                for (std::int32_t l = k; l < block.columns; ++l)
+                    add(column_[block.index + static_cast<std::size_t>(l)], column);
+            } else {
+                for (std::int32_t i = 0; i < groups_[g].rows; ++i) add(n + groups_[g].first + i, column);
+            }
+        }
+    }
+    if (form != Form::Normal) {
+        for (const EBlock& block : e_blocks_) {
+            const Group &down = groups_[static_cast<std::size_t>(block.row)],
+                        &across = groups_[static_cast<std::size_t>(block.column)];
+            for (std::int32_t j = 0; j < across.rows; ++j)
+                for (std::int32_t i = 0; i < down.rows; ++i) add(n + down.first + i, n + across.first + j);
+        }
+    }
+    sdk::SparseColumns matrix(size, size);
+    std::vector<std::int32_t> counts;
+    for (auto& column : rows) {
+        std::sort(column.begin(), column.end());
+        column.erase(std::unique(column.begin(), column.end()), column.end());
+        counts.push_back(static_cast<std::int32_t>(column.size()));
+    }
+    matrix.reserve(counts);
+    for (std::size_t j = 0; j < rows.size(); ++j)
+        for (const auto i : rows[j]) matrix.insert(i, static_cast<Eigen::Index>(j)) = 1.0;
+    matrix.makeCompressed();
+    return matrix;
+}
+
+void KktSystem::find_places(const sdk::ProblemView& problem) {
+    const auto n = static_cast<std::int32_t>(n_);
+    const auto place = [&](std::int32_t i, std::int32_t j) {
+        return static_cast<std::int32_t>(place_of(matrix_, std::max(i, j), std::min(i, j)));
+    };
+    h_place_.clear();
+    for (std::int32_t j = 0; j < n; ++j)  // H is symmetric: its rows are its columns
+        for (sdk::SparseRowsView::InnerIterator entry(problem.H, j); entry; ++entry)
+            h_place_.push_back(entry.col() >= j ? place(static_cast<std::int32_t>(entry.col()), j) : -1);
+    d_place_.clear();
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+        DBlock& block = d_blocks_[g];
+        block.place = d_place_.size();
+        for (std::int32_t k = 0; k < block.columns; ++k) {
+            const std::int32_t column = column_[block.index + static_cast<std::size_t>(k)];
+            if (form_ == Form::Normal) {
+                for (std::int32_t l = k; l < block.columns; ++l)
+                    d_place_.push_back(place(column_[block.index + static_cast<std::size_t>(l)], column));
+            } else {
+                for (std::int32_t i = 0; i < groups_[g].rows; ++i)
+                    d_place_.push_back(place(n + groups_[g].first + i, column));
+            }
+        }
+    }
+    e_place_.clear();
+    if (form_ == Form::Normal) return;
+    for (EBlock& block : e_blocks_) {
+        block.place = e_place_.size();
+        const Group &down = groups_[static_cast<std::size_t>(block.row)],
+                    &across = groups_[static_cast<std::size_t>(block.column)];
+        for (std::int32_t j = 0; j < across.rows; ++j)
+            for (std::int32_t i = 0; i < down.rows; ++i)
+                e_place_.push_back(place(n + down.first + i, n + across.first + j));
+    }
+}
+
+void KktSystem::load(const ScaledSystem& system, bool definite) {
+    system_ = &system;
+    definite_ = definite;
+    delta_ = settings_.regularization;
+    rho_ = definite ? 0.0 : delta_;
+    std::fill(d_value_.begin(), d_value_.end(), 0.0);
+    for (std::size_t k = 0; k < d_slot_.size(); ++k) d_value_[d_slot_[k]] = system.D.valuePtr()[k];
+    std::fill(e_value_.begin(), e_value_.end(), 0.0);
+    for (std::size_t k = 0; k < e_slot_.size(); ++k)  // E is symmetric: its rows are its columns
+        if (e_slot_[k] >= 0) e_value_[static_cast<std::size_t>(e_slot_[k])] = system.E.valuePtr()[k];
+}
+
+// D̂' = Qᵀ D̂, Ê' = Qᵀ Ê Q by blocks.
+void KktSystem::rotate(const Complementarity& cones) {
+    d_rotated_ = d_value_;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+        const Basis* basis = cones.basis(g);
+        if (!basis) continue;
+        const int rows = groups_[g].rows;
+        double* column = d_rotated_.data() + d_blocks_[g].value;
+        for (std::int32_t k = 0; k < d_blocks_[g].columns; ++k, column += rows) {
+            Triple v{};
+            for (int i = 0; i < rows; ++i)
+                for (int l = 0; l < rows; ++l) v[i] += (*basis)[i][l] * column[l];
+            std::copy_n(v.begin(), rows, column);
+        }
+    }
+    e_rotated_ = e_value_;
+    for (const EBlock& block : e_blocks_) {
+        const auto row = static_cast<std::size_t>(block.row), column = static_cast<std::size_t>(block.column);
+        const int rows = groups_[row].rows, columns = groups_[column].rows;
+        double* values = e_rotated_.data() + block.value;
+        if (const Basis* basis = cones.basis(row)) {
+            for (int j = 0; j < columns; ++j) {
+                Triple v{};
+                for (int i = 0; i < rows; ++i)
+                    for (int l = 0; l < rows; ++l) v[i] += (*basis)[i][l] * values[j * rows + l];
+                std::copy_n(v.begin(), rows, values + j * rows);
+            }
+        }
+        if (const Basis* basis = cones.basis(column)) {
+            for (int i = 0; i < rows; ++i) {
+                Triple v{};
+                for (int j = 0; j < columns; ++j)
+                    for (int l = 0; l < columns; ++l) v[j] += (*basis)[j][l] * values[l * rows + i];
+                for (int j = 0; j < columns; ++j) values[j * rows + i] = v[j];
+            }
+        }
+    }
+}
+
+void KktSystem::factorize(const Complementarity& cones, const sdk::Vector& theta) {
+    rotate(cones);
+    theta_ = theta;
+    weight_ = (1.0 + theta.array()).sqrt().inverse();
+    while (true) {
+        ++factorizations_;
+        assemble(cones, theta);
+        if (factor_.factorize(matrix_)) return;
+        delta_ *= 10.0;
+        if (!definite_) rho_ = delta_;
+        if (!(delta_ <= largest_regularization))
+            throw sdk::NumericalFailure(
+                "the factorisation broke down for every regularisation up to 1e-4: E is not positive semidefinite, or "
+                "H is not");
+    }
+}
+
+void KktSystem::assemble(const Complementarity& cones, const sdk::Vector& theta) {
+    double* values = matrix_.valuePtr();
+    std::fill_n(values, matrix_.nonZeros(), 0.0);
+    for (std::size_t k = 0; k < h_place_.size(); ++k)
+        if (h_place_[k] >= 0) values[h_place_[k]] += system_->H.valuePtr()[k];
+    for (Eigen::Index j = 0; j < n_; ++j) values[matrix_.outerIndexPtr()[j]] += rho_;
+    if (form_ == Form::Normal) {
+        t_.assign(3 * groups_.size(), Triple{});
+        for (std::size_t g = 0; g < groups_.size(); ++g) {
+            const int rows = groups_[g].rows;
+            const Eigen::Map<const Eigen::MatrixXd> E(e_rotated_.data() + e_blocks_[g].value, rows, rows);
+            if (E.isZero(0.0)) {
+                for (int i = 0; i < rows; ++i) t_[3 * g + i][i] = 1.0 / (theta[groups_[g].first + i] + delta_);
+            } else {
+                Eigen::Matrix3d block = Eigen::Matrix3d::Identity();
+                block.topLeftCorner(rows, rows) = E;
+                for (int i = 0; i < rows; ++i) block(i, i) += theta[groups_[g].first + i] + delta_;
+                const Eigen::Matrix3d inverse = block.llt().solve(Eigen::Matrix3d::Identity());
+                for (int i = 0; i < rows; ++i)
+                    for (int j = 0; j < rows; ++j) t_[3 * g + i][j] = inverse(i, j);
+            }
+            add_normal_block(g);
+        }
+        return;
+    }
+    const double sign = form_ == Form::Augmented ? -1.0 : 1.0;
+    if (form_ == Form::Augmented)
+        for (std::size_t k = 0; k < d_place_.size(); ++k) values[d_place_[k]] += d_rotated_[k];
+    for (const EBlock& block : e_blocks_) {
+        const auto row = static_cast<std::size_t>(block.row), column = static_cast<std::size_t>(block.column);
+        const int rows = groups_[row].rows, columns = groups_[column].rows;
+        for (int j = 0; j < columns; ++j)
+            for (int i = 0; i < rows; ++i) {
+                if (row == column && i < j) continue;
+                const auto k = static_cast<std::size_t>(j * rows + i);
+                double value = e_rotated_[block.value + k];
+                if (row == column && i == j) value += theta[groups_[row].first + i] + delta_;
+                values[e_place_[block.place + k]] += sign * value;
+            }
+    }
+    static_cast<void>(cones);
+}
+
+// The lower triangle += D̂'_gᵀ T_g D̂'_g.
+void KktSystem::add_normal_block(std::size_t group) {
+    const DBlock& block = d_blocks_[group];
+    const int rows = groups_[group].rows;
+    const double* D = d_rotated_.data() + block.value;
+    const std::int32_t* place = d_place_.data() + block.place;
+    double* values = matrix_.valuePtr();
+    for (std::int32_t k = 0; k < block.columns; ++k) {
+        Triple weighted{};
+        for (int i = 0; i < rows; ++i)
+            for (int j = 0; j < rows; ++j) weighted[i] += t_[3 * group + i][j] * D[k * rows + j];
+        for (std::int32_t l = k; l < block.columns; ++l) {
+            double sum = 0.0;
+            for (int i = 0; i < rows; ++i) sum += D[l * rows + i] * weighted[i];
+            values[*place++] += sum;
+        }
+    }
+}
+
+void KktSystem::solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz) {
+    if (form_ == Form::Reduced) {
+        dx.resize(0);
+        dz = g;
+        factor_.solve(dz);
+        return;
+    }
+    if (form_ == Form::Augmented) {  // [Ĥ, D̂'ᵀ; D̂', −(Ê' + θ)] {δx; −δz} = {f; g}
+        stacked_.resize(n_ + m_);
+        stacked_ << f, g;
+        factor_.solve(stacked_);
+        dx = stacked_.head(n_);
+        dz = -stacked_.tail(m_);
+        return;
+    }
+    // (Ĥ + D̂'ᵀ T D̂') δx = f + D̂'ᵀ T g,  δz = T (g − D̂' δx)
+    dx = f;
+    const auto times_T = [this](std::size_t group, const Triple& v) {
+        Triple result{};
+        for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j) result[i] += t_[3 * group + i][j] * v[j];
+        return result;
+    };
+    for (std::size_t k = 0; k < groups_.size(); ++k) {
+        const int rows = groups_[k].rows;
+        Triple v{};
+        for (int i = 0; i < rows; ++i) v[i] = g[groups_[k].first + i];
+        v = times_T(k, v);
+        const double* D = d_rotated_.data() + d_blocks_[k].value;
+        for (std::int32_t c = 0; c < d_blocks_[k].columns; ++c, D += rows) {
+            double sum = 0.0;
+            for (int i = 0; i < rows; ++i) sum += D[i] * v[i];
+            dx[column_[d_blocks_[k].index + static_cast<std::size_t>(c)]] += sum;
+        }
+    }
+    factor_.solve(dx);
+    dz.resize(m_);
+    for (std::size_t k = 0; k < groups_.size(); ++k) {
+        const int rows = groups_[k].rows;
+        Triple v{};
+        for (int i = 0; i < rows; ++i) v[i] = g[groups_[k].first + i];
+        const double* D = d_rotated_.data() + d_blocks_[k].value;
+        for (std::int32_t c = 0; c < d_blocks_[k].columns; ++c, D += rows) {
+            const double value = dx[column_[d_blocks_[k].index + static_cast<std::size_t>(c)]];
+            for (int i = 0; i < rows; ++i) v[i] -= D[i] * value;
+        }
+        v = times_T(k, v);
+        for (int i = 0; i < rows; ++i) dz[groups_[k].first + i] = v[i];
+    }
+}
+
+double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx,
+                        sdk::Vector& dz) {
+    const auto norm = [this](const sdk::Vector& x, const sdk::Vector& z) {
+        return std::sqrt(x.squaredNorm() + z.cwiseProduct(weight_).squaredNorm());
+    };
+    const double size = norm(f, g);
+    dx.setZero(n_);
+    dz.setZero(m_);
+    if (!(size > 0.0)) return 0.0;
+    f_rest_ = f;
+    g_rest_ = g;
+    double rest = size;
+    for (int refinement = 0;; ++refinement) {
+        solve_once(f_rest_, g_rest_, correction_x_, correction_z_);
+        for (Eigen::Index i = 0; i < m_; ++i)
+            if (cones.is_held(i)) correction_z_[i] = 0.0;
+        dx += correction_x_;
+        dz += correction_z_;
+        unrotated_ = dz;
+        cones.from_eigenbasis(unrotated_);
+        f_rest_ = f;
+        product_.setZero(m_);
+        if (n_ > 0) {
+            f_rest_.noalias() -= system_->H * dx;
+            f_rest_.noalias() += system_->D.transpose() * unrotated_;
+            product_.noalias() += system_->D * dx;
+        }
+        if (system_->E.nonZeros() > 0) product_.noalias() += system_->E * unrotated_;
+        cones.to_eigenbasis(product_);
+        g_rest_ = g - product_ - theta_.cwiseProduct(dz);
+        for (Eigen::Index i = 0; i < m_; ++i)
+            if (cones.is_held(i)) g_rest_[i] = 0.0;
+        const double next = norm(f_rest_, g_rest_);
+        if (!(next < rest)) {
+            if (refinement > 0) {
+                dx -= correction_x_;
+                dz -= correction_z_;
+            }
+            return (refinement > 0 ? rest : next) / size;
+        }
+        const bool slow = next > 0.5 * rest;
+        rest = next;
+        if (rest <= 1e-13 * size || slow || refinement >= settings_.refinements) return rest / size;
+    }
+}
+
+}  // namespace delassus::ipm

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "interior_point.hpp"
+
+namespace {
+
+using delassus::sdk::choice_option;
+using delassus::sdk::integer_option;
+using delassus::sdk::real_option;
+
+constexpr const char* forms[] = {"auto", "normal", "augmented"};
+
+constexpr delassus_option options[] = {
+    choice_option("form", "auto", forms,
+                  "what is factored: H + D'T D, or the quasi-definite saddle point; auto: by the fill"),
+    real_option("step_fraction", "0.99", 0.5, 0.9999, "", "part of the way to the boundary that a step may take"),
+    real_option("regularization", "1e-12", 1e-15, 1e-4, "",
+                "static regularisation of the rows, relative to the diagonal of N; refinement removes its effect"),
+    integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
+    integer_option("stall_iterations", "15", 0, 1e9, "iterations",
+                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+};
+
+constexpr delassus::sdk::PluginInfo info{
+    .name = "ipm",
+    .version = "0.1.0",
+    .description = "primal-dual interior point method with Nesterov-Todd scaling and predictor-corrector steps",
+    .licence = "BSD-3-Clause AND MPL-2.0",
+    .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
+                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
+                    DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_H_SEMIDEFINITE | DELASSUS_CAN_REDUCED |
+                    DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
+};
+
+}  // namespace
+
+DELASSUS_SOLVER_PLUGIN(delassus::ipm::InteriorPoint, info, options)

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scaled_system.hpp"
+
+#include <cmath>
+
+#include "delassus/sdk/saddle_point.hpp"
+
+namespace delassus::ipm {
+
+std::vector<Group> groups_of(const sdk::ProblemView& problem) {
+    std::vector<Group> groups;
+    for (const delassus_cone& cone : problem.cones) {
+        if (cone.kind == DELASSUS_CONE_FRICTION) {
+            groups.push_back({cone.first_row, cone.rows});
+        } else {
+            for (std::int32_t i = 0; i < cone.rows; ++i) groups.push_back({cone.first_row + i, 1});
+        }
+    }
+    return groups;
+}
+
+void Scaling::analyze(const sdk::ProblemView& problem) {
+    definite_ = problem.n == 0 || !problem.needs_any(DELASSUS_CAN_H_SEMIDEFINITE);
+    if (definite_) operator_.analyze(problem);
+}
+
+void Scaling::factorize(const sdk::ProblemView& problem) {
+    h_ = sdk::magnitude_of_diagonal(problem);
+    if (definite_) {
+        operator_.factorize(problem);
+        diagonal_ = operator_.diagonal();
+        return;
+    }
+    diagonal_.setZero(problem.m);
+    for (Eigen::Index i = 0; i < problem.m; ++i) {
+        for (sdk::SparseRowsView::InnerIterator entry(problem.D, i); entry; ++entry)
+            diagonal_[i] += entry.value() * entry.value() / h_[entry.col()];
+        for (sdk::SparseRowsView::InnerIterator entry(problem.E, i); entry; ++entry)
+            if (entry.col() == i) diagonal_[i] += entry.value();
+    }
+}
+
+void Scaling::load(const sdk::ProblemView& problem) {
+    sdk::Vector r = problem.b;
+    if (definite_) {
+        r = operator_.free_velocity(problem);
+    } else {
+        r += problem.D * problem.a.cwiseQuotient(h_);
+    }
+    residual_ = sdk::NaturalResidual(problem, diagonal_, r);
+    double rho = residual_.reference();
+    if (problem.m == 0 && problem.n > 0)
+        if (const double size = problem.a.cwiseQuotient(h_.cwiseSqrt()).norm(); size > 0.0) rho = size;
+
+    const double positive = static_cast<double>((diagonal_.array() > 0.0).count());
+    const double mean = positive > 0.0 ? diagonal_.sum() / positive : 1.0;
+    sdk::Vector p(problem.m);
+    for (const delassus_cone& cone : problem.cones) {
+        const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
+        const double normal = friction && cone.mu > 0.0 ? 1.0 / cone.mu : 1.0;
+        double square = 0.0;
+        for (std::int32_t i = 0; i < cone.rows; ++i)
+            square += diagonal_[cone.first_row + i] * (i == 0 ? normal * normal : 1.0) / cone.rows;
+        for (std::int32_t i = 0; i < cone.rows; ++i) {
+            const double size = friction ? square : diagonal_[cone.first_row + i];
+            p[cone.first_row + i] = (i == 0 && friction ? normal : 1.0) / std::sqrt(size > 0.0 ? size : mean);
+        }
+    }
+    const sdk::Vector R = h_.cwiseSqrt().cwiseInverse();
+    system_.x_scale = rho * R;
+    system_.z_scale = rho * p;
+    system_.a = problem.a.cwiseProduct(R) / rho;
+    system_.b = problem.b.cwiseProduct(p) / rho;
+    system_.H = R.asDiagonal() * sdk::SparseColumns(problem.H) * R.asDiagonal();
+    system_.D = p.asDiagonal() * sdk::SparseRows(problem.D) * R.asDiagonal();
+    system_.E = p.asDiagonal() * sdk::SparseColumns(problem.E) * p.asDiagonal();
+}
+
+Scaling::Error Scaling::measure(const sdk::ProblemView& problem, sdk::Vector& x, const sdk::Vector& lambda) const {
+    Error error;
+    if (definite_) {
+        x = operator_.velocity(problem, lambda);
+    } else {
+        const sdk::Vector momentum = problem.H * x, impulse = problem.D.transpose() * lambda;
+        const double size = std::max({momentum.norm(), impulse.norm(), problem.a.norm()});
+        error.balance = (momentum - impulse - problem.a).norm() / (size > 0.0 ? size : 1.0);
+    }
+    if (problem.m == 0) return error;
+    sdk::Vector u = problem.b;
+    if (problem.n > 0) u.noalias() += problem.D * x;
+    if (problem.E.nonZeros() > 0) u.noalias() += problem.E * lambda;
+    error.natural = residual_.natural(lambda, u);
+    return error;
+}
+
+}  // namespace delassus::ipm

@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sparse_factor.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/OrderingMethods>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace delassus::ipm {
+
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+using Panel = Eigen::Map<Matrix>;
+
+/// The lower triangle of the matrix with its rows and columns at new positions, columns sorted.
+sdk::SparseColumns permute(const sdk::SparseColumns& lower, const std::vector<std::int32_t>& position) {
+    std::vector<std::int32_t> count(position.size(), 0);
+    const auto visit = [&](auto&& take) {
+        for (Eigen::Index j = 0; j < lower.cols(); ++j)
+            for (sdk::SparseColumns::InnerIterator entry(lower, j); entry; ++entry) {
+                const std::int32_t p = position[static_cast<std::size_t>(entry.row())];
+                const std::int32_t q = position[static_cast<std::size_t>(j)];
+                take(std::max(p, q), std::min(p, q));
+            }
+    };
+    visit([&](std::int32_t, std::int32_t column) { ++count[static_cast<std::size_t>(column)]; });
+    sdk::SparseColumns result(lower.rows(), lower.cols());
+    result.resizeNonZeros(lower.nonZeros());
+    std::fill_n(result.valuePtr(), lower.nonZeros(), 1.0);
+    std::int32_t* start = result.outerIndexPtr();
+    start[0] = 0;
+    for (std::size_t j = 0; j < count.size(); ++j) start[j + 1] = start[j] + count[j];
+    std::vector<std::int32_t> next(start, start + count.size());
+    visit([&](std::int32_t row, std::int32_t column) {
+        result.innerIndexPtr()[next[static_cast<std::size_t>(column)]++] = row;
+    });
+    for (std::size_t j = 0; j < count.size(); ++j)
+        std::sort(result.innerIndexPtr() + start[j], result.innerIndexPtr() + start[j + 1]);
+    return result;
+}
+
+/// The elimination tree (Liu 1986): parent of each column, −1 at a root.
+std::vector<std::int32_t> elimination_tree(const sdk::SparseColumns& lower) {
+    const auto n = static_cast<std::size_t>(lower.cols());
+    std::vector<std::int32_t> parent(n, -1), ancestor(n, -1);
+    const Eigen::SparseMatrix<double, Eigen::RowMajor, std::int32_t> rows = lower;
+    for (std::int32_t i = 0; i < lower.rows(); ++i) {
+        for (decltype(rows)::InnerIterator entry(rows, i); entry; ++entry) {
+            auto j = static_cast<std::int32_t>(entry.col());
+            while (j >= 0 && j < i) {
+                const std::int32_t next = ancestor[static_cast<std::size_t>(j)];
+                ancestor[static_cast<std::size_t>(j)] = i;
+                if (next < 0) parent[static_cast<std::size_t>(j)] = i;
+                j = next;
+            }
+        }
+    }
+    return parent;
+}
+
+/// New positions in which children come right before their parents.
+std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent) {
+    const auto n = static_cast<std::int32_t>(parent.size());
+    std::vector<std::int32_t> first_child(parent.size(), -1), sibling(parent.size(), -1), position(parent.size());
+    for (std::int32_t j = n - 1; j >= 0; --j) {
+        const std::int32_t p = parent[static_cast<std::size_t>(j)];
+        if (p < 0) continue;
+        sibling[static_cast<std::size_t>(j)] = first_child[static_cast<std::size_t>(p)];
+        first_child[static_cast<std::size_t>(p)] = j;
+    }
+    std::int32_t count = 0;
+    std::vector<std::int32_t> stack;
+    for (std::int32_t root = 0; root < n; ++root) {
+        if (parent[static_cast<std::size_t>(root)] >= 0) continue;
+        stack.push_back(root);
+        while (!stack.empty()) {
+            const auto j = static_cast<std::size_t>(stack.back());
+            if (const std::int32_t child = first_child[j]; child >= 0) {
+                first_child[j] = sibling[static_cast<std::size_t>(child)];
+                stack.push_back(child);
+            } else {
+                position[j] = count++;
+                stack.pop_back();
+            }
+        }
+    }
+    return position;
+}
+
+}  // namespace
+
+void SparseFactor::analyze(const sdk::SparseColumns& lower, Eigen::Index positive) {
+    size_ = lower.rows();
+    const auto n = static_cast<std::size_t>(size_);
+    position_.resize(n);
+    std::iota(position_.begin(), position_.end(), 0);
+    if (size_ > 0) {
+        Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, std::int32_t> order;
+        Eigen::AMDOrdering<std::int32_t>()(lower.selfadjointView<Eigen::Lower>(), order);
+        for (std::size_t k = 0; k < n; ++k)
+            position_[static_cast<std::size_t>(order.indices()[static_cast<Eigen::Index>(k)])] =
+                static_cast<std::int32_t>(k);
+    }
+    const std::vector<std::int32_t> parent = elimination_tree(permute(lower, position_));
+    const std::vector<std::int32_t> post = postorder(parent);
+    std::vector<std::int32_t> moved(n, -1);
+    for (std::size_t j = 0; j < n; ++j)
+        if (parent[j] >= 0) moved[static_cast<std::size_t>(post[j])] = post[static_cast<std::size_t>(parent[j])];
+    for (auto& p : position_) p = post[static_cast<std::size_t>(p)];
+    sign_.assign(n, 1.0);
+    for (std::size_t i = 0; i < n; ++i)
+        if (static_cast<Eigen::Index>(i) >= positive) sign_[static_cast<std::size_t>(position_[i])] = -1.0;
+    find_supernodes(permute(lower, position_), moved);
+    find_places(lower);
+}
+
+void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std::vector<std::int32_t>& parent) {
+    const auto n = static_cast<std::size_t>(size_);
+    // The pattern of each column of L: its own entries and those of its children below themselves.
+    std::vector<std::vector<std::int32_t>> pattern(n), children(n);
+    for (std::size_t j = 0; j < n; ++j)
+        if (parent[j] >= 0) children[static_cast<std::size_t>(parent[j])].push_back(static_cast<std::int32_t>(j));
+    std::vector<std::int32_t> mark(n, -1);
+    struct Run {
+        std::int32_t first, columns;
+        std::vector<std::int32_t> below;  // rows under the last column
+        double zeros;                     // stored without need
+    };
+    std::vector<Run> runs;
+    for (std::size_t j = 0; j < n; ++j) {
+        const auto column = static_cast<std::int32_t>(j);
+        std::vector<std::int32_t>& rows = pattern[j];
+        mark[j] = column;
+        const auto take = [&](std::int32_t i) {
+            if (i <= column || mark[static_cast<std::size_t>(i)] == column) return;
+            mark[static_cast<std::size_t>(i)] = column;
+            rows.push_back(i);
+        };
+        for (sdk::SparseColumns::InnerIterator entry(permuted, column); entry; ++entry)
+            take(static_cast<std::int32_t>(entry.row()));
+        for (const auto child : children[j]) {
+            for (const auto i : pattern[static_cast<std::size_t>(child)]) take(i);
+            pattern[static_cast<std::size_t>(child)] = {};
+        }
+        std::sort(rows.begin(), rows.end());
+        Run run{column, 1, rows, 0.0};
+        // The run before joins in if this column is its parent and few zeros are stored for it.
+        while (!runs.empty()) {
+            const Run& before = runs.back();
+            if (before.below.empty() || before.below.front() > column) break;
+            const double height = static_cast<double>(run.columns) + static_cast<double>(run.below.size());
+            const double extra = before.columns * (height - static_cast<double>(before.below.size()));
+            const double columns = before.columns + run.columns;
+            const double stored = columns * (columns + static_cast<double>(run.below.size()));
+            const double zeros = before.zeros + run.zeros + extra;
+            if (extra > 0.0 && !(zeros <= 0.1 * stored || (columns <= 12.0 && zeros <= 0.3 * stored))) break;
+            run = {before.first, before.columns + run.columns, std::move(run.below), zeros};
+            runs.pop_back();
+        }
+        runs.push_back(std::move(run));
+    }
+
+    nodes_.clear();
+    row_.clear();
+    entries_ = 0.0;
+    std::vector<std::int32_t> node_of(n);
+    for (const Run& run : runs) {
+        Supernode node;
+        node.first = run.first;
+        node.columns = run.columns;
+        node.height = run.columns + static_cast<std::int32_t>(run.below.size());
+        node.row = row_.size();
+        node.panel = static_cast<std::size_t>(entries_);
+        for (std::int32_t c = 0; c < run.columns; ++c) {
+            row_.push_back(run.first + c);
+            node_of[static_cast<std::size_t>(run.first + c)] = static_cast<std::int32_t>(nodes_.size());
+            if (sign_[static_cast<std::size_t>(run.first + c)] < 0.0) node.definite = false;
+        }
+        row_.insert(row_.end(), run.below.begin(), run.below.end());
+        entries_ += static_cast<double>(node.height) * node.columns;
+        nodes_.push_back(node);
+    }
+    for (Supernode& node : nodes_)
+        if (node.height > node.columns)
+            node.parent = node_of[static_cast<std::size_t>(row_[node.row + static_cast<std::size_t>(node.columns)])];
+}
+
+void SparseFactor::find_places(const sdk::SparseColumns& lower) {
+    const auto place = [this](const Supernode& node, std::int32_t row) {
+        const auto begin = row_.begin() + static_cast<std::ptrdiff_t>(node.row);
+        return static_cast<std::int32_t>(std::lower_bound(begin, begin + node.height, row) - begin);
+    };
+    place_in_parent_.assign(row_.size(), 0);
+    std::vector<std::size_t> node_of(static_cast<std::size_t>(size_));
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        const Supernode& node = nodes_[s];
+        for (std::int32_t c = 0; c < node.columns; ++c) node_of[static_cast<std::size_t>(node.first + c)] = s;
+        for (std::int32_t i = node.columns; i < node.height; ++i)
+            place_in_parent_[node.row + static_cast<std::size_t>(i)] =
+                place(nodes_[static_cast<std::size_t>(node.parent)], row_[node.row + static_cast<std::size_t>(i)]);
+    }
+    std::vector<std::vector<Entry>> entries(nodes_.size());
+    for (Eigen::Index j = 0; j < lower.cols(); ++j) {
+        for (std::int32_t k = lower.outerIndexPtr()[j]; k < lower.outerIndexPtr()[j + 1]; ++k) {
+            const std::int32_t p = position_[static_cast<std::size_t>(lower.innerIndexPtr()[k])];
+            const std::int32_t q = position_[static_cast<std::size_t>(j)];
+            const std::size_t s = node_of[static_cast<std::size_t>(std::min(p, q))];
+            const Supernode& node = nodes_[s];
+            const auto column = static_cast<std::size_t>(std::min(p, q) - node.first);
+            entries[s].push_back({k, column * static_cast<std::size_t>(node.height) +
+                                         static_cast<std::size_t>(place(node, std::max(p, q)))});
+        }
+    }
+    entry_.clear();
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        nodes_[s].entry = entry_.size();
+        entry_.insert(entry_.end(), entries[s].begin(), entries[s].end());
+    }
+}
+
+bool SparseFactor::factorize(const sdk::SparseColumns& lower) {
+    value_.assign(static_cast<std::size_t>(entries_), 0.0);
+    update_.resize(nodes_.size());
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        const Supernode& node = nodes_[s];
+        const std::size_t end = s + 1 < nodes_.size() ? nodes_[s + 1].entry : entry_.size();
+        for (std::size_t k = node.entry; k < end; ++k)
+            value_[node.panel + entry_[k].target] += lower.valuePtr()[entry_[k].source];
+    }
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        const Eigen::Index rest = nodes_[s].height - nodes_[s].columns;
+        if (update_[s].rows() != rest) update_[s].setZero(rest, rest);
+        if (!eliminate(s)) {
+            update_.clear();
+            return false;
+        }
+        if (rest > 0) add_update(s);
+    }
+    return true;
+}
+
+// Factors the panel [A11; A21] into L11, L21 = A21 L11⁻ᵀ S, and takes L21 S L21ᵀ from the update.
+bool SparseFactor::eliminate(std::size_t s) {
+    const Supernode& node = nodes_[s];
+    const Eigen::Index k = node.columns, rest = node.height - k;
+    Panel panel(value_.data() + node.panel, node.height, k);
+    auto top = panel.topRows(k);
+    auto bottom = panel.bottomRows(rest);
+    if (node.definite) {
+        if (k == 1) {
+            if (!(panel(0, 0) > 0.0) || !std::isfinite(panel(0, 0))) return false;
+            panel(0, 0) = std::sqrt(panel(0, 0));
+            bottom /= panel(0, 0);
+        } else {
+            Eigen::LLT<Eigen::Ref<Matrix>> factor(top);
+            if (factor.info() != Eigen::Success || !std::isfinite(top.diagonal().sum())) return false;
+            if (rest > 0) top.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(bottom);
+        }
+        if (rest > 0) update_[s].selfadjointView<Eigen::Lower>().rankUpdate(bottom, -1.0);
+        return true;
+    }
+    const Eigen::Map<const sdk::Vector> sign(sign_.data() + node.first, k);
+    for (Eigen::Index c = 0; c < k; ++c) {
+        const double pivot = sign[c] * panel(c, c);
+        if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
+        panel.col(c).tail(node.height - c) *= sign[c] / std::sqrt(pivot);
+        for (Eigen::Index j = c + 1; j < k; ++j)
+            panel.col(j).tail(node.height - j) -= sign[c] * panel(j, c) * panel.col(c).tail(node.height - j);
+    }
+    if (rest > 0) update_[s].triangularView<Eigen::Lower>() -= (bottom * sign.asDiagonal()) * bottom.transpose();
+    return true;
+}
+
+// Adds the update of a supernode to its parent's front, and frees it.
+void SparseFactor::add_update(std::size_t child) {
+    const Supernode& node = nodes_[child];
+    const auto p = static_cast<std::size_t>(node.parent);
+    const Supernode& parent = nodes_[p];
+    Matrix& update = update_[child];
+    const Eigen::Index rest = update.rows(), above = parent.height - parent.columns;
+    if (update_[p].rows() != above) update_[p].setZero(above, above);
+    const std::int32_t* place = place_in_parent_.data() + node.row + node.columns;
+    for (Eigen::Index j = 0; j < rest; ++j) {
+        if (place[j] < parent.columns) {
+            double* target = value_.data() + parent.panel +
+                             static_cast<std::size_t>(place[j]) * static_cast<std::size_t>(parent.height);
+            for (Eigen::Index i = j; i < rest; ++i) target[place[i]] += update(i, j);
+        } else {
+            double* target = update_[p].col(place[j] - parent.columns).data();
+            for (Eigen::Index i = j; i < rest; ++i) target[place[i] - parent.columns] += update(i, j);
+        }
+    }
+    update.resize(0, 0);
+}
+
+void SparseFactor::solve(sdk::Vector& v) {
+    work_.resize(size_);
+    for (Eigen::Index i = 0; i < size_; ++i) work_[position_[static_cast<std::size_t>(i)]] = v[i];
+    for (const Supernode& node : nodes_) {
+        const Eigen::Index k = node.columns, rest = node.height - k;
+        const Panel panel(value_.data() + node.panel, node.height, k);
+        auto own = work_.segment(node.first, k);
+        panel.topRows(k).triangularView<Eigen::Lower>().solveInPlace(own);
+        if (rest == 0) continue;
+        gathered_.noalias() = panel.bottomRows(rest) * own;
+        const std::int32_t* row = row_.data() + node.row + k;
+        for (Eigen::Index i = 0; i < rest; ++i) work_[row[i]] -= gathered_[i];
+    }
+    work_.array() *= Eigen::Map<const sdk::Vector>(sign_.data(), size_).array();
+    for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) {
+        const Eigen::Index k = node->columns, rest = node->height - k;
+        const Panel panel(value_.data() + node->panel, node->height, k);
+        auto own = work_.segment(node->first, k);
+        if (rest > 0) {
+            gathered_.resize(rest);
+            const std::int32_t* row = row_.data() + node->row + k;
+            for (Eigen::Index i = 0; i < rest; ++i) gathered_[i] = work_[row[i]];
+            own.noalias() -= panel.bottomRows(rest).transpose() * gathered_;
+        }
+        panel.topRows(k).triangularView<Eigen::Lower>().transpose().solveInPlace(own);
+    }
+    for (Eigen::Index i = 0; i < size_; ++i) v[i] = work_[position_[static_cast<std::size_t>(i)]];
+}
+
+}  // namespace delassus::ipm

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The interior point solver: known answers for every cone, its forms of the linear system, degenerate contacts,
+// problems without a solution, reuse, and honest claims on the shared contact problems.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "delassus/problem_files.hpp"
+#include "delassus/solver.hpp"
+#include "support/shared_problems.hpp"
+#include "support/small_problems.hpp"
+
+namespace delassus {
+namespace {
+
+using tests::diagonal_matrix;
+using tests::identity;
+using tests::point_on_plane;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+struct Result {
+    Solution solution;
+    SolveReport report;
+};
+
+Result solve(const Problem& problem, double tolerance, const OptionTexts& options = {},
+             const Solution* start = nullptr) {
+    const Registry registry;
+    Solver solver(registry.load("ipm"), options, &registry);
+    Result result;
+    SolveSettings settings;
+    settings.tolerance = tolerance;
+    if (start) {
+        settings.warm_start = true;
+        result.solution = *start;
+    }
+    result.report = solver.solve(PreparedProblem(problem), result.solution, settings);
+    return result;
+}
+
+void expect_answer(const Problem& problem, const std::vector<double>& x, const std::vector<double>& lambda,
+                   const OptionTexts& options = {}) {
+    const auto [solution, report] = solve(problem, 1e-11, options);
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    ASSERT_EQ(solution.x.size(), x.size());
+    ASSERT_EQ(solution.lambda.size(), lambda.size());
+    for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(solution.x[i], x[i], 1e-9) << "x " << i;
+    for (std::size_t i = 0; i < lambda.size(); ++i) EXPECT_NEAR(solution.lambda[i], lambda[i], 1e-9) << "λ " << i;
+}
+
+Problem one_row(double mass, double a, Cone cone) {
+    Problem problem;
+    problem.H = diagonal_matrix({mass});
+    problem.D = identity(1);
+    problem.a = {a};
+    problem.b = {0.0};
+    problem.cones = {std::move(cone)};
+    return problem;
+}
+
+TEST(Ipm, SolvesEachKindOfRow) {
+    expect_answer(tests::tied_masses(), {1.0, 1.0}, {-3.0});
+    expect_answer(one_row(2.0, -6.0, Cone::nonnegative(1)), {0.0}, {6.0});
+    expect_answer(one_row(2.0, 6.0, Cone::nonnegative(1)), {3.0}, {0.0});
+    expect_answer(one_row(2.0, 5.0, Cone::box({-1.0}, {2.0})), {2.0}, {-1.0});
+    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {2.0})), {-1.5}, {2.0});
+    expect_answer(one_row(2.0, 0.5, Cone::box({-1.0}, {2.0})), {0.0}, {-0.5});
+    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {infinity})), {0.0}, {5.0});
+    expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {2.0})), {0.0}, {-5.0});
+    expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {infinity})), {0.0}, {-5.0});
+    expect_answer(one_row(2.0, 5.0, Cone::box({1.0}, {1.0})), {3.0}, {1.0});
+}
+
+TEST(Ipm, SticksSlidesAndOpens) {
+    const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
+    expect_answer(point_on_plane(2.0, 6.0, 2.0, mu, Law::Associated), {0.0, 0.0, 0.0}, {6.0, -2.0, 0.0});
+    expect_answer(point_on_plane(2.0, 6.0, 5.0, mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0, 0.0},
+                  {s, -mu * s, 0.0});
+    expect_answer(point_on_plane(2.0, -6.0, 1.0, mu, Law::Associated), {3.0, 0.5, 0.0}, {0.0, 0.0, 0.0});
+    expect_answer(point_on_plane(2.0, 6.0, 5.0, 0.0, Law::Associated), {0.0, 2.5, 0.0}, {6.0, 0.0, 0.0});
+    Problem planar;
+    planar.H = diagonal_matrix({2.0, 2.0});
+    planar.D = identity(2);
+    planar.a = {-6.0, 5.0};
+    planar.b = {0.0, 0.0};
+    planar.cones = {Cone::friction(mu, 2)};
+    expect_answer(planar, {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0}, {s, -mu * s});
+}
+
+// λ and u both vanish: on the central path both are √τ, so that τ must fall to the square of the tolerance.
+TEST(Ipm, ReachesTheLastDigitsOfADegenerateContact) {
+    expect_answer(one_row(2.0, 0.0, Cone::nonnegative(1)), {0.0}, {0.0});
+    // Sliding is about to start, and another contact is just touched.
+    Problem problem = point_on_plane(1.0, 4.0, 2.0, 0.5, Law::Associated);
+    problem.H = diagonal_matrix({1.0, 1.0, 1.0, 1.0, 1.0, 1.0});
+    problem.D = identity(6);
+    problem.a.insert(problem.a.end(), {0.0, 0.0, 0.0});
+    problem.b.assign(6, 0.0);
+    problem.cones.push_back(Cone::friction(0.5));
+    const auto [solution, report] = solve(problem, 1e-12);
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    EXPECT_LE(report.error.natural, 1e-12);
+}
+
+TEST(Ipm, TheFormsOfTheLinearSystemAgree) {
+    Problem problem = point_on_plane(2.0, 6.0, 5.0, 0.5, Law::Associated);
+    const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
+    for (const char* form : {"auto", "normal", "augmented"})
+        expect_answer(problem, {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0, 0.0}, {s, -mu * s, 0.0}, {{"form", form}});
+    Problem reduced;
+    reduced.D = SparseMatrix::zero(3, 0);
+    reduced.E = diagonal_matrix({0.5, 0.5, 0.5});
+    reduced.b = {-3.0, 2.5, 0.0};
+    reduced.cones = problem.cones;
+    reduced.law = Law::Associated;
+    expect_answer(reduced, {}, {s, -mu * s, 0.0});
+}
+
+TEST(Ipm, ComplianceThatCouplesContacts) {
+    // u = (1 + E) λ + b with E coupling two nonnegative rows; both carry: λ = −(1 + E)⁻¹ b.
+    Problem problem;
+    problem.H = identity(2);
+    problem.D = identity(2);
+    problem.E = SparseMatrix::from_triplets(2, 2, {{0, 0, 1.0}, {0, 1, 0.5}, {1, 0, 0.5}, {1, 1, 1.0}});
+    problem.a = {0.0, 0.0};
+    problem.b = {-2.0, -2.0};
+    problem.cones = {Cone::nonnegative(2)};
+    expect_answer(problem, {0.8, 0.8}, {0.8, 0.8});
+}
+
+TEST(Ipm, SharesTheLoadOfRedundantRows) {
+    Problem problem = one_row(2.0, -6.0, Cone::nonnegative(3));
+    problem.D = SparseMatrix::from_triplets(3, 1, {{0, 0, 1.0}, {1, 0, 1.0}, {2, 0, 1.0}});
+    problem.b = {0.0, 0.0, 0.0};
+    expect_answer(problem, {0.0}, {2.0, 2.0, 2.0});  // the analytic centre of all splits
+}
+
+TEST(Ipm, TellsInfeasibleFromStalled) {
+    // A body between two walls that are nearer to each other than nothing: x ≥ 1 and −x ≥ 1.
+    Problem walls = one_row(1.0, 0.0, Cone::nonnegative(2));
+    walls.D = SparseMatrix::from_triplets(2, 1, {{0, 0, 1.0}, {1, 0, -1.0}});
+    walls.b = {-1.0, -1.0};
+    const auto squeezed = solve(walls, 1e-8).report;
+    EXPECT_EQ(squeezed.status, Status::Infeasible) << squeezed.message;
+    walls.b = {-1.0, 1.0};  // x = 1 is left
+    EXPECT_EQ(solve(walls, 1e-6).report.status, Status::Solved);
+
+    Problem tied = one_row(1.0, 0.0, Cone::free(2));
+    tied.D = SparseMatrix::from_triplets(2, 1, {{0, 0, 1.0}, {1, 0, 1.0}});
+    tied.b = {0.0, 1.0};
+    EXPECT_EQ(solve(tied, 1e-8).report.status, Status::Infeasible);
+
+    Problem floating = tests::tied_masses();
+    floating.H = SparseMatrix::from_triplets(2, 2, {{0, 0, 1.0}, {0, 1, -1.0}, {1, 0, -1.0}, {1, 1, 1.0}});
+    EXPECT_EQ(solve(floating, 1e-8).report.status, Status::Infeasible);  // nothing balances the total force of 4
+    floating.a = {4.0, -4.0};
+    EXPECT_EQ(solve(floating, 1e-8).report.status, Status::Solved);
+}
+
+TEST(Ipm, AnalysesOnceWhileThePatternStays) {
+    const Registry registry;
+    Solver solver(registry.load("ipm"), {}, &registry);
+    SolveSettings settings;
+    settings.tolerance = 1e-9;
+    for (const double mass : {1.0, 2.0, 3.0}) {
+        for (const double mu : {0.0, 0.5}) {
+            Solution solution;
+            const auto report =
+                solver.solve(PreparedProblem(point_on_plane(mass, 6.0, 5.0, mu, Law::Associated)), solution, settings);
+            EXPECT_EQ(report.status, Status::Solved);
+            EXPECT_EQ(report.analyses, 1);
+        }
+    }
+}
+
+TEST(Ipm, AWarmStartSavesIterations) {
+    const Problem problem = point_on_plane(2.0, 6.0, 5.0, 0.5, Law::Associated);
+    const auto cold = solve(problem, 1e-10);
+    EXPECT_EQ(solve(problem, 1e-10, {}, &cold.solution).report.iterations, 0);
+    Problem next = problem;
+    next.a[1] += 1e-5;
+    EXPECT_LT(solve(next, 1e-10, {}, &cold.solution).report.iterations, solve(next, 1e-10).report.iterations);
+}
+
+TEST(Ipm, RefusesTheExactCoulombLaw) {
+    const Registry registry;
+    const Solver solver(registry.load("ipm"), {}, &registry);
+    EXPECT_NE(solver.refusal(PreparedProblem(point_on_plane(1.0, 1.0, 1.0, 0.5, Law::Coulomb)), {}), "");
+}
+
+TEST(Ipm, ClaimsAreTrueOnTheSharedProblems) {
+    DELASSUS_REQUIRE_SHARED_PROBLEMS();
+    for (const auto& folder : tests::shared_problem_folders()) {
+        Problem problem = read_problem(folder);
+        problem.law = Law::Associated;
+        for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+            const auto report = solve(problem, tolerance).report;
+            EXPECT_EQ(report.status, Status::Solved)
+                << folder.filename() << " to " << tolerance << ": " << report.error.natural << ", " << report.message;
+            EXPECT_LE(report.error.natural, 1.001 * tolerance) << folder.filename();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace delassus
