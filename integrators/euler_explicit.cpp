@@ -32,6 +32,7 @@ public:
     }
 
     void restart() override {}
+    [[nodiscard]] int order() const override { return 1; }
 
 private:
     DynamicalSystem& system_;

@@ -16,7 +16,12 @@ namespace {
 //
 //     (M + h R + h² K) v⁺ − Dᵀ λ = (M + h R) v + h f(q, v, t⁺)
 //
-// It is consistent for any R and K, so that their symmetric parts do. Constraints at the end of the step, again to
+// It is consistent for any R and K, so that their symmetric parts do. The reactions turn with the bodies as well: with
+// those of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so H also has h² G.
+// It is what holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the pull P
+// at the arm l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1 on. Of G
+// the part without negative eigenvalues is taken (under pressure it has them), which keeps H definite for every solver;
+// what is left out is of the order of the method's own error. Constraints at the end of the step, again to
 // first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows with b = C(q, t⁺)/h. The part C(q, t)/h of
 // it is error of earlier steps; it is recovered with at most the speed η_s (seed footnote 5). A gap Φ ≥ 0 likewise:
 //
@@ -30,6 +35,7 @@ public:
           recovery_speed_(values[0].real),
           restitution_speed_(values[1].real),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
+          constraint_stiffness_(values[3].text == "definite"),
           blocks_(system.constraint_blocks()),
           n_(system.n()),
           m_(system.m()) {
@@ -52,19 +58,23 @@ public:
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         Solution solution{state.v, warm_start()};
-        solution.lambda.resize(problem.b.size());
-        std::vector<std::uint64_t> keys;
         report.solved = solver.solve(std::move(problem), solution, true);
         if (!report.solved) report.message = solver.effort().unsolved;
-        if (!std::all_of(solution.x.begin(), solution.x.end(), [](double value) { return std::isfinite(value); }))
-            throw StepFailure("the velocities of the step are not finite");
-
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution.x[i];
         system_.increment(state.q.data(), delta_.data(), end.q.data());
         end.v = solution.x;
+        require_finite(state, end, h, "euler_implicit_linearized");
+        report_reactions(state, solution.lambda, h, report);
         state = std::move(end);
         keep(solution.lambda, h);
         return report;
+    }
+
+    [[nodiscard]] int order() const override { return 1; }
+    [[nodiscard]] bool damps_at_once() const override { return true; }
+    [[nodiscard]] bool pushed(std::uint64_t key) const override {
+        const auto found = impulses_.find(key);
+        return found != impulses_.end() && found->second[0] > 0.0;
     }
 
     void restart() override {
@@ -115,12 +125,15 @@ private:
         system_.multiply_mass(state, 1.0, state.v.data(), problem.a.data());
         system_.add_force(end, h, problem.a.data());
         if (system_.has_stiffness()) {
-            system_.add_damping(end, h, tangent, H_);
-            system_.add_stiffness(end, h * h, tangent, H_);
             R_.begin(n_, n_);
             system_.add_damping(end, h, tangent, R_);
-            R_.finish().multiply_add(1.0, state.v.data(), problem.a.data());
+            const SparseMatrix& R = R_.finish();
+            R.multiply_add(1.0, state.v.data(), problem.a.data());
+            H_.add_matrix(R);
+            system_.add_stiffness(end, h * h, tangent, H_);
         }
+        if (constraint_stiffness_ && !multipliers_.empty())
+            system_.add_definite_constraint_stiffness(end, multipliers_.data(), h * h, H_);
         problem.H = H_.finish();
     }
 
@@ -160,24 +173,42 @@ private:
                 sorted.assign(first, last);
                 std::sort(sorted.begin(), sorted.end(),
                           [](const auto& a, const auto& b) { return a.column < b.column; });
-                double speed = rows_.rows()[row].rate;
                 for (const auto& entry : sorted) {
                     D.column.push_back(entry.column);
                     D.value.push_back(entry.value);
-                    speed += entry.value * state.v[static_cast<std::size_t>(entry.column)];
                 }
                 D.row_start.push_back(D.entries());
-                problem.b.push_back(offset(block, i, rows_.rows()[row], speed, h));
+                problem.b.push_back(offset(block, i, rows_.rows()[row], rows_.speed(row, state.v.data()), h));
             }
             problem.cones.push_back(std::move(cone));
         }
     }
 
+    // A contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed of Φ/h at
+    // least, also where its first speed was less. One that left and comes back within the step, as a ball that bounces
+    // low, does so about as fast.
+    void report_reactions(const State& begin, const std::vector<double>& lambda, double h, StepReport& report) const {
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            const double gap = std::max(rows_.rows()[row].gap, 0.0);
+            const double reaction = lambda[static_cast<std::size_t>(m_) + row];
+            const double approach = -rows_.speed(row, begin.v.data());
+            if (reaction != 0.0) ++report.active_blocks;
+            if (block.along_normal() && reaction > 0.0 && (approach < 0.0 || !pushed(block.key))) {
+                const double speed = std::max(std::abs(approach), gap / h);
+                if (speed > report.impact_speed) {
+                    report.impact_speed = speed;
+                    report.impact_time = approach < 0.0 ? h : gap / speed;
+                }
+            }
+            row += static_cast<std::size_t>(block.cone.rows);
+        }
+    }
+
     [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, const UnilateralRows::Row& row,
                                 double speed, double h) const {
-        const bool normal =
-            i == 0 && (block.cone.kind == ConeKind::Friction || block.cone.kind == ConeKind::Nonnegative);
-        if (normal && block.restitution > 0.0 && speed < -restitution_speed_ && row.gap + h * speed <= 0.0)
+        if (i == 0 && block.along_normal() && block.restitution > 0.0 && speed < -restitution_speed_ &&
+            row.gap + h * speed <= 0.0)
             return row.rate + block.restitution * speed;
         return row.rate + std::max(row.gap / h, -recovery_speed_);
     }
@@ -213,6 +244,7 @@ private:
     DynamicalSystem& system_;
     double recovery_speed_, restitution_speed_;
     bool exact_;
+    bool constraint_stiffness_;
     std::vector<std::int32_t> blocks_;
     std::int32_t n_, m_;
     MatrixAssembler H_, R_, D_;
@@ -225,30 +257,31 @@ private:
 const RegisterTimestepper row{
     {.name = "euler_implicit_linearized",
      .description = "linearised implicit Euler for contacts, impacts and constraints; one problem a step",
-     .options = {{.key = "recovery_speed",
-                  .type = DELASSUS_OPTION_REAL,
-                  .default_value = "inf",
-                  .minimum = 0.0,
-                  .maximum = HUGE_VAL,
-                  .choices = {},
-                  .unit = "m/s",
-                  .doc = "largest speed with which errors of position are corrected"},
-                 {.key = "restitution_speed",
-                  .type = DELASSUS_OPTION_REAL,
-                  .default_value = "0",
-                  .minimum = 0.0,
-                  .maximum = HUGE_VAL,
-                  .choices = {},
-                  .unit = "m/s",
-                  .doc = "contacts that close slower than this do not bounce"},
-                 {.key = "jacobian",
-                  .type = DELASSUS_OPTION_CHOICE,
-                  .default_value = "symmetric",
-                  .minimum = 0.0,
-                  .maximum = 0.0,
-                  .choices = {"symmetric", "exact"},
-                  .unit = "",
-                  .doc = "tangent of gyroscopic and follower forces; with contacts always symmetric"}},
+     .options =
+         {{.key = "recovery_speed",
+           .type = DELASSUS_OPTION_REAL,
+           .default_value = "inf",
+           .minimum = 0.0,
+           .maximum = HUGE_VAL,
+           .unit = "m/s",
+           .doc = "largest speed with which errors of position are corrected"},
+          {.key = "restitution_speed",
+           .type = DELASSUS_OPTION_REAL,
+           .default_value = "0",
+           .minimum = 0.0,
+           .maximum = HUGE_VAL,
+           .unit = "m/s",
+           .doc = "contacts that close slower than this do not bounce"},
+          {.key = "jacobian",
+           .type = DELASSUS_OPTION_CHOICE,
+           .default_value = "symmetric",
+           .choices = {"symmetric", "exact"},
+           .doc = "tangent of gyroscopic and follower forces; with contacts always symmetric"},
+          {.key = "constraint_stiffness",
+           .type = DELASSUS_OPTION_CHOICE,
+           .default_value = "definite",
+           .choices = {"definite", "none"},
+           .doc = "what keeps light bodies under heavy pull stable: the positive part of the reactions' stiffness"}},
      .constraints = true,
      .unilateral = true,
      .order = 1,

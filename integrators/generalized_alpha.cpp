@@ -30,8 +30,6 @@ const RegisterTimestepper row{
                           .default_value = "0.8",
                           .minimum = 0.0,
                           .maximum = 1.0,
-                          .choices = {},
-                          .unit = "",
                           .doc = "factor of the highest frequencies in a step; 0: gone at once, 1: no damping"}}),
      .constraints = true,
      .unilateral = false,

@@ -26,8 +26,6 @@ const RegisterTimestepper row{
                                  .default_value = "-0.1",
                                  .minimum = -1.0 / 3.0,
                                  .maximum = 0.0,
-                                 .choices = {},
-                                 .unit = "",
                                  .doc = "0: the trapezoidal rule; -1/3: the most damping"}}),
      .constraints = true,
      .unilateral = false,

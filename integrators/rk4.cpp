@@ -37,6 +37,7 @@ public:
     }
 
     void restart() override {}
+    [[nodiscard]] int order() const override { return 4; }
 
 private:
     struct Slope {

@@ -49,8 +49,10 @@ public:
         for (const auto& simulation : simulations_) steps += simulation.record().step;
         const double rate = (now - start_) / seconds_since(begin_);
         const std::string left = rate > 0.0 ? fmt::format("{:.0f} s left", (all - now) / rate) : std::string();
-        fmt::print(stderr, "\r  {:3.0f} %  t = {:.4g} s  {} steps  {} contacts  {:12}", 100.0 * part,
-                   simulations_[0].state().t, steps, simulations_[0].record().contacts, left);
+        const auto& first = simulations_[0];
+        const std::string size = first.system().control ? fmt::format(" of {:.1e} s", first.record().h) : std::string();
+        fmt::print(stderr, "\r  {:3.0f} %  t = {:.4g} s  {} steps{}  {} contacts  {:12}", 100.0 * part,
+                   simulations_[0].state().t, steps, size, simulations_[0].record().contacts, left);
         written_ = true;
     }
     void clear() {
@@ -133,6 +135,9 @@ void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outco
         const auto& totals = simulation.totals();
         fmt::print("{}: {} steps of {} to t = {:.6g} s in {:.3g} s\n", system.name, simulation.record().step,
                    system.integrator, simulation.state().t, totals.seconds);
+        if (system.control)
+            fmt::print("  steps from {:.2e} to {:.2e} s, {} trials rejected, {} impacts\n", totals.smallest_step,
+                       totals.largest_step, totals.rejected, totals.impacts);
         if (std::isfinite(totals.energy))
             fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
         fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,

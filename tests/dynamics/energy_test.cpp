@@ -2,6 +2,8 @@
 // Energy of linear systems, from hω = 0.01 to 1e8 (h = 1). Two modes, ω and ω/2, that both coordinates share.
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "support/order.hpp"
 #include "support/systems/linear_oscillators.hpp"
 
@@ -95,6 +97,51 @@ TEST(Energy, OfStiffModesFallsByTheFactorChosen) {
             const double rate = std::pow(system.energy(run[90]) / system.energy(run[45]), 1.0 / 90.0);
             EXPECT_NEAR(rate, damped.rho, 0.03) << damped.method << " at " << omega;
         }
+}
+
+// What never grows with the generalised-α form (docs/integrators.md, "Energy of stiff linear systems"): with
+// r = M (a − v̇), δ = ½ − α_f, g = α_f − α_m and b = β − γ/2 = g²/4,
+//     E + ½ b h² aᵀM a + δ/(2g) rᵀK⁻¹ r
+TEST(Energy, WithItsAlgorithmicTermsNeverGrowsWithGeneralizedAlpha) {
+    struct Method {
+        std::string name;
+        OptionTexts options;
+        double delta, g;
+    };
+    const auto alpha = [](const char* text, double rho) {
+        return Method{
+            "generalized_alpha", {{"rho_infinity", text}}, 0.5 * (1.0 - rho) / (1.0 + rho), (1.0 - rho) / (1.0 + rho)};
+    };
+    const auto hht = [](const char* text, double value) {
+        return Method{"hht", {{"alpha", text}}, 0.5 + value, -value};
+    };
+    for (const auto& method : {alpha("0", 0.0), alpha("0.5", 0.5), alpha("0.8", 0.8), alpha("0.95", 0.95),
+                               hht("-0.05", -0.05), hht("-0.1", -0.1), hht("-0.3", -0.3)})
+        for (const double omega : frequencies)
+            for (const auto& start : starts(omega)) {
+                LinearOscillators system(omega, 0.5 * omega, start);
+                const Eigen::LDLT<Eigen::Matrix2d> K(system.stiffness());
+                const Registry registry;
+                StepSolver solver(registry, {});
+                const auto stepper = make_timestepper(method.name, system, method.options);
+                State state = start;
+                Eigen::Vector2d a = -system.stiffness() * Eigen::Map<const Eigen::Vector2d>(start.q.data());
+                Eigen::Vector2d r = Eigen::Vector2d::Zero();
+                const auto extended = [&] {
+                    return system.energy(state) + 0.125 * method.g * method.g * a.squaredNorm() +
+                           0.5 * method.delta / method.g * r.dot(K.solve(r));
+                };
+                double before = extended();
+                for (int step = 0; step < 100 && before > 1e-150; ++step) {
+                    stepper->step(state, 1.0, solver);
+                    const auto memory = stepper->save();  // 1, v̇, a, …
+                    a = Eigen::Vector2d(memory[3], memory[4]);
+                    r = a - Eigen::Vector2d(memory[1], memory[2]);
+                    const double now = extended();
+                    ASSERT_LE(now, before * (1.0 + 1e-9)) << method.name << " at " << omega << ", step " << step;
+                    before = now;
+                }
+            }
 }
 
 // Moving through equilibrium there is nothing to overshoot.

@@ -49,6 +49,11 @@ public:
         Cone cone;                 ///< for a box, bounds of the force (N, Nm); a stepper multiplies by h
         double restitution = 0.0;  /// e in [0, 1] of Newton's law u_n⁺ ≥ −e u_n⁻; normal row of a contact
         std::uint64_t key = 0;     ///< the same constraint has the same key in the next step: for warm starts
+
+        /// Whether its first row is the distance of two things that cannot meet.
+        [[nodiscard]] bool along_normal() const {
+            return cone.kind == ConeKind::Friction || cone.kind == ConeKind::Nonnegative;
+        }
     };
     struct Row {
         double gap = 0.0;   ///< position-level value Φ of the row, 0 for tangential and box rows
@@ -72,6 +77,9 @@ public:
     [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
     /// rows() + 1 positions in entries().
     [[nodiscard]] const std::vector<std::int32_t>& row_start() const { return row_start_; }
+
+    /// D_A v + rate of a row; v: of the system's n.
+    [[nodiscard]] DELASSUS_API double speed(std::size_t row, const double* v) const;
 
 private:
     std::vector<Block> blocks_;
@@ -135,6 +143,10 @@ public:
     /// H += factor · ∂(C_qᵀ λ)/∂q for fixed λ; m. Default: nothing.
     virtual void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
                                           MatrixAssembler& H) const;
+    /// H += factor · G with factor > 0 and G what is positive semidefinite in −∂(C_qᵀ λ)/∂q: its symmetric part without
+    /// the negative eigenvalues, joint by joint or in whatever parts a system has. Default: nothing.
+    virtual void add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
+                                                   MatrixAssembler& H) const;
 
     // ---- Contacts, stops, bounded motors; nothing by default ----
 

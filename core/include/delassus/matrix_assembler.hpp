@@ -42,6 +42,9 @@ public:
             for (std::int32_t j = 0; j < columns; ++j) add(row + i, column + j, factor * block[i * columns + j]);
     }
 
+    /// Adds factor · matrix, of the size of this one.
+    DELASSUS_API void add_matrix(const SparseMatrix& matrix, double factor = 1.0);
+
     /// The matrix; valid until the next begin(). Throws InputError if a place lies outside.
     [[nodiscard]] DELASSUS_API const SparseMatrix& finish();
 

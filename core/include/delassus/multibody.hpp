@@ -254,6 +254,8 @@ public:
     void constraint_curvature(const State& state, double* c) const override;
     void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
                                   MatrixAssembler& H) const override;
+    void add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
+                                           MatrixAssembler& H) const override;
     [[nodiscard]] bool has_unilateral() const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
     [[nodiscard]] double energy(const State& state) const override;

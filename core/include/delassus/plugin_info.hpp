@@ -16,12 +16,12 @@ namespace delassus {
 
 /// One row of a plugin's option table; see delassus_option.
 struct OptionInfo {
-    std::string key;
+    std::string key{};
     delassus_option_type type = DELASSUS_OPTION_TEXT;
-    std::string default_value;
+    std::string default_value{};
     double minimum = 0.0, maximum = 0.0;
-    std::vector<std::string> choices;
-    std::string unit, doc;
+    std::vector<std::string> choices{};
+    std::string unit{}, doc{};
 
     /// "real in [0, 2]", "one of a, b": for messages, help and docs.
     [[nodiscard]] DELASSUS_API std::string domain() const;

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "delassus/adaptive_stepping.hpp"
 #include "delassus/config.hpp"
 #include "delassus/export.hpp"
 #include "delassus/multibody.hpp"
@@ -42,9 +43,10 @@ struct SceneSystem {
 
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
-    SolverConfig solver;  ///< an empty name: by need
-    double step = 0.0;    ///< s, > 0
-    double end = 0.0;     ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
+    SolverConfig solver;                 ///< an empty name: by need
+    double step = 0.0;                   ///< s, > 0; with `control` the first that is tried
+    std::optional<StepControl> control;  ///< steps follow from a tolerance; none: all are `step` long
+    double end = 0.0;                    ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
     // What a plan and a report name things by.
     std::vector<BodyParameters> bodies;  ///< by BodyIndex
@@ -76,7 +78,8 @@ struct SceneOverrides {
     std::vector<std::pair<std::string, std::string>> values;
     std::string solver;               ///< "name" or "name(key=value,…)" for every system; empty: the file's
     std::string integrator;           ///< likewise
-    std::optional<double> step, end;  ///< s, for every system
+    std::optional<double> step, end;  ///< s, for every system; a step takes the place of a tolerance
+    std::optional<double> tolerance;  ///< for every system, in place of a fixed step
 };
 
 /// Reads the whole scene and builds its systems. Throws InputError with file, line, key and the nearest valid key.

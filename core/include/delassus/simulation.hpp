@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "delassus/adaptive_stepping.hpp"
 #include "delassus/export.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/scene.hpp"
@@ -27,9 +28,12 @@ struct StepRecord {
     std::int64_t contacts = 0;   ///< and other unilateral blocks in the problem
     std::int64_t newton_iterations = 0;
     std::int64_t solver_iterations = 0;
-    double natural = 0.0;  ///< largest natural error of the step's solves by a plugin
-    double seconds = 0.0;  ///< of wall time, everything included
-    bool solved = true;    ///< every solve reached its tolerance
+    double natural = 0.0;       ///< largest natural error of the step's solves by a plugin
+    double h = 0.0;             ///< size of the step, s
+    std::int64_t rejected = 0;  ///< trials of the step control that were thrown away
+    bool impact = false;        ///< a short step of the step control, for a contact that closed
+    double seconds = 0.0;       ///< of wall time, everything included
+    bool solved = true;         ///< every solve reached its tolerance
 };
 
 /// Sums and extremes since the start.
@@ -38,6 +42,8 @@ struct SimulationTotals {
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
     std::int64_t most_contacts = 0;
     std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
+    double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
+    std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;
     std::int64_t unsolved_steps = 0;  ///< steps with a solve that missed its tolerance
     std::string first_unsolved;       ///< when and why the first did
@@ -47,7 +53,8 @@ struct SimulationTotals {
 struct SimulationState {
     std::int64_t step = 0;
     State state;
-    std::vector<double> memory;  ///< Timestepper::save(), warm starts included
+    std::vector<double> memory;   ///< Timestepper::save(), warm starts included
+    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps
     SimulationTotals totals;
 };
 
@@ -59,7 +66,7 @@ public:
     DELASSUS_API ~Simulation();
     Simulation(Simulation&&) noexcept = default;
 
-    /// Whether `end` is reached. The last step is shorter where `end` is no multiple of the step.
+    /// Whether `end` is reached. The last step is shorter where `end` is no multiple of a fixed step.
     [[nodiscard]] DELASSUS_API bool finished() const;
 
     /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence; everything is then
@@ -79,10 +86,12 @@ public:
 
 private:
     void measure();
+    AdaptiveStepReport advance(State& state);
 
     SceneSystem* system_;
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Timestepper> timestepper_;
+    std::unique_ptr<AdaptiveStepping> control_;  // empty with fixed steps
     SimulationState now_;
     StepRecord record_;
     std::vector<double> constraint_;

@@ -20,8 +20,12 @@ namespace delassus {
 struct StepReport {
     std::int32_t newton_iterations = 0;  ///< linear or cone problems solved
     std::int32_t unilateral_blocks = 0;  ///< contacts and other unilateral blocks that were in the problem
+    std::int32_t active_blocks = 0;      ///< of these, blocks with a reaction
     bool solved = true;                  ///< false if the step rests on a solve that missed its tolerance; it is taken
     std::string message;                 ///< why not
+    // Of the fastest contact or stop that closed: it pushed in this step, and not in the one before.
+    double impact_speed = 0.0;  ///< with which it closed, in its unit a second; 0: none
+    double impact_time = 0.0;   ///< when, after the beginning of the step
 };
 
 /// A step that cannot be taken: Newton's method does not converge, a state is not finite. The state is as before it.
@@ -42,6 +46,14 @@ public:
     /// Forgets what was kept from step to step: call it when the state was changed from outside.
     virtual void restart() = 0;
 
+    /// Order of convergence for smooth systems, with the options chosen.
+    [[nodiscard]] virtual int order() const = 0;
+    /// Whether a motion of infinite frequency is gone after a step: then results of different steps may be
+    /// extrapolated.
+    [[nodiscard]] virtual bool damps_at_once() const { return false; }
+    /// Whether the unilateral block with this key pushed in the last step.
+    [[nodiscard]] virtual bool pushed(std::uint64_t) const { return false; }
+
     /// Reaction forces λ of the bilateral constraints at the end of the last step; m. Empty before the first step.
     [[nodiscard]] const std::vector<double>& multipliers() const { return multipliers_; }
 
@@ -60,7 +72,7 @@ struct TimestepperInfo {
     std::vector<OptionInfo> options;
     bool constraints = false;  ///< takes bilateral constraints
     bool unilateral = false;   ///< takes contacts, stops and bounded motors
-    int order = 1;             ///< of convergence, for smooth systems
+    int order = 1;             ///< of convergence, for smooth systems and the default options
     /// system outlives the stepper; the values are checked, one for each option.
     std::unique_ptr<Timestepper> (*make)(DynamicalSystem& system, const std::vector<OptionValue>& values) = nullptr;
 };

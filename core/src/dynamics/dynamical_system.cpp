@@ -32,6 +32,15 @@ void UnilateralRows::end_block(Cone cone, std::uint64_t key, double restitution)
     blocks_.push_back({std::move(cone), restitution, key});
 }
 
+double UnilateralRows::speed(std::size_t row, const double* v) const {
+    double speed = rows_[row].rate;
+    for (auto e = row_start_[row]; e < row_start_[row + 1]; ++e) {
+        const Entry& entry = entries_[static_cast<std::size_t>(e)];
+        speed += entry.value * v[entry.column];
+    }
+    return speed;
+}
+
 DynamicalSystem::~DynamicalSystem() = default;
 
 std::int32_t DynamicalSystem::position_size() const {
@@ -71,6 +80,7 @@ void DynamicalSystem::constraint_curvature(const State&, double* c) const {
     std::fill_n(c, m(), 0.0);
 }
 void DynamicalSystem::add_constraint_stiffness(const State&, const double*, double, Tangent, MatrixAssembler&) const {}
+void DynamicalSystem::add_definite_constraint_stiffness(const State&, const double*, double, MatrixAssembler&) const {}
 
 bool DynamicalSystem::has_unilateral() const {
     return false;

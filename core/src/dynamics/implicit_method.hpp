@@ -2,6 +2,8 @@
 // The implicit one-step methods of integrators/ have one form, and differ in six numbers (internal).
 #pragma once
 
+#include <cmath>
+
 #include "dynamics/newton.hpp"
 
 namespace delassus {
@@ -28,6 +30,13 @@ struct ImplicitCoefficients {
     [[nodiscard]] bool remembers() const {
         return position_old != 0.0 || velocity_old != 0.0 || alpha_m != 0.0 || alpha_f != 0.0;
     }
+
+    /// 2 if γ = ½ + α_f − α_m and positions are of order 2 in themselves, else 1.
+    [[nodiscard]] int order() const {
+        const bool second = std::abs(velocity_new - 0.5 - alpha_f + alpha_m) < 1e-12 &&
+                            std::abs(position_old + position_new - 0.5) < 1e-12;
+        return second ? 2 : 1;
+    }
 };
 
 class ImplicitMethod : public Timestepper {
@@ -37,6 +46,9 @@ public:
 
     StepReport step(State& state, double h, StepSolver& solver) override;
     void restart() override;
+    [[nodiscard]] int order() const override { return c_.order(); }
+    /// Of these methods, only implicit Euler remembers nothing.
+    [[nodiscard]] bool damps_at_once() const override { return !c_.remembers(); }
     [[nodiscard]] std::vector<double> save() const override;
     void load(const std::vector<double>& memory) override;
 

@@ -17,6 +17,13 @@ void MatrixAssembler::begin(std::int32_t rows, std::int32_t columns) {
     count_ = 0;
 }
 
+void MatrixAssembler::add_matrix(const SparseMatrix& matrix, double factor) {
+    for (std::int32_t row = 0; row < matrix.rows; ++row)
+        for (auto e = matrix.row_start[static_cast<std::size_t>(row)];
+             e < matrix.row_start[static_cast<std::size_t>(row) + 1]; ++e)
+            add(row, matrix.column[static_cast<std::size_t>(e)], factor * matrix.value[static_cast<std::size_t>(e)]);
+}
+
 const SparseMatrix& MatrixAssembler::finish() {
     if (repeats_ && count_ == slot_.size()) {
         std::fill(matrix_.value.begin(), matrix_.value.end(), 0.0);

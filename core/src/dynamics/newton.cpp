@@ -332,10 +332,7 @@ OptionInfo jacobian_option(std::string default_value) {
     return {.key = "jacobian",
             .type = DELASSUS_OPTION_CHOICE,
             .default_value = std::move(default_value),
-            .minimum = 0.0,
-            .maximum = 0.0,
             .choices = {"symmetric", "exact"},
-            .unit = "",
             .doc = "matrix of Newton's method: the derivative, or its symmetric part, which more solvers take"};
 }
 
@@ -345,26 +342,19 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
         {.key = "reuse",
          .type = DELASSUS_OPTION_CHOICE,
          .default_value = "full",
-         .minimum = 0.0,
-         .maximum = 0.0,
          .choices = {"full", "modified", "adaptive"},
-         .unit = "",
          .doc = "a new matrix in every iteration, once a step, or when the residual falls too slowly"},
         {.key = "newton_tolerance",
          .type = DELASSUS_OPTION_REAL,
          .default_value = "1e-10",
          .minimum = 0.0,
          .maximum = 0.1,
-         .choices = {},
-         .unit = "",
          .doc = "residual and remaining increment, relative to the way that the step goes (docs/integrators.md)"},
         {.key = "max_newton_iterations",
          .type = DELASSUS_OPTION_INTEGER,
          .default_value = "20",
          .minimum = 1.0,
          .maximum = 1e6,
-         .choices = {},
-         .unit = "",
          .doc = "linear problems in a step before it fails"}};
     options.insert(options.end(), own.begin(), own.end());
     return options;

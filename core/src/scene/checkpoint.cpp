@@ -45,7 +45,10 @@ std::vector<double> numbers(const Json& json) {
 
 Json json_of(const SimulationTotals& totals) {
     return {{"reals", bits({totals.start_energy, totals.energy, totals.worst_drift, totals.worst_penetration,
-                            totals.worst_natural, totals.seconds, totals.solver_seconds})},
+                            totals.worst_natural, totals.seconds, totals.solver_seconds, totals.smallest_step,
+                            totals.largest_step})},
+            {"rejected", totals.rejected},
+            {"impacts", totals.impacts},
             {"most_contacts", totals.most_contacts},
             {"newton_iterations", totals.newton_iterations},
             {"solver_iterations", totals.solver_iterations},
@@ -57,7 +60,7 @@ Json json_of(const SimulationTotals& totals) {
 SimulationTotals totals_of(const Json& json) {
     SimulationTotals totals;
     const auto reals = numbers(json.at("reals"));
-    if (reals.size() != 7) throw InputError("the totals are not complete");
+    if (reals.size() != 9) throw InputError("the totals are not complete");
     totals.start_energy = reals[0];
     totals.energy = reals[1];
     totals.worst_drift = reals[2];
@@ -65,6 +68,10 @@ SimulationTotals totals_of(const Json& json) {
     totals.worst_natural = reals[4];
     totals.seconds = reals[5];
     totals.solver_seconds = reals[6];
+    totals.smallest_step = reals[7];
+    totals.largest_step = reals[8];
+    json.at("rejected").get_to(totals.rejected);
+    json.at("impacts").get_to(totals.impacts);
     json.at("most_contacts").get_to(totals.most_contacts);
     json.at("newton_iterations").get_to(totals.newton_iterations);
     json.at("solver_iterations").get_to(totals.solver_iterations);
@@ -87,6 +94,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"q", bits(simulation.state.q)},
                                    {"v", bits(simulation.state.v)},
                                    {"memory", bits(simulation.memory)},
+                                   {"control", bits(simulation.control)},
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)}});
     }
@@ -109,6 +117,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             if (t.size() != 1) throw InputError("it holds no time");
             system.simulation.state = {t[0], numbers(one.at("q")), numbers(one.at("v"))};
             system.simulation.memory = numbers(one.at("memory"));
+            system.simulation.control = numbers(one.at("control"));
             system.simulation.totals = totals_of(one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             checkpoint.systems.push_back(std::move(system));

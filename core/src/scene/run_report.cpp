@@ -41,9 +41,16 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
              {"solvers_loaded", simulation.solver().loaded()},
              {"velocities", velocities},
              {"constraints", system.system->m()},
-             {"step", system.step},
+             {"step", system.control ? Json(nullptr) : Json(system.step)},
+             {"tolerance", system.control
+                               ? Json{{"absolute", system.control->absolute}, {"relative", system.control->relative}}
+                               : Json(nullptr)},
              {"end", system.end},
              {"steps", simulation.record().step},
+             {"rejected", totals.rejected},
+             {"impacts", totals.impacts},
+             {"smallest_step", totals.smallest_step},
+             {"largest_step", totals.largest_step},
              {"t", simulation.state().t},
              {"energy", {{"start", json_number(totals.start_energy)}, {"end", json_number(totals.energy)}}},
              {"worst",

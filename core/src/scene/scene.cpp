@@ -51,7 +51,7 @@ void apply(const SceneOverrides& overrides, SceneSystem& system) {
     }
 }
 
-/// Step and end from the command line, put where the file would have them.
+/// Step, tolerance and end from the command line, put where the file would have them.
 void put_times(const SceneOverrides& overrides, Source& source, YAML::Node map) {
     if (!map.IsMap()) return;  // refused when it is read
     const auto put = [&](const char* key, const std::optional<double>& value) {
@@ -60,7 +60,12 @@ void put_times(const SceneOverrides& overrides, Source& source, YAML::Node map) 
         source.comes_from(node, fmt::format("--{} {}", key, *value));
         map[key] = node;
     };
+    if (overrides.step && overrides.tolerance)
+        throw InputError("--step is for fixed steps, --tolerance for steps that follow from it; give one of them");
+    if (overrides.step) map.remove("tolerance");
+    if (overrides.tolerance && map["step"].IsDefined() && map["step"].IsScalar()) map.remove("step");
     put("step", overrides.step);
+    put("tolerance", overrides.tolerance);
     put("end", overrides.end);
 }
 

@@ -29,6 +29,8 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         // Checked here without loading the plugin, which may never be needed.
         if (!system.solver.name.empty()) check_solver(registry, system.solver);
         timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
+        if (system.control)
+            control_ = std::make_unique<AdaptiveStepping>(*system.system, *timestepper_, *system.control);
     } catch (const InputError& error) {
         throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));
     } catch (const Unsupported& error) {
@@ -44,7 +46,18 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
 Simulation::~Simulation() = default;
 
 bool Simulation::finished() const {
-    return system_->end - now_.state.t <= rounding_of_step * system_->step;
+    // The last of steps that are chosen ends at `end` itself.
+    return system_->end - now_.state.t <= (control_ ? 0.0 : rounding_of_step * system_->step);
+}
+
+AdaptiveStepReport Simulation::advance(State& state) {
+    if (control_) return control_->step(state, system_->end, *solver_);
+    // A whole step unless the end comes sooner: a run that is ended here or goes on later takes the same steps.
+    const double remaining = system_->end - state.t;
+    AdaptiveStepReport report;
+    report.h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
+    report.step = timestepper_->step(state, report.h, *solver_);
+    return report;
 }
 
 void Simulation::measure() {
@@ -63,22 +76,19 @@ void Simulation::measure() {
 
 const StepRecord& Simulation::step() {
     const auto begin = Clock::now();
-    // A whole step unless the end comes sooner: a run that is ended here or goes on later takes the same steps.
-    const double remaining = system_->end - now_.state.t;
-    const double h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
     const auto where = [&] {
         return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
     };
     State next = now_.state;
     const std::vector<double> memory = timestepper_->save();
-    StepReport report;
+    AdaptiveStepReport taken;
     solver_->reset_effort();
     const auto undo = [&] {
         timestepper_->restart();
         timestepper_->load(memory);
     };
     try {
-        report = timestepper_->step(next, h, *solver_);
+        taken = advance(next);
         if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
     } catch (const Unsupported& error) {
         undo();
@@ -90,6 +100,7 @@ const StepRecord& Simulation::step() {
         undo();
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
     }
+    const StepReport& report = taken.step;
     const std::string place = where();
     now_.state = std::move(next);
     ++now_.step;
@@ -103,6 +114,9 @@ const StepRecord& Simulation::step() {
     record_.solver_iterations = effort.iterations;
     record_.natural = effort.worst_natural;
     record_.solved = report.solved;
+    record_.h = taken.h;
+    record_.rejected = taken.rejected;
+    record_.impact = taken.impact;
     measure();
     record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
@@ -111,6 +125,12 @@ const StepRecord& Simulation::step() {
     totals.worst_drift = std::max(totals.worst_drift, record_.drift);
     totals.worst_penetration = std::max(totals.worst_penetration, record_.penetration);
     totals.worst_natural = std::max(totals.worst_natural, record_.natural);
+    if (!taken.impact) {
+        totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
+        totals.largest_step = std::max(totals.largest_step, taken.h);
+    }
+    totals.rejected += taken.rejected;
+    totals.impacts += taken.impact ? 1 : 0;
     totals.most_contacts = std::max(totals.most_contacts, record_.contacts);
     totals.newton_iterations += record_.newton_iterations;
     totals.solver_iterations += record_.solver_iterations;
@@ -127,6 +147,7 @@ const StepRecord& Simulation::step() {
 SimulationState Simulation::save() const {
     SimulationState result = now_;
     result.memory = timestepper_->save();
+    if (control_) result.control = control_->save();
     return result;
 }
 
@@ -138,8 +159,10 @@ void Simulation::load(SimulationState state) {
             system_->name, state.state.q.size(), state.state.v.size(), now_.state.q.size(), now_.state.v.size()));
     timestepper_->restart();
     timestepper_->load(state.memory);
+    if (control_) control_->load(state.control);
     now_ = std::move(state);
     now_.memory.clear();
+    now_.control.clear();
     record_ = {};
     measure();
 }

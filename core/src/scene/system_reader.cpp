@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/system_reader.hpp"
 
+#include <algorithm>
+
 #include "config/sections.hpp"
 
 namespace delassus::scene {
@@ -12,7 +14,8 @@ SystemReader::SystemReader(const Source& source, SceneSystem& result) : source_(
 std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
     std::vector<std::pair<std::string_view, Handler>> all = {
         {"gravity", [this](const YAML::Node& n) { gravity_ = vector3(source_, n, "gravity"); }},
-        {"step", [this](const YAML::Node& n) { step_ = positive_number(source_, n, "step"); }},
+        {"step", [this](const YAML::Node& n) { read_step(n); }},
+        {"tolerance", [this](const YAML::Node& n) { read_tolerance(n); }},
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
@@ -27,9 +30,9 @@ void SystemReader::build(const YAML::Node& place) {
     const auto missing = [&](std::string_view key, std::string_view example) {
         source_.refuse(place, fmt::format("system \"{}\" lacks the key \"{}\", e.g. {}", result_.name, key, example));
     };
-    if (!step_) missing("step", "step: 0.001");
+    if (!step_ && !tolerance_) missing("step", "step: 0.001");
     if (!end_) missing("end", "end: 10");
-    result_.step = *step_;
+    build_step(place);
     result_.end = *end_;
     if (gravity_) result_.system->set_gravity(*gravity_);
     if (envelope_) result_.system->set_envelope(*envelope_);
@@ -62,6 +65,58 @@ void SystemReader::read_items(std::string_view key, ItemReader reader) {
         }
         for (const Copy& copy : repeat(source_, repeated)) (this->*reader)(item, copy);
     }
+}
+
+// step: 0.001, or with a tolerance step: {initial, smallest, largest}
+void SystemReader::read_step(const YAML::Node& node) {
+    step_node_ = node;
+    if (!node.IsMap()) {
+        step_ = positive_number(source_, node, "step");
+        return;
+    }
+    read_map(source_, node, "\"step\"",
+             {{"initial", [&](const YAML::Node& n) { initial_ = positive_number(source_, n, "initial"); }},
+              {"smallest", [&](const YAML::Node& n) { control_.smallest = positive_number(source_, n, "smallest"); }},
+              {"largest", [&](const YAML::Node& n) { control_.largest = positive_number(source_, n, "largest"); }}});
+}
+
+// tolerance: 1e-4, or tolerance: {absolute, relative}
+void SystemReader::read_tolerance(const YAML::Node& node) {
+    tolerance_ = true;
+    if (!node.IsMap()) {
+        control_.absolute = control_.relative = positive_number(source_, node, "tolerance");
+        return;
+    }
+    bool absolute = false;
+    control_.relative = 0.0;
+    read_map(
+        source_, node, "\"tolerance\"",
+        {{"absolute",
+          [&](const YAML::Node& n) {
+              control_.absolute = positive_number(source_, n, "absolute");
+              absolute = true;
+          }},
+         {"relative", [&](const YAML::Node& n) { control_.relative = nonnegative_number(source_, n, "relative"); }}});
+    if (!absolute) source_.refuse(node, "\"tolerance\" lacks the key \"absolute\"");
+}
+
+void SystemReader::build_step(const YAML::Node& place) {
+    if (!tolerance_) {
+        if (!step_) source_.refuse(step_node_, "a \"step\" with bounds needs a \"tolerance\", e.g. tolerance: 1.0e-4");
+        result_.step = *step_;
+        return;
+    }
+    if (step_)
+        source_.refuse(step_node_,
+                       "a fixed \"step\" and a \"tolerance\" exclude each other; bounds of the step are given as "
+                       "step: {initial, smallest, largest}");
+    control_.initial = initial_.value_or(std::clamp(control_.initial, control_.smallest, control_.largest));
+    if (!(control_.smallest <= control_.initial && control_.initial <= control_.largest))
+        source_.refuse(step_node_.IsDefined() ? step_node_ : place,
+                       fmt::format("\"step\" must have smallest ≤ initial ≤ largest, not {}, {} and {}",
+                                   control_.smallest, control_.initial, control_.largest));
+    result_.control = control_;
+    result_.step = control_.initial;
 }
 
 void SystemReader::read_integrator(const YAML::Node& node) {

@@ -28,6 +28,10 @@ private:
     using ItemReader = void (SystemReader::*)(const YAML::Node& item, const Copy& copy);
 
     void read_integrator(const YAML::Node& node);
+    void read_step(const YAML::Node& node);
+    void read_tolerance(const YAML::Node& node);
+    /// One step for all, or the control of steps.
+    void build_step(const YAML::Node& place);
     void read_materials(const YAML::Node& node);
     void read_material_pair(const YAML::Node& item, const Copy& copy);
     void read_body(const YAML::Node& item, const Copy& copy);
@@ -81,6 +85,10 @@ private:
     Numbers bodies_, nodes_, blocks_, joints_, materials_, others_;
     std::optional<Vector3> gravity_;
     std::optional<double> envelope_, step_, end_;
+    YAML::Node step_node_{YAML::NodeType::Undefined};
+    bool tolerance_ = false;
+    StepControl control_;
+    std::optional<double> initial_;
 };
 
 }  // namespace delassus::scene

@@ -28,6 +28,7 @@ public:
     void add_stiffness(const State&, double factor, Tangent tangent, MatrixAssembler& H) const override {
         add_tangent<2>(K_, 0, factor, tangent, H);
     }
+    [[nodiscard]] const Eigen::Matrix2d& stiffness() const { return K_; }
     [[nodiscard]] double energy(const State& s) const override {
         const Eigen::Map<const Eigen::Vector2d> q(s.q.data()), v(s.v.data());
         return 0.5 * v.squaredNorm() + 0.5 * q.dot(K_ * q);

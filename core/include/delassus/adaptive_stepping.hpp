@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Steps whose size follows from a tolerance: any timestepper, with rejection, and with cuts where contacts close.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/timestepper.hpp"
+
+namespace delassus {
+
+/// What a step's size may be, and the error that chooses it (docs/integrators.md, "Steps by tolerance").
+struct StepControl {
+    double absolute = 1e-4;  ///< in units of positions, as a rule m and rad; > 0
+    double relative = 0.0;   ///< of the way that a coordinate goes in a unit of time; ≥ 0
+    double initial = 1e-4;   ///< first step to try, as a rule s; > 0
+    double smallest = 1e-7;  ///< > 0. A smooth step below it fails; of impacts closer than this none is looked for
+    double largest = 0.1;    ///< ≥ initial
+};
+
+/// What a step with a chosen size did.
+struct AdaptiveStepReport {
+    StepReport step;            ///< of the result; its iterations are those of all trials
+    double h = 0.0;             ///< the size taken
+    double error = 0.0;         ///< estimate over tolerance; ≤ 1, but for impacts
+    std::int32_t rejected = 0;  ///< trials that were thrown away
+    bool impact = false;        ///< a short step for a contact that closed at its beginning
+};
+
+/// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves; the halves are kept.
+class DELASSUS_API AdaptiveStepping {
+public:
+    /// system and stepper, made for it, outlive this. Throws InputError for values of control that make no sense.
+    AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control);
+
+    /// Advances state by one step, not beyond end > state.t. Throws StepFailure if a step below `smallest` would be
+    /// needed, Unsupported as the stepper; then state is as before and the stepper's memory must be loaded again.
+    AdaptiveStepReport step(State& state, double end, StepSolver& solver);
+
+    /// The size that the next step tries first.
+    [[nodiscard]] double next() const { return next_; }
+
+    /// The memory of the choice for checkpoints, that of the stepper apart; load() takes what save() gave.
+    [[nodiscard]] std::vector<double> save() const;
+    void load(const std::vector<double>& memory);
+
+private:
+    /// A step as two halves, compared with the whole.
+    struct Trial {
+        State end;
+        StepReport whole, first, second;
+        std::vector<double> memory;  ///< of the stepper at the end
+        double error = 0.0;          ///< over the tolerance
+        bool touches = false;        ///< a contact, stop or limited motor acts in it
+    };
+    [[nodiscard]] Trial take(const State& begin, double h, StepSolver& solver);
+    /// When the first impact comes, after the beginning of a trial of size h; infinity if none does.
+    [[nodiscard]] double impact_in(const Trial& trial, double h);
+    /// How long after a state, at its speeds, the first open contact closes; negative: since when one is closed.
+    [[nodiscard]] double time_to_closing(const State& state);
+    /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
+    [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
+    [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h) const;
+    void extrapolate(const State& whole, State& halves) const;
+    /// A step from the state in which a contact closes.
+    [[nodiscard]] AdaptiveStepReport take_impact(State& state, double end, StepSolver& solver);
+    [[nodiscard]] double impact_step() const;
+    [[nodiscard]] double power() const;
+    [[nodiscard]] double growth(bool shrunk) const;
+    void restore(const std::vector<double>& memory);
+    void count(const StepReport& report);
+
+    DynamicalSystem& system_;
+    Timestepper& stepper_;
+    StepControl control_;
+    bool extrapolates_;
+    double next_;
+    double last_error_ = 1.0;
+    double impacts_ = 0.0;  // short steps for impacts since the last long one
+    // Of the step that is being taken:
+    std::vector<double> memory_;
+    AdaptiveStepReport report_;
+    UnilateralRows rows_;
+};
+
+}  // namespace delassus

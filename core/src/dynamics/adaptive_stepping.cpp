@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/adaptive_stepping.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace delassus {
+
+// ---- The estimate ----
+//
+// A method of order p makes a local error of c h^{p+1} in a step of size h, of 2 c (h/2)^{p+1} in its two halves. So
+// with the difference δ = log(q_whole⁻¹ ∘ q_halves),
+//
+//     error of the halves ≈ δ / (2^p − 1)
+//
+// which needs nothing but the method itself, constraints or not, and is of the method's own order (Hairer, Nørsett,
+// Wanner, Solving Ordinary Differential Equations I, sec. II.4). Velocities are of lower order than positions in
+// systems with constraints on positions; their differences enter with the factor h (Hairer, Wanner, II, sec. VII.3).
+//
+// Methods that damp at once may add the estimate to the result, which then is of one order more. For others the sum is
+// unstable: with the factor −ρ a step at infinite frequency it has (2^p ρ² + ρ)/(2^p − 1), 1.12 for ρ = 0.8. With
+// constraints the sum gains no order: the chord of the first half is not tangential, so that the second half loses
+// twice as much speed along the constraint as the first. While contacts push it would undo what they hold.
+//
+// What is bounded: with the sum, the error of a step; without, the error of a step divided by its size. Either way the
+// error at a fixed time is proportional to the tolerance, and the estimate to h^{p+1} or h^p.
+
+namespace {
+
+/// Longest and shortest next step, relative to the last.
+constexpr double most_growth = 4.0, least_growth = 0.2, safety = 0.9;
+/// Remaining times within this fraction of a step are whole steps that rounding spoiled.
+constexpr double rounding_of_step = 1e-9;
+
+}  // namespace
+
+AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control)
+    : system_(system),
+      stepper_(stepper),
+      control_(control),
+      extrapolates_(stepper.damps_at_once() && system.m() == 0),
+      next_(control.initial) {
+    const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+    if (!positive(control.absolute) || !(control.relative >= 0.0) || !std::isfinite(control.relative))
+        throw InputError("a tolerance must be positive and finite");
+    if (!positive(control.smallest) || !positive(control.largest) || !(control.smallest <= control.initial) ||
+        !(control.initial <= control.largest))
+        throw InputError(
+            fmt::format("steps must be positive and finite with smallest ≤ initial ≤ largest, not {}, {} and {}",
+                        control.smallest, control.initial, control.largest));
+}
+
+double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h) const {
+    const double share = std::pow(2.0, stepper_.order()) - 1.0;
+    std::vector<double> delta(halves.v.size());
+    system_.difference(whole.q.data(), halves.q.data(), delta.data());
+    double worst = 0.0;
+    for (std::size_t i = 0; i < delta.size(); ++i) {
+        const double error = std::max(std::abs(delta[i]), h * std::abs(halves.v[i] - whole.v[i])) / share;
+        const double speed = std::max(std::abs(begin.v[i]), std::abs(halves.v[i]));
+        const double allowed = control_.absolute + control_.relative * speed;
+        const double ratio = error / (extrapolates_ ? allowed : allowed * h);
+        worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
+    }
+    return worst;
+}
+
+void AdaptiveStepping::extrapolate(const State& whole, State& halves) const {
+    const double share = 1.0 / (std::pow(2.0, stepper_.order()) - 1.0);
+    std::vector<double> delta(halves.v.size());
+    system_.difference(whole.q.data(), halves.q.data(), delta.data());
+    for (double& entry : delta) entry *= share;
+    system_.increment(halves.q.data(), delta.data(), halves.q.data());
+    for (std::size_t i = 0; i < delta.size(); ++i) halves.v[i] += share * (halves.v[i] - whole.v[i]);
+}
+
+void AdaptiveStepping::restore(const std::vector<double>& memory) {
+    stepper_.restart();
+    stepper_.load(memory);
+}
+
+AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, StepSolver& solver) {
+    Trial trial;
+    State whole = begin;
+    restore(memory_);
+    trial.whole = stepper_.step(whole, h, solver);
+    count(trial.whole);
+    trial.end = begin;
+    restore(memory_);
+    trial.first = stepper_.step(trial.end, 0.5 * h, solver);
+    count(trial.first);
+    trial.second = stepper_.step(trial.end, 0.5 * h, solver);
+    count(trial.second);
+    trial.memory = stepper_.save();
+    trial.error = error_of(begin, whole, trial.end, h);
+    trial.touches = trial.whole.active_blocks + trial.first.active_blocks + trial.second.active_blocks > 0;
+    if (extrapolates_ && !trial.touches) extrapolate(whole, trial.end);
+    return trial;
+}
+
+void AdaptiveStepping::count(const StepReport& report) {
+    report_.step.newton_iterations += report.newton_iterations;
+}
+
+// ---- Impacts ----
+//
+// An impact is a jump of velocities, whatever the step: it must not be refined as an error, and at the end of a long
+// step it is late by up to h. So steps are cut where a contact or stop closes, faster than the tolerance a unit of
+// time; a step of size `smallest` follows, in which the impact happens. What bounces ever sooner, as a ball that comes
+// to rest, has impacts closer than `smallest`, and these steps double while nothing else lies between them: time goes
+// on. Contacts that close slowly, or pushed already, are part of the smooth motion.
+
+double AdaptiveStepping::impact_step() const {
+    constexpr double patience = 8.0;
+    return std::min(control_.smallest * std::pow(2.0, std::max(0.0, impacts_ - patience)), control_.largest);
+}
+
+double AdaptiveStepping::time_to_closing(const State& state) {
+    double soonest = std::numeric_limits<double>::infinity();
+    system_.collect_unilateral(state, control_.smallest, rows_);
+    std::size_t row = 0;
+    for (const auto& block : rows_.blocks()) {
+        if (block.along_normal() && !stepper_.pushed(block.key)) {
+            const double speed = -rows_.speed(row, state.v.data());
+            if (speed > control_.absolute) soonest = std::min(soonest, rows_.rows()[row].gap / speed);
+        }
+        row += static_cast<std::size_t>(block.cone.rows);
+    }
+    return soonest;
+}
+
+double AdaptiveStepping::impact_in(const Trial& trial, double h) {
+    if (!system_.has_unilateral()) return std::numeric_limits<double>::infinity();
+    if (trial.first.impact_speed > control_.absolute) return trial.first.impact_time;
+    if (trial.second.impact_speed > control_.absolute) return 0.5 * h + trial.second.impact_time;
+    if (trial.whole.impact_speed > control_.absolute) return trial.whole.impact_time;
+    // A contact that no step knew: it was too far to be found where the last step began.
+    const double after = time_to_closing(trial.end);
+    return after < 0.0 ? std::max(h + after, 0.0) : std::numeric_limits<double>::infinity();
+}
+
+// Trials from the open side: at speeds that stay, an open end says when the contact closes, and speeds change little in
+// a short rest. Half of `smallest` is left out, so that the trial after it is open again.
+AdaptiveStepping::Trial AdaptiveStepping::until_impact(const State& begin, double impact, double& h,
+                                                       StepSolver& solver) {
+    const double close = impact_step();
+    double open = 0.0, closed = h, guess = impact - 0.5 * close;
+    Trial best;
+    while (closed - open > close) {
+        if (!(guess > open && guess < closed)) guess = 0.5 * (open + closed);
+        Trial trial = take(begin, guess, solver);
+        ++report_.rejected;
+        impact = impact_in(trial, guess);
+        if (std::isfinite(impact)) {
+            closed = guess;
+            guess = impact - 0.5 * close;
+            if (guess > open + 0.9 * (closed - open)) guess = 0.5 * (open + closed);
+            continue;
+        }
+        open = guess;
+        best = std::move(trial);
+        const double rest = time_to_closing(best.end);
+        if (rest <= close) break;
+        guess = open + rest - 0.5 * close;
+    }
+    h = open;
+    return best;
+}
+
+AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double end, StepSolver& solver) {
+    restore(memory_);
+    const double remaining = end - state.t;
+    report_.h = std::min(impact_step(), remaining);
+    report_.impact = true;
+    const std::int32_t iterations = report_.step.newton_iterations;
+    report_.step = stepper_.step(state, report_.h, solver);
+    report_.step.newton_iterations += iterations;
+    impacts_ += 1.0;
+    if (report_.h == remaining) state.t = end;
+    return report_;
+}
+
+// ---- The choice ----
+//
+// After a step with the estimate e (over the tolerance; e₋ that of the step before), and k the power of h in it,
+//
+//     h ← 0.9 h e^(−0.7/k) e₋^(0.4/k)
+//
+// (PI control: Gustafsson, ACM TOMS 17, 1991; Hairer, Wanner, II, sec. IV.2). A trial with e > 1 is thrown away and
+// tried again with 0.9 h e^(−1/k).
+
+AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& solver) {
+    memory_ = stepper_.save();
+    report_ = {};
+    bool shrunk = false;
+    double proposed = std::clamp(next_, control_.smallest, control_.largest);
+    std::string failure = "loosen the tolerance, or allow smaller steps by step: {smallest: …}";
+    while (true) {
+        const bool smallest = proposed < control_.smallest;
+        const auto fell_below = [&] {
+            throw StepFailure(
+                fmt::format("the step fell below {:.3g} at t = {:.9g}; {}", control_.smallest, state.t, failure));
+        };
+        if (smallest && !system_.has_unilateral()) fell_below();
+        const double tried = std::max(proposed, control_.smallest), remaining = end - state.t;
+        double h = remaining <= (1.0 + rounding_of_step) * tried ? remaining
+                   : remaining < 2.0 * tried                     ? 0.5 * remaining
+                                                                 : tried;
+        Trial trial;
+        try {
+            trial = take(state, h, solver);
+            const double impact = impact_in(trial, h);
+            if (impact > impact_step() && std::isfinite(impact)) trial = until_impact(state, impact, h, solver);
+            if (impact <= impact_step() || h == 0.0) return take_impact(state, end, solver);
+        } catch (const StepFailure& error) {
+            if (smallest) throw;
+            failure = error.what();
+            proposed = 0.25 * h;
+            shrunk = true;
+            ++report_.rejected;
+            continue;
+        }
+        report_.error = trial.error;
+        if (report_.error > 1.0) {
+            if (!smallest) {
+                proposed = h * std::max(safety * std::pow(report_.error, -1.0 / power()), least_growth);
+                shrunk = true;
+                ++report_.rejected;
+                continue;
+            }
+            if (!trial.touches) fell_below();
+        }
+        restore(trial.memory);
+        // A step cut by the end or by an impact says less than the one that it was to be.
+        const double next = h * growth(shrunk);
+        next_ = std::clamp(h < tried ? std::max(next, tried) : next, control_.smallest, control_.largest);
+        last_error_ = std::max(report_.error, 1e-4);
+        if (h > impact_step()) impacts_ = 0.0;
+        report_.step.solved = trial.first.solved && trial.second.solved;
+        report_.step.message = trial.first.solved ? trial.second.message : trial.first.message;
+        report_.step.unilateral_blocks = std::max(trial.first.unilateral_blocks, trial.second.unilateral_blocks);
+        report_.h = h;
+        state = std::move(trial.end);
+        if (h == remaining) state.t = end;
+        return report_;
+    }
+}
+
+double AdaptiveStepping::power() const {
+    return stepper_.order() + (extrapolates_ ? 1.0 : 0.0);
+}
+
+double AdaptiveStepping::growth(bool shrunk) const {
+    const double error = std::max(report_.error, 1e-10);
+    return std::clamp(safety * std::pow(error, -0.7 / power()) * std::pow(last_error_, 0.4 / power()), least_growth,
+                      shrunk ? 1.0 : most_growth);
+}
+
+std::vector<double> AdaptiveStepping::save() const {
+    return {next_, last_error_, impacts_};
+}
+
+void AdaptiveStepping::load(const std::vector<double>& memory) {
+    if (memory.size() != 3) throw InputError("the memory of the step control must have three numbers");
+    next_ = memory[0];
+    last_error_ = memory[1];
+    impacts_ = memory[2];
+}
+
+}  // namespace delassus
