@@ -208,8 +208,8 @@ TEST(Beam, IsTheElastica) {
         const double coarse = error(6), fine = error(18);
         RecordProperty("load_" + std::to_string(static_cast<int>(load)),
                        std::to_string(coarse) + " with 6, " + std::to_string(fine) + " with 18 elements");
-        EXPECT_LE(coarse, 1e-2) << load;
-        EXPECT_LE(fine, 1.2e-3) << load;
+        EXPECT_LE(coarse, 4e-3) << load;
+        EXPECT_LE(fine, 4e-4) << load;
         EXPECT_LE(fine, coarse / 6.0 + 1e-5) << load;
     }
 }
@@ -242,7 +242,7 @@ VectorXd frequencies(const ElasticBeamParameters& beam) {
 
 TEST(Beam, SwingsWithTheFrequenciesOfACantilever) {
     // ω = β² √(E I/(ρ A L⁴)), cos β cosh β = −1, about z, and √2 times that about y. A slender section, so that its own
-    // inertia does not matter; the lumped mass lowers ω by the square of β/elements.
+    // inertia does not matter; the lumped mass lowers ω by β/3 over the square of the number of elements.
     constexpr int elements = 30;
     auto beam = cantilever(elements);
     beam.section = {1e-4, 2e-12, 1e-12, 1e-9, infinite, infinite};
@@ -253,7 +253,7 @@ TEST(Beam, SwingsWithTheFrequenciesOfACantilever) {
         for (const double axis : {1.0, std::sqrt(2.0)}) {
             const double ratio = found[k] / (axis * beta * beta * unit);
             RecordProperty("mode_" + std::to_string(k), std::to_string(ratio));
-            EXPECT_NEAR(ratio, 1.0, 0.05 * std::pow(beta / elements, 2)) << k;
+            EXPECT_NEAR(ratio, 1.0, 0.4 * beta / (elements * elements)) << k;
             ++k;
         }
 }

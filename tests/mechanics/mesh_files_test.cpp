@@ -2,6 +2,7 @@
 // Meshes in files: what is read, and what is refused with the file and the place.
 #include "delassus/mesh_files.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -40,17 +41,11 @@ private:
         std::filesystem::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
 };
 
-/// A tetrahedron with legs along the axes from (x, 0, 0), as OBJ.
-std::string tetrahedron(double x, int first) {
-    std::string text;
-    for (const auto* point : {"0 0 0", "1 0 0", "0 1 0", "0 0 1"}) {
-        double px = 0, py = 0, pz = 0;
-        std::sscanf(point, "%lf %lf %lf", &px, &py, &pz);
-        text += "v " + std::to_string(px + x) + " " + std::to_string(py) + " " + std::to_string(pz) + "\n";
-    }
+/// A tetrahedron with legs of 1 along the axes from (x, 0, 0), as OBJ, after `first` points.
+std::string tetrahedron(int x, int first) {
+    std::string text = fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 1 0\nv {0} 0 1\n", x, x + 1);
     for (const auto& face : {std::array{1, 3, 2}, std::array{1, 2, 4}, std::array{2, 3, 4}, std::array{1, 4, 3}})
-        text += "f " + std::to_string(face[0] + first) + " " + std::to_string(face[1] + first) + " " +
-                std::to_string(face[2] + first) + "\n";
+        text += fmt::format("f {} {} {}\n", face[0] + first, face[1] + first, face[2] + first);
     return text;
 }
 
@@ -69,7 +64,7 @@ double volume(const Mesh& mesh) {
 #ifdef DELASSUS_HAS_ASSIMP
 
 TEST_F(MeshFile, ObjectFileHasItsPartsAndItsScale) {
-    const auto parts = read_surface_mesh(write("two.obj", tetrahedron(0.0, 0) + tetrahedron(5.0, 4)), 2.0);
+    const auto parts = read_surface_mesh(write("two.obj", tetrahedron(0, 0) + tetrahedron(5, 4)), 2.0);
     ASSERT_EQ(parts.size(), 2U);
     for (const auto& part : parts) {
         EXPECT_EQ(part.vertices.size(), 4U);
@@ -108,18 +103,18 @@ TEST_F(MeshFile, WrongSurfacesAreToldInOneSentence) {
         const auto file = write(name, text);
         return refusal([&] { static_cast<void>(read_surface_mesh(file, scale)); });
     };
-    std::string open = tetrahedron(0.0, 0);
+    std::string open = tetrahedron(0, 0);
     open.resize(open.size() - 8);
     EXPECT_EQ(told("open.obj", open).rfind("open.obj: the mesh is open at the edge from vertex ", 0), 0U);
-    std::string turned = tetrahedron(0.0, 0);
+    std::string turned = tetrahedron(0, 0);
     turned.replace(turned.find("f 1 3 2"), 7, "f 1 2 3");
     EXPECT_EQ(told("turned.obj", turned).rfind("turned.obj: two triangles of the mesh run from vertex ", 0), 0U);
-    EXPECT_EQ(told("two.obj", tetrahedron(0.0, 0) + open.substr(0, 0) + "v 9 0 0\nv 10 0 0\nv 9 1 0\nf 5 6 7\n")
+    EXPECT_EQ(told("two.obj", tetrahedron(0, 0) + "v 9 0 0\nv 10 0 0\nv 9 1 0\nf 5 6 7\n")
                   .rfind("two.obj, part 2: the mesh is open at the edge from vertex ", 0),
               0U);
     EXPECT_EQ(told("text.obj", "no mesh\n").rfind("text.obj: ", 0), 0U);
     EXPECT_EQ(told("text.xyzw", "no mesh\n").rfind("text.xyzw: no mesh can be read: ", 0), 0U);
-    EXPECT_EQ(told("scaled.obj", tetrahedron(0.0, 0), -1.0), "the scale of a mesh is -1; it must be positive");
+    EXPECT_EQ(told("scaled.obj", tetrahedron(0, 0), -1.0), "the scale of a mesh is -1; it must be positive");
     EXPECT_EQ(refusal([] { static_cast<void>(read_surface_mesh("none.obj")); }), "none.obj: there is no such file");
 }
 

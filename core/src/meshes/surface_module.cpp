@@ -9,8 +9,13 @@
 
 #include "delassus/error.hpp"
 #include "mechanics/mesh_modules.hpp"
+#include "meshes/mesh_bytes.hpp"
+#include "support/call_in_child.hpp"
 
-extern "C" DELASSUS_API void delassus_surface_mesh_read(const std::filesystem::path& file, delassus::Mesh& mesh) {
+namespace {
+
+delassus::Mesh read(const std::filesystem::path& file) {
+    delassus::Mesh mesh;
     Assimp::Importer importer;
     // Nodes are put where the file's hierarchy has them. Points and lines are left out.
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
@@ -35,6 +40,18 @@ extern "C" DELASSUS_API void delassus_surface_mesh_read(const std::filesystem::p
         }
     }
     if (mesh.triangles.empty()) throw delassus::InputError(fmt::format("{}: it has no triangles", file.string()));
+    return mesh;
+}
+
+}  // namespace
+
+extern "C" DELASSUS_API void delassus_surface_mesh_read(const std::filesystem::path& file, delassus::Mesh& mesh) {
+    using namespace delassus;
+    const std::string bytes = call_in_child(file, "assimp", meshes::seconds_to_read(file), [&] {
+        const Mesh found = read(file);
+        return meshes::pack(found.vertices, found.triangles);
+    });
+    meshes::unpack(bytes, mesh.vertices, mesh.triangles);
 }
 
 static_assert(std::is_same_v<decltype(&delassus_surface_mesh_read), DelassusSurfaceMeshRead>);

@@ -2,12 +2,12 @@
 // Tetrahedra through Netgen's library; see mechanics/mesh_modules.hpp.
 #include <fmt/format.h>
 
-#include <cstring>
 #include <memory>
 #include <type_traits>
 
 #include "delassus/error.hpp"
 #include "mechanics/mesh_modules.hpp"
+#include "meshes/mesh_bytes.hpp"
 #include "support/call_in_child.hpp"
 
 namespace nglib {
@@ -39,46 +39,25 @@ void take(nglib::Ng_Mesh* from, const std::string& who, TetrahedralMesh& mesh) {
     }
 }
 
-/// Processor time for Netgen, s: some damaged files keep it busy for ever.
-constexpr unsigned seconds_to_fill = 600, least_seconds_to_read = 20;
-constexpr std::uintmax_t bytes_per_second = 500'000;
+/// Processor time to fill a surface, s.
+constexpr unsigned seconds_to_fill = 600;
 
-void append(std::string& bytes, const void* data, std::size_t size) {
-    bytes.append(static_cast<const char*>(data), size);
-}
-
-/// Runs work(mesh) in a child process, since Netgen crashes on damaged files, and takes the mesh over.
+/// Runs work(mesh) in a child process and takes the mesh over.
 template <class Work>
 void in_child(const std::filesystem::path& file, unsigned seconds, TetrahedralMesh& mesh, Work&& work) {
-    using Point = decltype(mesh.vertices)::value_type;
-    using Element = decltype(mesh.tetrahedra)::value_type;
     const std::string bytes = delassus::call_in_child(file, "Netgen", seconds, [&] {
         nglib::Ng_Init();
         TetrahedralMesh made;
         work(made);
-        std::string result;
-        const std::size_t points = made.vertices.size();
-        append(result, &points, sizeof points);
-        append(result, made.vertices.data(), points * sizeof(Point));
-        append(result, made.tetrahedra.data(), made.tetrahedra.size() * sizeof(Element));
-        return result;
+        return delassus::meshes::pack(made.vertices, made.tetrahedra);
     });
-    std::size_t points = 0;
-    std::memcpy(&points, bytes.data(), sizeof points);
-    const std::size_t start = sizeof points + points * sizeof(Point);
-    mesh.vertices.resize(points);
-    mesh.tetrahedra.resize((bytes.size() - start) / sizeof(Element));
-    std::memcpy(mesh.vertices.data(), bytes.data() + sizeof points, points * sizeof(Point));
-    std::memcpy(mesh.tetrahedra.data(), bytes.data() + start, mesh.tetrahedra.size() * sizeof(Element));
+    delassus::meshes::unpack(bytes, mesh.vertices, mesh.tetrahedra);
 }
 
 }  // namespace
 
 extern "C" DELASSUS_API void delassus_volume_mesh_read(const std::filesystem::path& file, TetrahedralMesh& mesh) {
-    std::error_code error;
-    const auto bytes = std::filesystem::file_size(file, error);
-    const auto seconds = least_seconds_to_read + (error ? 0 : static_cast<unsigned>(bytes / bytes_per_second));
-    in_child(file, seconds, mesh, [&](TetrahedralMesh& made) {
+    in_child(file, delassus::meshes::seconds_to_read(file), mesh, [&](TetrahedralMesh& made) {
         const MeshPointer loaded(nglib::Ng_LoadMesh(file.c_str()));
         take(loaded.get(), file.string(), made);
     });
