@@ -177,6 +177,10 @@ TEST_F(MeshFile, SurfaceIsFilledWithTetrahedra) {
     const auto again = read_tetrahedral_mesh(file);
     EXPECT_EQ(coarse.vertices, again.vertices) << "equal files give equal meshes";
     EXPECT_EQ(coarse.tetrahedra, again.tetrahedra);
+    const auto fine = read_tetrahedral_mesh(file, 2.0, 1);
+    EXPECT_EQ(fine.tetrahedra.size(), 8 * coarse.tetrahedra.size());
+    EXPECT_NEAR(volume(fine) / exact, 8.0, 1e-5);
+    EXPECT_THROW(static_cast<void>(read_tetrahedral_mesh(file, 1.0, -1)), InputError);
 }
 #endif
 

@@ -26,11 +26,11 @@ struct TetrahedralMesh {
 };
 
 /// The tetrahedra in a Netgen file (.vol); any other file is read as a surface and filled with tetrahedra by Netgen,
-/// whose surface is that of the file and whose edges are at most longest_edge (m, after scaling; 0: as the surface has
-/// them). Throws InputError, naming the file, where this build lacks the library, the file is unreadable, an element is
-/// inverted or flat or no tetrahedron, a vertex belongs to no element, or a face to more than two.
+/// about as large as the surface's triangles, that are divided into eight `refinements` times (0 to 6). Throws
+/// InputError, naming the file, where this build lacks the library, the file is unreadable, an element is inverted or
+/// flat or no tetrahedron, a vertex belongs to no element, a face to more than two, or a .vol shall be refined.
 [[nodiscard]] DELASSUS_API TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale = 1.0,
-                                                                 double longest_edge = 0.0);
+                                                                 int refinements = 0);
 
 /// Throws InputError "who: …" unless the triangles bound a solid: closed, counter-clockwise from outside, with volume.
 DELASSUS_API void check_closed_surface(const Mesh& mesh, const std::string& who);

@@ -133,7 +133,6 @@ private:
     bool good_ = true;
 };
 
-/// What the child does; never returns.
 }  // namespace
 
 Problem read_isolated(const std::filesystem::path& file) {

@@ -164,10 +164,14 @@ std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double sc
     return parts;
 }
 
-TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale, double longest_edge) {
+TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale, int refinements) {
+    if (refinements < 0 || refinements > 6)
+        throw InputError(fmt::format("a mesh shall be refined {} times; it must be from 0 to 6", refinements));
     TetrahedralMesh mesh;
     if (file.extension() == ".vol") {
         must_be_there(file);
+        if (refinements != 0)
+            throw InputError(fmt::format("{}: only tetrahedra that fill a surface can be refined", file.string()));
         const auto read = reinterpret_cast<DelassusVolumeMeshRead>(
             symbol_of("delassus_volume_mesh.so", "delassus_volume_mesh_read", file.string(), "Netgen"));
         read(file, mesh);
@@ -177,7 +181,7 @@ TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double 
         check_closed_surface(surface, file.string());
         const auto fill = reinterpret_cast<DelassusVolumeMeshFill>(
             symbol_of("delassus_volume_mesh.so", "delassus_volume_mesh_fill", file.string(), "Netgen"));
-        fill(surface, longest_edge, file, mesh);
+        fill(surface, refinements, file, mesh);
     }
     check_elements(mesh, file.string());
     return mesh;

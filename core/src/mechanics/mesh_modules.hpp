@@ -9,6 +9,6 @@ extern "C" {
 using DelassusSurfaceMeshRead = void (*)(const std::filesystem::path& file, delassus::Mesh& mesh);
 /// delassus_volume_mesh_read and _fill of delassus_volume_mesh.so; elements are not checked.
 using DelassusVolumeMeshRead = void (*)(const std::filesystem::path& file, delassus::TetrahedralMesh& mesh);
-using DelassusVolumeMeshFill = void (*)(const delassus::Mesh& surface, double longest_edge,
+using DelassusVolumeMeshFill = void (*)(const delassus::Mesh& surface, int refinements,
                                         const std::filesystem::path& file, delassus::TetrahedralMesh& mesh);
 }

@@ -63,7 +63,7 @@ extern "C" DELASSUS_API void delassus_volume_mesh_read(const std::filesystem::pa
     });
 }
 
-extern "C" DELASSUS_API void delassus_volume_mesh_fill(const delassus::Mesh& surface, double longest_edge,
+extern "C" DELASSUS_API void delassus_volume_mesh_fill(const delassus::Mesh& surface, int refinements,
                                                        const std::filesystem::path& file, TetrahedralMesh& mesh) {
     in_child(file, seconds_to_fill, mesh, [&](TetrahedralMesh& made) {
         const MeshPointer filled(nglib::Ng_NewMesh());
@@ -73,9 +73,9 @@ extern "C" DELASSUS_API void delassus_volume_mesh_fill(const delassus::Mesh& sur
             nglib::Ng_AddSurfaceElement(filled.get(), nglib::NG_TRIG, corners);
         }
         nglib::Ng_Meshing_Parameters parameters;
-        if (longest_edge > 0.0) parameters.maxh = longest_edge;
         if (nglib::Ng_GenerateVolumeMesh(filled.get(), &parameters) != nglib::NG_OK)
             throw InputError(fmt::format("{}: Netgen cannot fill it with tetrahedra", file.string()));
+        for (int i = 0; i < refinements; ++i) nglib::Ng_Uniform_Refinement(filled.get());
         take(filled.get(), file.string(), made);
     });
 }

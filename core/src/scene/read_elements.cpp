@@ -97,7 +97,8 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
     ElasticMeshParameters body;
     body.pose.position = copy.offset;
     std::string file;
-    double scale = 1.0, longest_edge = 0.0;
+    double scale = 1.0;
+    int refinements = 0;
     const auto read_box = [this](const YAML::Node& node) {
         std::optional<Vector3> lower, upper;
         read_map(source_, node, "a box of \"fixed_boxes\"",
@@ -114,7 +115,8 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
         {{"name", [&](const YAML::Node& n) { body.name = name_in(source_, n, "name", copy); }},
          {"file", [&](const YAML::Node& n) { file = scalar(source_, n, "file"); }},
          {"scale", [&](const YAML::Node& n) { scale = positive_number(source_, n, "scale"); }},
-         {"longest_edge", [&](const YAML::Node& n) { longest_edge = positive_number(source_, n, "longest_edge"); }},
+         {"refinements",
+          [&](const YAML::Node& n) { refinements = value<int>(source_, n, "refinements", "a whole number"); }},
          {"position", [&](const YAML::Node& n) { body.pose.position = point_in(source_, n, "position", copy); }},
          {"orientation", [&](const YAML::Node& n) { body.pose.orientation = orientation(source_, n); }},
          {"fixed_boxes", [&](const YAML::Node& n) {
@@ -126,7 +128,7 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
     result_.tetrahedra_read = true;
     if (!file.ends_with(".vol")) result_.surfaces_read = true;
     const auto first = at(item, [&] {
-        body.mesh = read_tetrahedral_mesh(source_.folder() / file, scale, longest_edge);
+        body.mesh = read_tetrahedral_mesh(source_.folder() / file, scale, refinements);
         return result_.system->add_elastic_mesh(body);
     });
     take_name(item, blocks_, "elastic mesh", body.name, first);
