@@ -33,6 +33,7 @@ TEST(CollisionSetup, BadOnesAreRefused) {
     tilted.pose.orientation = {0.0, 0.0, 0.0, 0.0};
     EXPECT_TRUE(has(one(tilted), "quaternion"));
     EXPECT_TRUE(has(refusal({{}, {false}, {{0, 1}}}), "pair of bodies"));
+    EXPECT_TRUE(has(refusal({{}, {false, false}, {}, {0}}), "groups for 1 bodies of 2"));
 
     Mesh mesh = *box_mesh(1.0, 1.0, 1.0);
     const auto meshed = [&](const Mesh& bad) { return one(convex(std::make_shared<Mesh>(bad), 0)); };

@@ -29,5 +29,25 @@ TEST(LeaveOut, FclibFilesAloneMapHdf5) {
     EXPECT_EQ(loader_log("inspect " + example("box_stack")).find("libhdf5"), std::string::npos);
 }
 
+std::string scene(const std::string& name) {
+    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / (name + ".yaml")).string();
+}
+
+TEST(LeaveOut, MeshFilesAloneMapTheirLibraries) {
+    const auto without = loader_log("plan " + scene("box_on_incline"));
+    for (const char* library : {"libassimp", "libnglib"})
+        EXPECT_EQ(without.find(library), std::string::npos) << library;
+#ifdef DELASSUS_HAS_ASSIMP
+    const auto surface = loader_log("plan " + scene("mesh_die"));
+    EXPECT_NE(surface.find("libassimp"), std::string::npos);
+    EXPECT_EQ(surface.find("libnglib"), std::string::npos);
+#endif
+#ifdef DELASSUS_HAS_NETGEN
+    const auto volume = loader_log("plan " + scene("hanging_bar"));
+    EXPECT_NE(volume.find("libnglib"), std::string::npos);
+    EXPECT_EQ(volume.find("libassimp"), std::string::npos);
+#endif
+}
+
 }  // namespace
 }  // namespace delassus::tests

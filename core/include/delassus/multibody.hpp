@@ -15,6 +15,7 @@
 #include "delassus/collision.hpp"
 #include "delassus/dynamical_system.hpp"
 #include "delassus/export.hpp"
+#include "delassus/mesh_files.hpp"
 
 namespace delassus {
 
@@ -156,6 +157,24 @@ struct ElasticBlockParameters {
     std::int32_t contact_material = -1;
 };
 
+/// A box with edges along the axes, m.
+struct AlignedBox {
+    Vector3 lower{}, upper{};
+};
+
+/// An elastic body of the tetrahedra of a mesh.
+struct ElasticMeshParameters {
+    std::string name;
+    TetrahedralMesh mesh;
+    Pose pose;  ///< of the mesh's frame
+    ElasticMaterial material;
+    ElementModel model = ElementModel::Corotational;
+    std::vector<AlignedBox> fixed_boxes;  ///< world frame at t = 0: the nodes in them do not move
+    Vector3 velocity{};                   ///< m/s
+    double contact_radius = 0.0;          ///< as in ElasticBlockParameters
+    std::int32_t contact_material = -1;
+};
+
 struct CableParameters {
     std::string name;
     std::array<std::int32_t, 2> nodes{-1, -1};
@@ -166,6 +185,42 @@ struct CableParameters {
     double rest_length;         ///< m; not a number: the initial distance
     bool slack = true;          ///< carries no compression
     DELASSUS_API CableParameters();
+};
+
+/// The section of a beam in its axes: x along the beam, y and z principal axes of the section.
+struct BeamSection {
+    double area, inertia_y, inertia_z;  ///< A; ∫z² dA (bending about y); ∫y² dA (about z): m², m⁴, > 0
+    double torsion;                     ///< Saint-Venant's constant J, m⁴, > 0
+    double shear_area_y, shear_area_z;  ///< m², > 0; infinite: no shear (Euler and Bernoulli)
+    /// width along y, height along z (m); shear areas 5/6 of the area; torsion within 0.5 % (Roark's formula).
+    DELASSUS_API static BeamSection rectangle(double width, double height);
+    /// Shear areas 9/10 of the area.
+    DELASSUS_API static BeamSection circle(double radius);
+};
+
+/// A straight elastic beam between two bodies, unstressed at t = 0, for any displacement and for turns of its ends
+/// against each other by less than π. It has no mass: its bodies have.
+struct BeamParameters {
+    std::string name;
+    BodyIndex first = world_body, second = world_body;
+    Vector3 first_point{}, second_point{};  ///< its ends: world frame at t = 0, kept by the bodies
+    Vector3 section_y{};                    ///< near the y axis of the section; (0, 0, 0): any
+    BeamSection section = BeamSection::rectangle(0.01, 0.01);
+    ElasticMaterial material;  ///< its density is not used
+};
+
+/// A straight beam of equal elements with a body at each node, that has its share of the mass and of the section's
+/// inertia. Bodies are named name_0, name_1, …; their x axis is along the beam.
+struct ElasticBeamParameters {
+    std::string name;
+    Vector3 from{}, to{1.0, 0.0, 0.0};  ///< m
+    std::int32_t elements = 10;         ///< ≥ 1
+    Vector3 section_y{};                ///< as in BeamParameters
+    BeamSection section = BeamSection::rectangle(0.01, 0.01);
+    ElasticMaterial material;
+    bool fixed_from = false, fixed_to = false;  ///< whether the body at that end is fixed
+    Vector3 velocity{};                         ///< of the end `from`, m/s; the beam moves as a rigid body at the start
+    Vector3 angular_velocity{};                 ///< world frame, rad/s
 };
 
 struct ContactMaterial {
@@ -194,7 +249,12 @@ public:
                          ElementModel model = ElementModel::Corotational);
     /// Returns the number of its first node, at the corner; nodes are numbered with z fastest and x slowest.
     std::int32_t add_elastic_block(const ElasticBlockParameters& block);
+    /// Returns the number of its first node; nodes are numbered as the vertices of the mesh.
+    std::int32_t add_elastic_mesh(const ElasticMeshParameters& body);
     void add_cable(const CableParameters& cable);
+    void add_beam(const BeamParameters& beam);
+    /// Returns the number of its first body, at `from`; the others follow.
+    BodyIndex add_elastic_beam(const ElasticBeamParameters& beam);
     /// shape.body names the body; material indexes what add_material() returned.
     void add_shape(const Shape& shape, std::int32_t material);
     /// A node touches shapes of bodies as a small sphere; nodes do not touch one another. radius: m, > 0.

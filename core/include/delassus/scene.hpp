@@ -52,9 +52,11 @@ struct SceneSystem {
     std::vector<BodyParameters> bodies;  ///< by BodyIndex
     std::vector<NodeParameters> nodes;   ///< by number
     std::vector<ElasticBlockParameters> elastic_blocks;
-    std::vector<JointParameters> joints;    ///< by joint index
-    std::vector<MotorParameters> motors;    ///< in the order of the file
-    std::vector<SpringParameters> springs;  ///< likewise, as the next two
+    std::vector<std::int32_t> node_contact_material;  ///< of each block or mesh whose nodes touch bodies
+    std::vector<std::array<BodyIndex, 2>> beams;      ///< the bodies at the ends of each element
+    std::vector<JointParameters> joints;              ///< by joint index
+    std::vector<MotorParameters> motors;              ///< in the order of the file
+    std::vector<SpringParameters> springs;            ///< likewise, as the next two
     std::vector<BushingParameters> bushings;
     std::vector<LoadParameters> loads;
     std::vector<SceneMaterial> materials;
@@ -62,6 +64,7 @@ struct SceneSystem {
     std::vector<std::int32_t> shape_material;     ///< of each of system->shapes()
     std::vector<std::array<BodyIndex, 2>> apart;  ///< pairs of bodies that never touch, the smaller index first
     std::vector<LeftOut> left_out;
+    bool surfaces_read = false, tetrahedra_read = false;  ///< from files: which modules the scene has loaded
 };
 
 struct Scene {

@@ -6,6 +6,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -33,6 +34,8 @@ public:
     [[noreturn]] void refuse(const YAML::Node& node, std::string_view what) const {
         throw InputError(fmt::format("{}: {}", at(node), what));
     }
+    /// The folder that relative paths in the text start from: that of the file.
+    [[nodiscard]] std::filesystem::path folder() const { return std::filesystem::path(where_).parent_path(); }
     /// The node did not come from the text but from that place.
     void comes_from(const YAML::Node& node, const std::string& place) { elsewhere_.emplace_back(node, place); }
 

@@ -1,33 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fclib/isolated.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <csignal>
 #include <cstring>
-#include <exception>
 #include <string>
 #include <type_traits>
 
 #include "delassus/error.hpp"
 #include "fclib/fclib.hpp"
+#include "support/call_in_child.hpp"
 
 namespace delassus::fclib {
 namespace {
 
-/// The message of the child: one of these, then the content, then message_end.
-constexpr char holds_problem = 'P';
-constexpr char holds_refusal = 'E';
-constexpr char message_end = '.';
-
 /// Processor time for the smallest file, and bytes a second beyond that; some damaged files keep HDF5 busy for ever.
-constexpr rlim_t least_seconds = 20;
-constexpr rlim_t bytes_per_second = 5'000'000;
+constexpr unsigned least_seconds = 20;
+constexpr std::uintmax_t bytes_per_second = 5'000'000;
 
 class Packer {
 public:
@@ -144,90 +133,22 @@ private:
     bool good_ = true;
 };
 
-/// What the child does; never returns.
-[[noreturn]] void read_in_child(const std::filesystem::path& file, int pipe) {
-    for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGPIPE}) std::signal(signal, SIG_DFL);
-    std::error_code error;
-    const auto bytes = std::filesystem::file_size(file, error);
-    const rlim_t seconds = least_seconds + (error ? 0 : bytes / bytes_per_second);
-    const rlimit no_core{0, 0};
-    const rlimit processor_time{seconds, seconds};
-    setrlimit(RLIMIT_CORE, &no_core);
-    setrlimit(RLIMIT_CPU, &processor_time);
-    // What the C library says about a damaged heap is not for the user.
-    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    dup2(nowhere, STDOUT_FILENO);
-    dup2(nowhere, STDERR_FILENO);
-
-    Packer message;
-    try {
-        const Problem problem = read_file(file);
-        message.bytes = holds_problem;
-        message.problem(problem);
-    } catch (const InputError& refusal) {
-        message.bytes = holds_refusal;
-        message.text(refusal.what());
-    } catch (const std::exception& failure) {
-        message.bytes = holds_refusal;
-        message.text(fmt::format("{} cannot be read: {}.", file.string(), failure.what()));
-    }
-    message.bytes += message_end;
-    for (std::string_view rest = message.bytes; !rest.empty();) {
-        const ssize_t written = write(pipe, rest.data(), rest.size());
-        if (written < 0 && errno != EINTR) _exit(1);
-        if (written > 0) rest.remove_prefix(static_cast<std::size_t>(written));
-    }
-    _exit(0);
-}
-
-std::string read_to_end(int pipe) {
-    std::string bytes;
-    std::vector<char> buffer(1 << 16);
-    for (;;) {
-        const ssize_t got = read(pipe, buffer.data(), buffer.size());
-        if (got > 0) bytes.append(buffer.data(), static_cast<std::size_t>(got));
-        if (got == 0 || (got < 0 && errno != EINTR)) return bytes;
-    }
-}
-
 }  // namespace
 
 Problem read_isolated(const std::filesystem::path& file) {
-    int pipe[2];
-    if (pipe2(pipe, O_CLOEXEC) != 0) {
-        throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(errno)));
-    }
-    const pid_t child = fork();
-    if (child == 0) {
-        close(pipe[0]);
-        read_in_child(file, pipe[1]);
-    }
-    const int fork_error = errno;
-    close(pipe[1]);
-    std::string message;
-    if (child > 0) message = read_to_end(pipe[0]);
-    close(pipe[0]);
-    if (child < 0) {
-        throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(fork_error)));
-    }
-    int status = 0;
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-    }
-    if (message.size() >= 2 && message.back() == message_end) {
-        Unpacker content(std::string_view(message).substr(1, message.size() - 2));
-        if (message[0] == holds_refusal) {
-            const std::string refusal = content.text();
-            if (content.complete()) throw InputError(refusal);
-        } else if (message[0] == holds_problem) {
-            Problem problem = content.problem();
-            if (content.complete()) {
-                validate(problem);
-                return problem;
-            }
-        }
-    }
-    const bool too_long = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
-    throw InputError(fmt::format("{} is damaged: HDF5 {} on it.", file.string(), too_long ? "does not end" : "fails"));
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(file, error);
+    const auto seconds = least_seconds + (error ? 0 : static_cast<unsigned>(bytes / bytes_per_second));
+    const std::string message = call_in_child(file, "HDF5", seconds, [&] {
+        Packer packer;
+        packer.problem(read_file(file));
+        return packer.bytes;
+    });
+    Unpacker content(message);
+    Problem problem = content.problem();
+    if (!content.complete()) throw InputError(fmt::format("{} is damaged: HDF5 fails on it.", file.string()));
+    validate(problem);
+    return problem;
 }
 
 }  // namespace delassus::fclib

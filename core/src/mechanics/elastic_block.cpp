@@ -77,27 +77,4 @@ std::int32_t MultibodySystem::add_elastic_block(const ElasticBlockParameters& bl
     return first;
 }
 
-// A face that two tetrahedra share is inside. Faces seen from outside, for nodes in the order of a positive volume.
-std::vector<std::array<std::int32_t, 3>> MultibodySystem::element_surface() const {
-    using Face = std::array<std::int32_t, 3>;
-    constexpr std::array<std::array<std::size_t, 3>, 4> sides = {{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
-    std::vector<std::pair<Face, Face>> faces;  // sorted nodes, and as seen from outside
-    for (const auto& element : implementation_->tetrahedra)
-        for (const auto& side : sides) {
-            const Face face = {element.nodes()[side[0]], element.nodes()[side[1]], element.nodes()[side[2]]};
-            Face sorted = face;
-            std::sort(sorted.begin(), sorted.end());
-            faces.emplace_back(sorted, face);
-        }
-    std::sort(faces.begin(), faces.end());
-    std::vector<Face> surface;
-    for (std::size_t i = 0; i < faces.size();) {
-        std::size_t end = i + 1;
-        while (end < faces.size() && faces[end].first == faces[i].first) ++end;
-        if (end == i + 1) surface.push_back(faces[i].second);
-        i = end;
-    }
-    return surface;
-}
-
 }  // namespace delassus

@@ -23,7 +23,7 @@ public:
     Tetrahedron(const std::array<std::int32_t, 4>& nodes, const std::array<Vector3d, 4>& positions,
                 const ElasticMaterial& material, ElementModel model);
 
-    static constexpr int size = 4;
+    static constexpr int size = 4, freedoms = 3;
     [[nodiscard]] const std::array<std::int32_t, 4>& nodes() const { return nodes_; }
     /// A quarter of it goes to each node.
     [[nodiscard]] double mass() const { return density_ * volume_; }
@@ -55,7 +55,7 @@ public:
     Cable(const std::array<std::int32_t, 2>& nodes, const std::array<Vector3d, 2>& positions,
           const CableParameters& parameters);
 
-    static constexpr int size = 2;
+    static constexpr int size = 2, freedoms = 3;
     [[nodiscard]] const std::array<std::int32_t, 2>& nodes() const { return nodes_; }
     [[nodiscard]] double mass() const { return mass_; }
     [[nodiscard]] double energy(const std::array<NodePlacement, 2>& at) const;

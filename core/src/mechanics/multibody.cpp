@@ -2,33 +2,25 @@
 // Building a multibody system, and reading its states.
 #include "delassus/multibody.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
-#include "delassus/error.hpp"
+#include "mechanics/checks.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
 
 using mechanics::array;
+using mechanics::finite;
 using mechanics::Matrix3d;
 using mechanics::quaternion;
 using mechanics::Quaterniond;
+using mechanics::refuse_unless;
 using mechanics::vector;
 using mechanics::Vector3d;
 
 namespace {
-
-bool finite(const Vector3& v) {
-    return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
-}
-
-void refuse_unless(bool condition, std::string_view what, std::string_view name, std::string_view rule) {
-    if (!condition) throw InputError(fmt::format("{} \"{}\" {}", what, name, rule));
-}
 
 Matrix3d tensor(const Inertia& J) {
     Matrix3d result;
@@ -106,20 +98,15 @@ std::int32_t MultibodySystem::add_node(const NodeParameters& parameters) {
     return static_cast<std::int32_t>(self.nodes.size()) - 1;
 }
 
-namespace {
-
-/// Placements at t = 0, without columns.
-mechanics::Placements initial_placements(const std::vector<mechanics::Body>& bodies) {
-    mechanics::Placements at(bodies.size());
+mechanics::Placements MultibodySystem::Implementation::initial_placements() const {
+    mechanics::Placements result(bodies.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) {
-        auto& place = at[static_cast<BodyIndex>(k)];
+        auto& place = result[static_cast<BodyIndex>(k)];
         place.x = vector(bodies[k].parameters.pose.position);
         place.A = quaternion(bodies[k].parameters.pose.orientation).toRotationMatrix();
     }
-    return at;
+    return result;
 }
-
-}  // namespace
 
 std::int32_t MultibodySystem::add_joint(const JointParameters& parameters) {
     auto& self = *implementation_;
@@ -138,7 +125,7 @@ std::int32_t MultibodySystem::add_joint(const JointParameters& parameters) {
     refuse_unless(
         !(parameters.lower > parameters.upper), "the limits of the joint", name,
         fmt::format("are {} and {}; the lower must not exceed the upper", parameters.lower, parameters.upper));
-    self.joints.push_back(mechanics::make_joint(parameters, initial_placements(self.bodies), self.joints));
+    self.joints.push_back(mechanics::make_joint(parameters, self.initial_placements(), self.joints));
     if (parameters.kind != JointKind::Gear) keep_apart(parameters.first, parameters.second);
     return static_cast<std::int32_t>(self.joints.size()) - 1;
 }
@@ -172,7 +159,7 @@ void MultibodySystem::add_spring(const SpringParameters& spring) {
     refuse_unless(spring.stiffness >= 0.0 && spring.damping >= 0.0 && std::isfinite(spring.stiffness + spring.damping),
                   "the stiffness and damping of the spring", spring.name, "must be finite and not negative");
     refuse_unless(!(spring.rest_length < 0.0), "the rest length of the spring", spring.name, "must not be negative");
-    self.springs.push_back(mechanics::make_spring(spring, initial_placements(self.bodies)));
+    self.springs.push_back(mechanics::make_spring(spring, self.initial_placements()));
 }
 
 void MultibodySystem::add_bushing(const BushingParameters& bushing) {
@@ -185,8 +172,7 @@ void MultibodySystem::add_bushing(const BushingParameters& bushing) {
         for (const double value : *values)
             refuse_unless(value >= 0.0 && std::isfinite(value), "the stiffness and damping of the bushing",
                           bushing.name, "must be finite and not negative");
-    for (auto& spring : mechanics::make_bushing(bushing, initial_placements(self.bodies)))
-        self.springs.push_back(spring);
+    for (auto& spring : mechanics::make_bushing(bushing, self.initial_placements())) self.springs.push_back(spring);
 }
 
 void MultibodySystem::add_load(const LoadParameters& load) {
@@ -194,63 +180,25 @@ void MultibodySystem::add_load(const LoadParameters& load) {
     self.must_not_be_finished();
     self.check_body(load.body, load.name);
     refuse_unless(load.body != world_body, "the load", load.name, "acts on no body");
-    const auto at = initial_placements(self.bodies);
+    const auto at = self.initial_placements();
     self.loads.push_back({load, at[load.body].A.transpose() * (vector(load.point) - at[load.body].x)});
 }
 
-void MultibodySystem::Implementation::check_node(std::int32_t node, std::string_view what) const {
-    if (node < 0 || node >= static_cast<std::int32_t>(nodes.size()))
-        throw InputError(fmt::format("{} names the node {}; there are {}", what, node, nodes.size()));
-}
+namespace {
 
-void MultibodySystem::add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
-                                      ElementModel model) {
-    auto& self = *implementation_;
-    self.must_not_be_finished();
-    if (!(material.young > 0.0 && std::isfinite(material.young)) ||
-        !(material.density > 0.0 && std::isfinite(material.density)))
-        throw InputError(fmt::format("Young's modulus is {} Pa and the density {} kg/m³; both must be positive",
-                                     material.young, material.density));
-    if (!(material.poisson > -1.0 && material.poisson < 0.5))
-        throw InputError(fmt::format("Poisson's ratio is {}; it must lie between -1 and 0.5", material.poisson));
-    if (!(material.damping_time >= 0.0))
-        throw InputError(fmt::format("the damping time is {} s; it must not be negative", material.damping_time));
-    std::array<Vector3d, 4> positions;
-    for (std::size_t k = 0; k < 4; ++k) {
-        self.check_node(nodes[k], "a tetrahedron");
-        positions[k] = vector(self.nodes[static_cast<std::size_t>(nodes[k])].parameters.position);
-    }
-    self.tetrahedra.emplace_back(nodes, positions, material, model);
-    for (const auto node : nodes)
-        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.25 * self.tetrahedra.back().mass();
-}
-
-void MultibodySystem::add_cable(const CableParameters& cable) {
-    auto& self = *implementation_;
-    self.must_not_be_finished();
-    std::array<Vector3d, 2> positions;
-    for (std::size_t k = 0; k < 2; ++k) {
-        self.check_node(cable.nodes[k], fmt::format("the cable \"{}\"", cable.name));
-        positions[k] = vector(self.nodes[static_cast<std::size_t>(cable.nodes[k])].parameters.position);
-    }
-    const double distance = (positions[1] - positions[0]).norm();
-    refuse_unless(distance > 0.0, "the nodes of the cable", cable.name, "coincide");
-    refuse_unless(!(cable.rest_length <= 0.0), "the rest length of the cable", cable.name, "must be positive");
-    refuse_unless(cable.young > 0.0 && cable.area > 0.0 && cable.density >= 0.0 && cable.damping_time >= 0.0 &&
-                      std::isfinite(cable.young * cable.area * cable.density * cable.damping_time),
-                  "the modulus, area, density and damping of the cable", cable.name, "must be positive and finite");
-    self.cables.emplace_back(cable.nodes, positions, cable);
-    for (const auto node : cable.nodes)
-        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.5 * self.cables.back().mass();
-}
-
-std::int32_t MultibodySystem::add_material(const ContactMaterial& material) {
-    auto& self = *implementation_;
+void check_material(const ContactMaterial& material) {
     if (!(material.friction >= 0.0) || !std::isfinite(material.friction))
         throw InputError(
             fmt::format("the friction coefficient is {}; it must be finite and not negative", material.friction));
     if (!(material.restitution >= 0.0 && material.restitution <= 1.0))
         throw InputError(fmt::format("the restitution is {}; it must lie between 0 and 1", material.restitution));
+}
+
+}  // namespace
+
+std::int32_t MultibodySystem::add_material(const ContactMaterial& material) {
+    auto& self = *implementation_;
+    check_material(material);
     self.materials.push_back(material);
     return static_cast<std::int32_t>(self.materials.size()) - 1;
 }
@@ -260,8 +208,7 @@ void MultibodySystem::set_material_pair(std::int32_t first, std::int32_t second,
     const auto count = static_cast<std::int32_t>(self.materials.size());
     if (first < 0 || second < 0 || first >= count || second >= count)
         throw InputError(fmt::format("a material pair names {} and {}; there are {} materials", first, second, count));
-    add_material(material);  // checks it
-    self.materials.pop_back();
+    check_material(material);
     self.material_pairs[std::minmax(first, second)] = material;
 }
 
@@ -321,12 +268,9 @@ void MultibodySystem::finish() {
         self.position_size += 3;
         self.n += 3;
     }
-    self.initial = initial_placements(self.bodies);
-    for (std::size_t k = 0; k < self.bodies.size(); ++k) {
-        auto& place = self.initial[static_cast<BodyIndex>(k)];
-        place.column = self.bodies[k].column;
-    }
-    self.at = self.initial;
+    self.at = self.initial_placements();
+    for (std::size_t k = 0; k < self.bodies.size(); ++k)
+        self.at[static_cast<BodyIndex>(k)].column = self.bodies[k].column;
     for (auto& joint : self.joints) {
         joint.first_row = self.m;
         self.m += joint.row_count();

@@ -21,17 +21,18 @@ void add_matrix(std::int32_t row, std::int32_t column, const Matrix3d& matrix, d
     H.add_block(row, column, 3, 3, block.data(), factor);
 }
 
-/// Adds a row-major matrix of 3 × 3 blocks over the moving nodes of an element.
-template <class Matrix, class Nodes>
+/// Adds a matrix of blocks over the moving nodes (or bodies) of an element, each with `freedoms` rows.
+template <int freedoms, class Matrix, class Nodes>
 void add_element(const Matrix& matrix, const Nodes& at, double factor, Tangent tangent, MatrixAssembler& H) {
     for (std::size_t a = 0; a < at.size(); ++a)
         for (std::size_t b = 0; b < at.size(); ++b) {
             if (at[a].column < 0 || at[b].column < 0) continue;
-            const auto i = 3 * static_cast<Eigen::Index>(a), j = 3 * static_cast<Eigen::Index>(b);
-            RowMajor3 block = matrix.template block<3, 3>(i, j);
+            const auto i = freedoms * static_cast<Eigen::Index>(a), j = freedoms * static_cast<Eigen::Index>(b);
+            Eigen::Matrix<double, freedoms, freedoms, Eigen::RowMajor> block =
+                matrix.template block<freedoms, freedoms>(i, j);
             if (tangent == Tangent::Symmetric)
-                block = (0.5 * (block + matrix.template block<3, 3>(j, i).transpose())).eval();
-            H.add_block(at[a].column, at[b].column, 3, 3, block.data(), factor);
+                block = (0.5 * (block + matrix.template block<freedoms, freedoms>(j, i).transpose())).eval();
+            H.add_block(at[a].column, at[b].column, freedoms, freedoms, block.data(), factor);
         }
 }
 
@@ -102,12 +103,14 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
                 result[columns.column[static_cast<std::size_t>(k)] + i] -= factor * force * self.gradient[6 * k + i];
     }
     self.for_each_element(state, [&](const auto& element, const auto& at) {
-        typename std::decay_t<decltype(element)>::Forces forces;
+        using Element = std::decay_t<decltype(element)>;
+        constexpr int freedoms = Element::freedoms;
+        typename Element::Forces forces;
         element.force(at, forces);
         for (std::size_t a = 0; a < at.size(); ++a)
             if (at[a].column >= 0)
-                Eigen::Map<Vector3d>(result + at[a].column) +=
-                    factor * forces.template segment<3>(3 * static_cast<Eigen::Index>(a));
+                Eigen::Map<Eigen::Matrix<double, freedoms, 1>>(result + at[a].column) +=
+                    factor * forces.template segment<freedoms>(freedoms * static_cast<Eigen::Index>(a));
     });
     for (const auto& load : self.loads) {
         const auto& place = self.at[load.parameters.body];
@@ -141,9 +144,10 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         add_local(columns, K, factor, tangent, H);
     }
     self.for_each_element(state, [&](const auto& element, const auto& at) {
-        typename std::decay_t<decltype(element)>::Matrix K;
+        using Element = std::decay_t<decltype(element)>;
+        typename Element::Matrix K;
         element.stiffness(at, K);
-        add_element(K, at, factor, tangent, H);
+        add_element<Element::freedoms>(K, at, factor, tangent, H);
     });
     for (const auto& load : self.loads) {
         const auto& place = self.at[load.parameters.body];
@@ -181,16 +185,17 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
     }
     self.for_each_element(state, [&](const auto& element, const auto& at) {
         if (!element.damped()) return;
-        typename std::decay_t<decltype(element)>::Matrix R;
+        using Element = std::decay_t<decltype(element)>;
+        typename Element::Matrix R;
         element.damping(at, R);
-        add_element(R, at, factor, tangent, H);
+        add_element<Element::freedoms>(R, at, factor, tangent, H);
     });
 }
 
 bool MultibodySystem::has_stiffness() const {
     const auto& self = *implementation_;
     return self.gyroscopic || !self.springs.empty() || !self.loads.empty() || !self.tetrahedra.empty() ||
-           !self.cables.empty();
+           !self.cables.empty() || !self.beams.empty();
 }
 
 }  // namespace delassus

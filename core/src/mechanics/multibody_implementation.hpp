@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include "mechanics/beam.hpp"
 #include "mechanics/elements.hpp"
 #include "mechanics/model.hpp"
 
@@ -18,6 +19,7 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::Load> loads;
     std::vector<mechanics::Tetrahedron> tetrahedra;
     std::vector<mechanics::Cable> cables;
+    std::vector<mechanics::Beam> beams;
     std::vector<mechanics::BoundedMotor> bounded_motors;
     mechanics::Motions motions;
     std::vector<Shape> shapes;
@@ -37,7 +39,6 @@ struct MultibodySystem::Implementation {
     // ---- Since finish() ----
     std::int32_t n = 0, position_size = 0, m = 0;
     bool gyroscopic = false;  // a moving body whose moments differ
-    mechanics::Placements initial;
     std::unique_ptr<CollisionDetector> detector;
 
     // ---- Work space of the call that runs ----
@@ -52,11 +53,13 @@ struct MultibodySystem::Implementation {
     void check_body(BodyIndex body, const std::string& name) const;
     void check_node(std::int32_t node, std::string_view what) const;
 
+    /// Placements of all bodies so far at t = 0, without columns.
+    [[nodiscard]] mechanics::Placements initial_placements() const;
     /// Placements of a state; v may be null for what needs positions alone.
     void place(const double* q, const double* v) const;
 
     [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
-    /// Visits all elements with the placements of their nodes: visit(element, placements).
+    /// Visits all elements with the placements of their nodes or bodies: visit(element, placements). After place().
     template <class Visitor>
     void for_each_element(const State& state, Visitor&& visit) const {
         const auto each = [&](const auto& elements) {
@@ -69,6 +72,7 @@ struct MultibodySystem::Implementation {
         };
         each(tetrahedra);
         each(cables);
+        for (const auto& beam : beams) visit(beam, mechanics::Beam::Ends{at[beam.bodies()[0]], at[beam.bodies()[1]]});
     }
 
     /// Visits the rows of all joints but gears: visit(row of C, Row).

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -52,6 +53,24 @@ Motion Motion::sine(double amplitude, double frequency, double phase, double off
                     omega == 0.0 ? std::sin(phase) * t : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
                 return offset * t + amplitude * swing;
             }};
+}
+
+// Torsion of a rectangle a ≥ b: a b³ (1/3 − 0.21 (b/a)(1 − b⁴/(12 a⁴))) (Young and Budynas, Roark's Formulas for
+// Stress and Strain, 2002, table 10.1).
+BeamSection BeamSection::rectangle(double width, double height) {
+    const double a = std::max(width, height), b = std::min(width, height), ratio = b / a;
+    const double area = width * height;
+    return {area,
+            area * height * height / 12.0,
+            area * width * width / 12.0,
+            a * b * b * b * (1.0 / 3.0 - 0.21 * ratio * (1.0 - std::pow(ratio, 4) / 12.0)),
+            5.0 / 6.0 * area,
+            5.0 / 6.0 * area};
+}
+
+BeamSection BeamSection::circle(double radius) {
+    const double area = std::numbers::pi * radius * radius, inertia = 0.25 * area * radius * radius;
+    return {area, inertia, inertia, 2.0 * inertia, 0.9 * area, 0.9 * area};
 }
 
 JointParameters::JointParameters() : lower(none), upper(none) {}

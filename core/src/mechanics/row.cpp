@@ -21,6 +21,26 @@ Arm arm_of(const Part& part, double t) {
     return {along, rate * across, acceleration * across - rate * rate * along};
 }
 
+/// c̄ alone.
+Vector3d direction_of(const Part& part, double t) {
+    if (!part.turn) return part.arm;
+    const double angle = part.turn->value(t);
+    return std::cos(angle) * part.arm + std::sin(angle) * part.quarter;
+}
+
+Vector3d value_of(const Feature& feature, const Placements& at, double t) {
+    Vector3d result = Vector3d::Zero();
+    for (int k = 0; k < feature.count; ++k) {
+        const Part& part = feature.parts[static_cast<std::size_t>(k)];
+        const Placement& place = at[part.body];
+        Vector3d vector = place.A * direction_of(part, t);
+        if (part.point) vector += place.x;
+        result += part.sign * vector;
+    }
+    return result;
+}
+
+/// A feature with what its derivatives in time need.
 struct Motion3 {
     Vector3d value = Vector3d::Zero(), partial = Vector3d::Zero(), velocity = Vector3d::Zero(),
              curvature = Vector3d::Zero();
@@ -52,7 +72,7 @@ void add_transposed(const Feature& feature, const Placements& at, double t, cons
         if (place.column < 0) continue;
         const int first = columns.place(place.column);
         if (part.point) result.segment<3>(first) += factor * part.sign * y;
-        result.segment<3>(first + 3) += factor * part.sign * arm_of(part, t).c.cross(place.A.transpose() * y);
+        result.segment<3>(first + 3) += factor * part.sign * direction_of(part, t).cross(place.A.transpose() * y);
     }
 }
 
@@ -65,7 +85,7 @@ void add_turning(const Feature& feature, const Placements& at, double t, const V
         if (place.column < 0) continue;
         const int first = columns.place(place.column) + 3;
         result.block<3, 3>(first, first) +=
-            factor * part.sign * skew(arm_of(part, t).c) * skew(place.A.transpose() * y);
+            factor * part.sign * skew(direction_of(part, t)) * skew(place.A.transpose() * y);
     }
 }
 
@@ -77,13 +97,13 @@ void add_product(const Feature& u, const Feature& w, const Placements& at, doubl
         const Placement& left_place = at[left.body];
         if (left_place.column < 0) continue;
         const int row = columns.place(left_place.column);
-        const Matrix3d left_turn = -left.sign * left_place.A * skew(arm_of(left, t).c);
+        const Matrix3d left_turn = -left.sign * left_place.A * skew(direction_of(left, t));
         for (int j = 0; j < w.count; ++j) {
             const Part& right = w.parts[static_cast<std::size_t>(j)];
             const Placement& right_place = at[right.body];
             if (right_place.column < 0) continue;
             const int column = columns.place(right_place.column);
-            const Matrix3d right_turn = -right.sign * right_place.A * skew(arm_of(right, t).c);
+            const Matrix3d right_turn = -right.sign * right_place.A * skew(direction_of(right, t));
             if (left.point && right.point)
                 result.block<3, 3>(row, column) += factor * left.sign * right.sign * Matrix3d::Identity();
             if (left.point) result.block<3, 3>(row, column + 3) += factor * left.sign * right_turn;
@@ -118,12 +138,12 @@ RowColumns Row::columns(const Placements& at) const {
 }
 
 double Row::value(const Placements& at, double t) const {
-    const double c = evaluate(u, at, t).value.dot(evaluate(w, at, t).value);
+    const double c = value_of(u, at, t).dot(value_of(w, at, t));
     return outer(*this, c).value - offset - (drive ? drive->value(t) : 0.0);
 }
 
 void Row::gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const {
-    const Vector3d first = evaluate(u, at, t).value, second = evaluate(w, at, t).value;
+    const Vector3d first = value_of(u, at, t), second = value_of(w, at, t);
     const double slope = outer(*this, first.dot(second)).slope;
     result.setZero(6 * columns.bodies);
     add_transposed(u, at, t, second, columns, slope, result);
@@ -147,7 +167,7 @@ double Row::curvature(const Placements& at, double t) const {
 }
 
 void Row::hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const {
-    const Vector3d first = evaluate(u, at, t).value, second = evaluate(w, at, t).value;
+    const Vector3d first = value_of(u, at, t), second = value_of(w, at, t);
     const Outer f = outer(*this, first.dot(second));
     result.setZero(6 * columns.bodies, 6 * columns.bodies);
     add_turning(u, at, t, second, columns, f.slope, result);

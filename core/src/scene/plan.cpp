@@ -40,10 +40,9 @@ public:
         std::map<std::int32_t, std::set<BodyIndex>> bodies;
         for (std::size_t i = 0; i < shapes.size(); ++i) bodies[system.shape_material[i]].insert(shapes[i].body);
         // Nodes do not touch one another: all of them are as one more body.
-        for (const auto& block : system.elastic_blocks) {
-            if (block.contact_radius == 0.0) continue;
+        for (const auto material : system.node_contact_material) {
             nodes_touch_ = shape_moves_ = true;
-            bodies[block.contact_material].insert(static_cast<BodyIndex>(system.bodies.size()));
+            bodies[material].insert(static_cast<BodyIndex>(system.bodies.size()));
         }
         for (auto first = bodies.begin(); first != bodies.end(); ++first)
             for (auto second = first; second != bodies.end(); ++second)
@@ -100,6 +99,7 @@ public:
     SystemPlan make() {
         first_step();
         bodies();
+        files();
         constraints();
         contacts();
         matrix();
@@ -141,6 +141,7 @@ private:
             if (joint.kind != JointKind::Gear) hold(joint.first, joint.second);
         for (const auto& spring : system_.springs) hold(spring.first, spring.second);
         for (const auto& bushing : system_.bushings) hold(bushing.first, bushing.second);
+        for (const auto& [first, second] : system_.beams) hold(first, second);
         if (!touching_.pairs().empty())
             for (const auto& shape : system_.system->shapes()) held.insert(shape.body);
         for (std::size_t i = 0; i < system_.bodies.size(); ++i) {
@@ -162,6 +163,17 @@ private:
         if (!free.empty())
             leave(counted(free.size(), "free body", "free bodies"),
                   "nothing touches or holds them, so they reach no solver: " + some_of(free));
+    }
+
+    void files() {
+        if (system_.surfaces_read) {
+            keep("surfaces in files", "the scene names them");
+            plan_.libraries.emplace_back("delassus_surface_mesh.so");
+        }
+        if (system_.tetrahedra_read) {
+            keep("tetrahedra in files", "the scene names them");
+            plan_.libraries.emplace_back("delassus_volume_mesh.so");
+        }
     }
 
     void constraints() {
@@ -189,7 +201,7 @@ private:
     void contacts() {
         if (touching_.detects()) {
             keep("collision detection", counted(system_.system->shapes().size(), "shape", "shapes") +
-                                            (touching_.nodes_touch() ? " and nodes of elastic blocks" : ""));
+                                            (touching_.nodes_touch() ? " and nodes of elements" : ""));
             plan_.libraries.emplace_back("delassus_collision.so");
         } else {
             leave("collision detection",

@@ -83,10 +83,44 @@ Shape SystemReader::read_shape_kind(const YAML::Node& item, std::string_view kin
     return shape;
 }
 
+std::vector<Shape> SystemReader::read_mesh_shapes(const YAML::Node& node) {
+    std::string file;
+    double scale = 1.0;
+    bool centered = false;
+    if (node.IsScalar()) {
+        file = node.Scalar();
+    } else {
+        read_map(source_, node, "\"mesh\"",
+                 {{"file", [&](const YAML::Node& n) { file = scalar(source_, n, "file"); }},
+                  {"scale", [&](const YAML::Node& n) { scale = positive_number(source_, n, "scale"); }},
+                  {"centered", [&](const YAML::Node& n) { centered = truth(source_, n, "centered"); }}});
+    }
+    if (file.empty()) source_.refuse(node, "\"mesh\" lacks the key \"file\"");
+    result_.surfaces_read = true;
+    return at(node, [&] {
+        std::vector<Shape> shapes;
+        for (auto& part : read_surface_mesh(source_.folder() / file, scale)) {
+            Shape shape;
+            shape.kind = ShapeKind::Convex;
+            shape.mesh = std::make_shared<const Mesh>(std::move(part));
+            shapes.push_back(std::move(shape));
+        }
+        if (!centered) return shapes;
+        const Vector3 centre = mass_properties(shapes).centre;
+        for (auto& shape : shapes) {
+            Mesh moved = *shape.mesh;
+            for (auto& vertex : moved.vertices)
+                for (std::size_t i = 0; i < 3; ++i) vertex[i] -= centre[i];
+            shape.mesh = std::make_shared<const Mesh>(std::move(moved));
+        }
+        return shapes;
+    });
+}
+
 std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Node& node) {
     std::vector<ShapeOfBody> shapes;
     for (const YAML::Node& item : elements(source_, node, "shapes")) {
-        std::optional<Shape> kind;
+        std::vector<Shape> kind;  // one, or the parts of a mesh
         ShapeOfBody one;
         one.node = item;
         Pose pose;
@@ -98,18 +132,24 @@ std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Nod
             {"margin", [&](const YAML::Node& n) { margin = nonnegative_number(source_, n, "margin"); }}};
         for (const char* name : {"sphere", "box", "capsule", "cylinder", "plane"})
             handlers.emplace_back(name, [&, name](const YAML::Node& n) {
-                if (kind) source_.refuse(n, "a shape is of one kind, not of several");
-                kind = read_shape_kind(item, name, n);
+                if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
+                kind = {read_shape_kind(item, name, n)};
             });
+        handlers.emplace_back("mesh", [&](const YAML::Node& n) {
+            if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
+            kind = read_mesh_shapes(n);
+        });
         read_map(source_, item, "a shape", handlers);
-        if (!kind)
+        if (kind.empty())
             source_.refuse(item,
                            "a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
-                           "\"plane\"");
-        one.shape = *kind;
-        one.shape.pose = pose;
-        one.shape.margin = margin;
-        shapes.push_back(std::move(one));
+                           "\"plane\", \"mesh\"");
+        for (const Shape& part : kind) {
+            one.shape = part;
+            one.shape.pose = pose;
+            one.shape.margin = margin;
+            shapes.push_back(one);
+        }
     }
     return shapes;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Elastic parts of a scene: blocks of tetrahedra, cables between nodes.
+// Elastic parts of a scene: blocks and meshes of tetrahedra, cables between nodes.
 #include <array>
-#include <limits>
+#include <optional>
 
 #include "scene/system_reader.hpp"
 
@@ -27,64 +27,112 @@ ElementModel element_model(const Source& source, const YAML::Node& node) {
 
 }  // namespace
 
-void SystemReader::read_elastic_block(const YAML::Node& item, const Copy& copy) {
-    ElasticBlockParameters block;
-    block.corner = copy.offset;
-    bool edges = false, cells = false;
+template <class Parameters>
+std::vector<std::pair<std::string_view, Handler>> SystemReader::elastic_handlers(Parameters& body) {
     const auto number = [&](double& value, std::string_view key, auto&& read) {
         return std::pair<std::string_view, Handler>{
             key, [this, &value, key, read](const YAML::Node& n) { value = read(source_, n, key); }};
     };
-    const auto read_contact = [&](const YAML::Node& node) {
+    const auto read_contact = [this, &body](const YAML::Node& node) {
         bool radius = false, material = false;
         read_map(source_, node, "\"contact\"",
                  {{"radius",
                    [&](const YAML::Node& n) {
-                       block.contact_radius = positive_number(source_, n, "radius");
+                       body.contact_radius = positive_number(source_, n, "radius");
                        radius = true;
                    }},
                   {"material", [&](const YAML::Node& n) {
-                       block.contact_material = material_named(n, "material");
+                       body.contact_material = material_named(n, "material");
                        material = true;
                    }}});
         if (!radius || !material)
             source_.refuse(node, fmt::format("\"contact\" lacks the key \"{}\"", radius ? "material" : "radius"));
     };
-    read_map(source_, item, "an elastic block",
-             {{"name", [&](const YAML::Node& n) { block.name = name_in(source_, n, "name", copy); }},
-              {"corner", [&](const YAML::Node& n) { block.corner = point_in(source_, n, "corner", copy); }},
-              {"edges",
-               [&](const YAML::Node& n) {
-                   block.edges = vector3(source_, n, "edges");
-                   edges = true;
-               }},
-              {"cells",
-               [&](const YAML::Node& n) {
-                   const auto counts = elements(source_, n, "cells");
-                   if (counts.size() != 3) source_.refuse(n, "\"cells\" must be three whole numbers");
-                   for (std::size_t i = 0; i < 3; ++i)
-                       block.cells[i] = value<std::int32_t>(source_, counts[i], "cells", "a whole number");
-                   cells = true;
-               }},
-              number(block.material.young, "young", positive_number),
-              number(block.material.poisson, "poisson", finite_number),
-              number(block.material.density, "density", positive_number),
-              number(block.material.damping_time, "damping_time", nonnegative_number),
-              {"model", [&](const YAML::Node& n) { block.model = element_model(source_, n); }},
-              {"fixed_faces",
-               [&](const YAML::Node& n) {
-                   for (const YAML::Node& one : elements(source_, n, "fixed_faces"))
-                       block.fixed_faces[face(source_, one)] = true;
-               }},
-              {"velocity", [&](const YAML::Node& n) { block.velocity = vector3(source_, n, "velocity"); }},
-              {"contact", read_contact},
-              {"repeat", [](const YAML::Node&) {}}});
+    return {number(body.material.young, "young", positive_number),
+            number(body.material.poisson, "poisson", finite_number),
+            number(body.material.density, "density", positive_number),
+            number(body.material.damping_time, "damping_time", nonnegative_number),
+            {"model", [this, &body](const YAML::Node& n) { body.model = element_model(source_, n); }},
+            {"velocity", [this, &body](const YAML::Node& n) { body.velocity = vector3(source_, n, "velocity"); }},
+            {"contact", read_contact},
+            {"repeat", [](const YAML::Node&) {}}};
+}
+
+void SystemReader::read_elastic_block(const YAML::Node& item, const Copy& copy) {
+    ElasticBlockParameters block;
+    block.corner = copy.offset;
+    bool edges = false, cells = false;
+    auto handlers = elastic_handlers(block);
+    handlers.insert(handlers.end(),
+                    {{"name", [&](const YAML::Node& n) { block.name = name_in(source_, n, "name", copy); }},
+                     {"corner", [&](const YAML::Node& n) { block.corner = point_in(source_, n, "corner", copy); }},
+                     {"edges",
+                      [&](const YAML::Node& n) {
+                          block.edges = vector3(source_, n, "edges");
+                          edges = true;
+                      }},
+                     {"cells",
+                      [&](const YAML::Node& n) {
+                          const auto counts = elements(source_, n, "cells");
+                          if (counts.size() != 3) source_.refuse(n, "\"cells\" must be three whole numbers");
+                          for (std::size_t i = 0; i < 3; ++i)
+                              block.cells[i] = value<std::int32_t>(source_, counts[i], "cells", "a whole number");
+                          cells = true;
+                      }},
+                     {"fixed_faces", [&](const YAML::Node& n) {
+                          for (const YAML::Node& one : elements(source_, n, "fixed_faces"))
+                              block.fixed_faces[face(source_, one)] = true;
+                      }}});
+    read_map(source_, item, "an elastic block", handlers);
     if (!edges || !cells)
         source_.refuse(item,
                        fmt::format("elastic block \"{}\" lacks the key \"{}\"", block.name, edges ? "cells" : "edges"));
     const auto first = at(item, [&] { return result_.system->add_elastic_block(block); });
     take_name(item, blocks_, "elastic block", block.name, first);
+    if (block.contact_radius > 0.0) result_.node_contact_material.push_back(block.contact_material);
     result_.elastic_blocks.push_back(block);
+}
+
+void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
+    ElasticMeshParameters body;
+    body.pose.position = copy.offset;
+    std::string file;
+    double scale = 1.0;
+    int refinements = 0;
+    const auto read_box = [this](const YAML::Node& node) {
+        std::optional<Vector3> lower, upper;
+        read_map(source_, node, "a box of \"fixed_boxes\"",
+                 {{"lower", [&](const YAML::Node& n) { lower = vector3(source_, n, "lower"); }},
+                  {"upper", [&](const YAML::Node& n) { upper = vector3(source_, n, "upper"); }}});
+        if (!lower || !upper)
+            source_.refuse(node,
+                           fmt::format("a box of \"fixed_boxes\" lacks the key \"{}\"", lower ? "upper" : "lower"));
+        return AlignedBox{*lower, *upper};
+    };
+    auto handlers = elastic_handlers(body);
+    handlers.insert(
+        handlers.end(),
+        {{"name", [&](const YAML::Node& n) { body.name = name_in(source_, n, "name", copy); }},
+         {"file", [&](const YAML::Node& n) { file = scalar(source_, n, "file"); }},
+         {"scale", [&](const YAML::Node& n) { scale = positive_number(source_, n, "scale"); }},
+         {"refinements",
+          [&](const YAML::Node& n) { refinements = value<int>(source_, n, "refinements", "a whole number"); }},
+         {"position", [&](const YAML::Node& n) { body.pose.position = point_in(source_, n, "position", copy); }},
+         {"orientation", [&](const YAML::Node& n) { body.pose.orientation = orientation(source_, n); }},
+         {"fixed_boxes", [&](const YAML::Node& n) {
+              for (const YAML::Node& one : elements(source_, n, "fixed_boxes"))
+                  body.fixed_boxes.push_back(read_box(one));
+          }}});
+    read_map(source_, item, "an elastic mesh", handlers);
+    if (file.empty()) source_.refuse(item, fmt::format("elastic mesh \"{}\" lacks the key \"file\"", body.name));
+    result_.tetrahedra_read = true;
+    if (!file.ends_with(".vol")) result_.surfaces_read = true;
+    const auto first = at(item, [&] {
+        body.mesh = read_tetrahedral_mesh(source_.folder() / file, scale, refinements);
+        return result_.system->add_elastic_mesh(body);
+    });
+    take_name(item, blocks_, "elastic mesh", body.name, first);
+    if (body.contact_radius > 0.0) result_.node_contact_material.push_back(body.contact_material);
 }
 
 void SystemReader::read_cable(const YAML::Node& item, const Copy& copy) {

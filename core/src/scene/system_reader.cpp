@@ -20,8 +20,8 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
-    for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "cables", "joints",
-                             "motors", "springs", "bushings", "loads", "keep_apart"})
+    for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
+                             "cables", "beams", "joints", "motors", "springs", "bushings", "loads", "keep_apart"})
         all.emplace_back(list, [this, list](const YAML::Node& n) { lists_.insert_or_assign(list, n); });
     return all;
 }
@@ -41,7 +41,9 @@ void SystemReader::build(const YAML::Node& place) {
     read_items("bodies", &SystemReader::read_body);
     read_items("nodes", &SystemReader::read_node);
     read_items("elastic_blocks", &SystemReader::read_elastic_block);
+    read_items("elastic_meshes", &SystemReader::read_elastic_mesh);
     read_items("cables", &SystemReader::read_cable);
+    read_items("beams", &SystemReader::read_beam);
     if (result_.bodies.empty() && result_.system->node_count() == 0)
         missing("bodies", "bodies: [{name: ball, mass: 1, …}]");
     read_items("joints", &SystemReader::read_joint);

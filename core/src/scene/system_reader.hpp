@@ -37,7 +37,9 @@ private:
     void read_body(const YAML::Node& item, const Copy& copy);
     void read_node(const YAML::Node& item, const Copy& copy);
     void read_elastic_block(const YAML::Node& item, const Copy& copy);
+    void read_elastic_mesh(const YAML::Node& item, const Copy& copy);
     void read_cable(const YAML::Node& item, const Copy& copy);
+    void read_beam(const YAML::Node& item, const Copy& copy);
     void read_joint(const YAML::Node& item, const Copy& copy);
     void read_motor(const YAML::Node& item, const Copy& copy);
     void read_spring(const YAML::Node& item, const Copy& copy);
@@ -54,6 +56,11 @@ private:
         YAML::Node node;
     };
     std::vector<ShapeOfBody> read_shapes(const YAML::Node& node);
+    /// A file's surface as convex shapes, one for each part.
+    std::vector<Shape> read_mesh_shapes(const YAML::Node& node);
+    /// Keys that elastic blocks and meshes share.
+    template <class Parameters>
+    std::vector<std::pair<std::string_view, Handler>> elastic_handlers(Parameters& body);
     Shape read_shape_kind(const YAML::Node& item, std::string_view kind, const YAML::Node& node);
     ContactMaterial read_contact_material(const YAML::Node& node, std::string_view name,
                                           std::vector<std::pair<std::string_view, Handler>> more = {});

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Adding elements to a multibody system.
+#include <cmath>
+
+#include "mechanics/checks.hpp"
+#include "mechanics/multibody_implementation.hpp"
+
+namespace delassus {
+
+using mechanics::finite;
+using mechanics::refuse_unless;
+using mechanics::vector;
+using mechanics::Vector3d;
+
+void mechanics::check_material(const ElasticMaterial& material) {
+    if (!(material.young > 0.0 && std::isfinite(material.young)) ||
+        !(material.density > 0.0 && std::isfinite(material.density)))
+        throw InputError(fmt::format("Young's modulus is {} Pa and the density {} kg/m³; both must be positive",
+                                     material.young, material.density));
+    if (!(material.poisson > -1.0 && material.poisson < 0.5))
+        throw InputError(fmt::format("Poisson's ratio is {}; it must lie between -1 and 0.5", material.poisson));
+    if (!(material.damping_time >= 0.0))
+        throw InputError(fmt::format("the damping time is {} s; it must not be negative", material.damping_time));
+}
+
+void MultibodySystem::Implementation::check_node(std::int32_t node, std::string_view what) const {
+    if (node < 0 || node >= static_cast<std::int32_t>(nodes.size()))
+        throw InputError(fmt::format("{} names the node {}; there are {}", what, node, nodes.size()));
+}
+
+void MultibodySystem::add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
+                                      ElementModel model) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    mechanics::check_material(material);
+    std::array<Vector3d, 4> positions;
+    for (std::size_t k = 0; k < 4; ++k) {
+        self.check_node(nodes[k], "a tetrahedron");
+        positions[k] = vector(self.nodes[static_cast<std::size_t>(nodes[k])].parameters.position);
+    }
+    self.tetrahedra.emplace_back(nodes, positions, material, model);
+    for (const auto node : nodes)
+        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.25 * self.tetrahedra.back().mass();
+}
+
+void MultibodySystem::add_cable(const CableParameters& cable) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    std::array<Vector3d, 2> positions;
+    for (std::size_t k = 0; k < 2; ++k) {
+        self.check_node(cable.nodes[k], fmt::format("the cable \"{}\"", cable.name));
+        positions[k] = vector(self.nodes[static_cast<std::size_t>(cable.nodes[k])].parameters.position);
+    }
+    const double distance = (positions[1] - positions[0]).norm();
+    refuse_unless(distance > 0.0, "the nodes of the cable", cable.name, "coincide");
+    refuse_unless(!(cable.rest_length <= 0.0), "the rest length of the cable", cable.name, "must be positive");
+    refuse_unless(cable.young > 0.0 && cable.area > 0.0 && cable.density >= 0.0 && cable.damping_time >= 0.0 &&
+                      std::isfinite(cable.young * cable.area * cable.density * cable.damping_time),
+                  "the modulus, area, density and damping of the cable", cable.name, "must be positive and finite");
+    self.cables.emplace_back(cable.nodes, positions, cable);
+    for (const auto node : cable.nodes)
+        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.5 * self.cables.back().mass();
+}
+
+void MultibodySystem::add_beam(const BeamParameters& beam) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    self.check_body(beam.first, beam.name);
+    self.check_body(beam.second, beam.name);
+    refuse_unless(beam.first != beam.second, "the beam", beam.name, "joins a body to itself");
+    refuse_unless(finite(beam.section_y), "the y axis of the section of the beam", beam.name, "is not finite");
+    mechanics::check_material(beam.material);
+    const auto& section = beam.section;
+    for (const double value : {section.area, section.inertia_y, section.inertia_z, section.torsion})
+        refuse_unless(value > 0.0 && std::isfinite(value), "the area and moments of the section of the beam", beam.name,
+                      "must be positive and finite");
+    refuse_unless(section.shear_area_y > 0.0 && section.shear_area_z > 0.0, "the shear areas of the beam", beam.name,
+                  "must be positive");
+    self.beams.emplace_back(beam, self.initial_placements());
+    keep_apart(beam.first, beam.second);
+}
+
+// Each element gives half of its mass ρ A ℓ and of its section's inertia ρ ℓ (I_y + I_z, I_y, I_z) to the body at each
+// end. The mass does so as a point: stiffness is exact for loads at the nodes, and this keeps M diagonal.
+BodyIndex MultibodySystem::add_elastic_beam(const ElasticBeamParameters& beam) {
+    BeamParameters element{beam.name, 0, 0, beam.from, beam.to, beam.section_y, beam.section, beam.material};
+    const mechanics::Matrix3d axes = mechanics::Beam::axes(element);
+    refuse_unless(beam.elements >= 1, "the beam", beam.name,
+                  fmt::format("has {} elements; it needs one at least", beam.elements));
+    mechanics::check_material(beam.material);
+    const Vector3d from = vector(beam.from), span = vector(beam.to) - from;
+    const Vector3d velocity = vector(beam.velocity), turning = vector(beam.angular_velocity);
+    const mechanics::Quaterniond orientation(axes);
+    const double share = beam.material.density * span.norm() / beam.elements;
+    const auto first = body_count();
+    for (std::int32_t k = 0; k <= beam.elements; ++k) {
+        const bool start = k == 0, end = k == beam.elements;
+        const double length = start || end ? 0.5 * share : share;
+        const Vector3d offset = static_cast<double>(k) / beam.elements * span;
+        BodyParameters body;
+        body.name = fmt::format("{}_{}", beam.name, k);
+        body.mass = length * beam.section.area;
+        body.inertia = {length * (beam.section.inertia_y + beam.section.inertia_z), length * beam.section.inertia_y,
+                        length * beam.section.inertia_z};
+        body.pose.position = mechanics::array(from + offset);
+        body.pose.orientation = {orientation.w(), orientation.x(), orientation.y(), orientation.z()};
+        body.fixed = (start && beam.fixed_from) || (end && beam.fixed_to);
+        if (!body.fixed) {
+            body.velocity = mechanics::array(velocity + turning.cross(offset));
+            body.angular_velocity = mechanics::array(axes.transpose() * turning);
+        }
+        element.second = add_body(body);
+        element.second_point = body.pose.position;
+        if (k > 0) add_beam(element);
+        element.first = element.second;
+        element.first_point = element.second_point;
+    }
+    return first;
+}
+
+}  // namespace delassus

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "support/call_in_child.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <string_view>
+#include <vector>
+
+#include "delassus/error.hpp"
+
+namespace delassus {
+namespace {
+
+/// The message of the child: one of these, then the content, then message_end.
+constexpr char holds_result = 'R';
+constexpr char holds_refusal = 'E';
+constexpr char message_end = '.';
+
+[[noreturn]] void run_in_child(const std::filesystem::path& file, unsigned seconds,
+                               const std::function<std::string()>& work, int pipe) {
+    for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGPIPE}) std::signal(signal, SIG_DFL);
+    const rlimit no_core{0, 0};
+    const rlimit processor_time{seconds, seconds};
+    setrlimit(RLIMIT_CORE, &no_core);
+    setrlimit(RLIMIT_CPU, &processor_time);
+    // What the C library says about a damaged heap is not for the user.
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    dup2(nowhere, STDOUT_FILENO);
+    dup2(nowhere, STDERR_FILENO);
+    std::string message;
+    try {
+        message = holds_result + work();
+    } catch (const InputError& refusal) {
+        message = std::string(1, holds_refusal) + refusal.what();
+    } catch (const std::exception& failure) {
+        message = holds_refusal + fmt::format("{} cannot be read: {}.", file.string(), failure.what());
+    }
+    message += message_end;
+    for (std::string_view rest = message; !rest.empty();) {
+        const ssize_t written = write(pipe, rest.data(), rest.size());
+        if (written < 0 && errno != EINTR) _exit(1);
+        if (written > 0) rest.remove_prefix(static_cast<std::size_t>(written));
+    }
+    _exit(0);
+}
+
+std::string read_to_end(int pipe) {
+    std::string bytes;
+    std::vector<char> buffer(1 << 16);
+    for (;;) {
+        const ssize_t got = read(pipe, buffer.data(), buffer.size());
+        if (got > 0) bytes.append(buffer.data(), static_cast<std::size_t>(got));
+        if (got == 0 || (got < 0 && errno != EINTR)) return bytes;
+    }
+}
+
+}  // namespace
+
+std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
+                          const std::function<std::string()>& work) {
+    int pipe[2];
+    if (pipe2(pipe, O_CLOEXEC) != 0)
+        throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(errno)));
+    const pid_t child = fork();
+    if (child == 0) {
+        close(pipe[0]);
+        run_in_child(file, seconds, work, pipe[1]);
+    }
+    const int fork_error = errno;
+    close(pipe[1]);
+    std::string message;
+    if (child > 0) message = read_to_end(pipe[0]);
+    close(pipe[0]);
+    if (child < 0) throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(fork_error)));
+    int status = 0;
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (message.size() >= 2 && message.back() == message_end) {
+        const std::string content = message.substr(1, message.size() - 2);
+        if (message[0] == holds_result) return content;
+        if (message[0] == holds_refusal) throw InputError(content);
+    }
+    const bool too_long = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
+    throw InputError(
+        fmt::format("{} is damaged: {} {} on it.", file.string(), library, too_long ? "does not end" : "fails"));
+}
+
+}  // namespace delassus
