@@ -11,6 +11,7 @@
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"
+#include "support/library_path.hpp"
 
 namespace delassus::command {
 
@@ -101,10 +102,6 @@ int list(const PluginsArguments& arguments) {
     return exit_solved;
 }
 
-bool is_path(const std::string& text) {
-    return text.find('/') != std::string::npos || text.ends_with(".so");
-}
-
 /// Loads a library that may crash or print.
 PluginInfo info_of_library(const std::string& library) {
     install_crash_handler(fmt::format("the plugin {}", library), exit_not_converged);
@@ -113,7 +110,7 @@ PluginInfo info_of_library(const std::string& library) {
 }
 
 PluginInfo info_of(const PluginsArguments& arguments) {
-    if (is_path(arguments.plugin)) return info_of_library(arguments.plugin);
+    if (is_library_path(arguments.plugin)) return info_of_library(arguments.plugin);
     return Registry(absolute(arguments.plugin_path)).find(arguments.plugin);
 }
 
@@ -143,8 +140,8 @@ int info(const PluginsArguments& arguments) {
 
 int check(const PluginsArguments& arguments) {
     const std::filesystem::path library =
-        is_path(arguments.plugin) ? std::filesystem::path(arguments.plugin)
-                                  : Registry(absolute(arguments.plugin_path)).find(arguments.plugin).library;
+        is_library_path(arguments.plugin) ? std::filesystem::path(arguments.plugin)
+                                          : Registry(absolute(arguments.plugin_path)).find(arguments.plugin).library;
     const auto report = check::run_conformance(std::filesystem::absolute(library));
     if (arguments.json) {
         fmt::print("{}", check::to_json(report));

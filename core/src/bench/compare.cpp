@@ -11,6 +11,7 @@
 #include <set>
 
 #include "delassus/error.hpp"
+#include "support/library_path.hpp"
 
 namespace delassus::bench {
 
@@ -57,10 +58,6 @@ std::vector<std::string> split(const std::string& text) {
     return parts;
 }
 
-bool is_path(const std::string& text) {
-    return text.find('/') != std::string::npos || text.ends_with(".so");
-}
-
 void compare_velocities(const ComparePlan& plan, ProblemResults& problem, const std::vector<fs::path>& solutions) {
     if (problem.facts.n == 0) return;
     const Measurement* best = nullptr;
@@ -96,7 +93,7 @@ std::vector<SolverConfig> solvers_of(const std::vector<std::string>& texts, cons
     for (const auto& text : texts)
         for (const auto& part : split(text)) {
             SolverConfig solver = parse_solver(part);
-            if (is_path(solver.name)) {
+            if (is_library_path(solver.name)) {
                 if (!fs::is_regular_file(solver.name))
                     throw InputError(fmt::format("there is no plugin {}", solver.name));
                 solver.name = fs::absolute(solver.name).lexically_normal().string();

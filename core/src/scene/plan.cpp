@@ -11,6 +11,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/simulation.hpp"
+#include "support/library_path.hpp"
 
 namespace delassus {
 namespace {
@@ -172,9 +173,10 @@ private:
         } else {
             leave("bilateral constraints", "the system has no joint with rows");
         }
-        for (const auto& joint : system_.joints)
-            if (!std::isnan(joint.lower) || !std::isnan(joint.upper)) needs_ |= DELASSUS_CAN_NONNEGATIVE;
-        if (has_limits()) keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");
+        if (has_limits()) {
+            needs_ |= DELASSUS_CAN_NONNEGATIVE;
+            keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");
+        }
         for (const auto& motor : system_.motors) {
             if (std::isinf(motor.force_limit)) continue;
             needs_ |= DELASSUS_CAN_BOX;
@@ -251,8 +253,7 @@ private:
             const bool chosen = name == system_.solver.name;
             keep(fmt::format("solver {}", name),
                  chosen ? "the scene names it" : "the first of the preference list that can take the problems");
-            const bool file = name.find('/') != std::string::npos || name.ends_with(".so");
-            plan_.libraries.push_back(file ? name : registry_.find(name).library.filename().string());
+            plan_.libraries.push_back(is_library_path(name) ? name : registry_.find(name).library.filename().string());
         }
     }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "support/library_path.hpp"
 
 namespace delassus {
 namespace {
@@ -28,8 +29,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     try {
         // Checked here without loading the plugin, which may never be needed.
         const auto& name = system.solver.name;
-        const bool file = name.find('/') != std::string::npos || name.ends_with(".so");
-        if (!name.empty() && !file)
+        if (!name.empty() && !is_library_path(name))
             static_cast<void>(resolve_options(name, registry.find(name).options, system.solver.options));
         timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
     } catch (const InputError& error) {

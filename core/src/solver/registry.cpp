@@ -13,6 +13,7 @@
 
 #include "delassus/error.hpp"
 #include "support/library_location.hpp"
+#include "support/library_path.hpp"
 #include "support/nearest_name.hpp"
 
 namespace delassus {
@@ -101,7 +102,7 @@ const PluginInfo& Registry::find(const std::string& name) const {
 }
 
 std::shared_ptr<const Plugin> Registry::load(const std::string& name_or_path) const {
-    if (name_or_path.find('/') != std::string::npos || name_or_path.ends_with(".so")) return Plugin::load(name_or_path);
+    if (is_library_path(name_or_path)) return Plugin::load(name_or_path);
     const PluginInfo& listed = find(name_or_path);
     auto plugin = Plugin::load(listed.library);
     if (sidecar_text(plugin->info()) != sidecar_text(listed))
