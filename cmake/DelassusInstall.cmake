@@ -19,6 +19,7 @@ install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp"
 install(EXPORT delassusSdkTargets NAMESPACE delassus:: DESTINATION ${package_directory})
 install(EXPORT delassusCoreTargets NAMESPACE delassus:: DESTINATION ${package_directory})
 install(FILES "${DELASSUS_PLUGIN_DIRECTORY}/not-built.list" DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/plugins)
+install(FILES "${PROJECT_SOURCE_DIR}/docs/scene.schema.json" DESTINATION ${CMAKE_INSTALL_DATADIR}/delassus)
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 configure_package_config_file(cmake/delassusConfig.cmake.in delassusConfig.cmake

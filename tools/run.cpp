@@ -10,6 +10,7 @@
 
 #include "command.hpp"
 #include "delassus/error.hpp"
+#include "delassus/scene_schema.hpp"
 #include "delassus/simulation.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
@@ -212,6 +213,15 @@ void add_run(CLI::App& program, Action& action) {
         ->type_name("N");
     command->add_option("--resume", arguments->resume, "Go on with the run in this folder")->type_name("DIR");
     command->add_flag("--json", arguments->json, "Print the report as JSON");
+    command
+        ->add_flag_callback(
+            "--schema",
+            [] {
+                fmt::print("{}", scene_schema());
+                throw CLI::Success();
+            },
+            "Print the JSON Schema of scene files")
+        ->trigger_on_parse();
     command->callback([arguments, &action] { action.run = [arguments] { return run(*arguments); }; });
 }
 

@@ -52,7 +52,7 @@ public:
         if (rod_) C[0] = (x * x + y * y - length * length) / (2.0 * length);
     }
     void add_constraint_jacobian(const State& state, std::int32_t row, MatrixAssembler& D) const override {
-        for (std::int32_t i = 0; rod_ && i < 2; ++i) {
+        for (std::int32_t i = 0; i < 2; ++i) {
             const double slope = (state.q[i + 2] - state.q[i]) / length;
             D.add(row, i, -slope);
             D.add(row, i + 2, slope);
@@ -60,11 +60,11 @@ public:
     }
     void constraint_curvature(const State& state, double* c) const override {
         const double x = state.v[2] - state.v[0], y = state.v[3] - state.v[1];
-        if (rod_) c[0] = (x * x + y * y) / length;
+        c[0] = (x * x + y * y) / length;
     }
     void add_constraint_stiffness(const State&, const double* lambda, double factor, Tangent,
                                   MatrixAssembler& H) const override {
-        for (std::int32_t i = 0; rod_ && i < 4; ++i) {
+        for (std::int32_t i = 0; i < 4; ++i) {
             H.add(i, i, factor * lambda[0] / length);
             H.add(i, (i + 2) % 4, -factor * lambda[0] / length);
         }

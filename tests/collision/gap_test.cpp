@@ -94,6 +94,22 @@ TEST(Gap, BetweenFacesIsExact) {
     }
 }
 
+/// Faces that rounding alone keeps apart, turned by as little: their normal stays the faces'.
+TEST(Gap, NearRoundingKeepsTheNormalOfTheFaces) {
+    const Shape lower = convex(box_mesh(0.5, 0.5, 0.5), 0), upper = convex(box_mesh(0.5, 0.5, 0.5), 1);
+    Random random(3);
+    for (int trial = 0; trial < 200; ++trial) {
+        const Quaterniond turned = random.rotation();
+        const double gap = 1e-12 * random(0.1, 10.0);
+        const Quaterniond little = turn(gap, random.direction());
+        const Vector3d at = turned * Vector3d(0.1 * random(0.0, 1.0), 0.05, 1.0 + gap);
+        const auto contacts = touch(lower, upper, pose(Vector3d::Zero(), turned), pose(at, little * turned), 0.01);
+        EXPECT_GE(contacts.size(), 4U) << "trial " << trial;
+        for (const auto& contact : contacts)
+            EXPECT_NEAR(vector(contact.normal).dot(turned * Vector3d::UnitZ()), 1.0, 1e-12) << "trial " << trial;
+    }
+}
+
 TEST(Gap, OfCrossedEdges) {
     // Two cubes on edge, their edges crossing at right angles.
     const Shape cube = shape(ShapeKind::Box, {0.5, 0.5, 0.5}, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Mechanisms against published or closed-form values.
+// Mechanisms against published or closed-form values; more of them are scenes (tests/scene/published_test.cpp).
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,8 +10,6 @@
 
 namespace delassus {
 namespace {
-
-using tests::angle_about_z;
 
 State run(DynamicalSystem& system, const std::string& method, double end, int steps, const OptionTexts& options = {}) {
     static const Registry registry;
@@ -47,36 +45,6 @@ TEST(Published, FourBarAfterTenSeconds) {
     EXPECT_NEAR(2.0 * (last.position[0] - 2.0), 0.328458111541, 2e-3);
     EXPECT_NEAR(2.0 * last.position[1], 0.944518538179, 1e-3);
     EXPECT_NEAR(system->energy(state), energy, 1e-3);
-}
-
-double apart(double angle, double expected) {
-    return std::abs(std::remainder(angle - expected, 2.0 * M_PI));
-}
-
-TEST(Published, SqueezerAfterThreeHundredths) {
-    const auto system = tests::squeezer();
-    const State state = run(*system, "generalized_alpha", 0.03, 3000, nearly_lossless);
-    const auto angle = [&](BodyIndex body) { return angle_about_z(system->pose(state, body)); };
-    const double tolerance = 2e-4;
-    EXPECT_LE(apart(angle(0), 15.81077119629904), tolerance);
-    EXPECT_LE(apart(angle(1) - angle(0), -15.75637105984298), tolerance);
-    EXPECT_LE(apart(angle(2), 0.04082224013073101), tolerance);
-    EXPECT_LE(apart(angle(3) - angle(4), -0.5347301163226948), tolerance);
-    EXPECT_LE(apart(angle(4), 0.5244099658805304), tolerance);
-    EXPECT_LE(apart(angle(5) - angle(6), 0.5347301163226948), tolerance);
-    EXPECT_LE(apart(angle(6), 1.048080741042263), tolerance);
-}
-
-TEST(Published, BricardMovesWithoutLosingEnergy) {
-    const auto system = tests::bricard();
-    const State start = system->initial_state();
-    EXPECT_EQ(6 * 5 - system->m(), 0) << "Gruebler's count";
-    const State state = run(*system, "generalized_alpha", 10.0, 25000, nearly_lossless);
-    double moved = 0.0;
-    for (BodyIndex k = 0; k < 5; ++k)
-        moved = std::max(moved, std::abs(system->pose(state, k).position[1] - system->pose(start, k).position[1]));
-    EXPECT_GT(moved, 0.1);
-    EXPECT_NEAR(system->energy(state), system->energy(start), 1e-4);
 }
 
 TEST(ClosedForm, TopPrecessesSteadily) {

@@ -4,6 +4,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/scene.hpp"
+#include "support/run_command.hpp"
 
 namespace delassus::tests {
 namespace {
@@ -114,9 +115,36 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 5: the system \"left\" has no key \"bodys\"; did you mean \"bodies\"?"},
         Case{"SystemName", "systems:\n  a/b: {}\n",
              "s.yaml, line 2: \"a/b\" cannot name a system; use letters, digits, _ and -"},
+        Case{"GearOfItself", head + bodies + "joints:\n  - {name: g, kind: gear, gear_first: g, gear_second: g}\n",
+             "s.yaml, line 6: \"gear_first\" is \"g\", but there is no such joint; there are none"},
+        Case{"AliasOfItself", head + "bodies: &all\n  - *all\n",
+             "s.yaml, line 3: an item of \"bodies\" must be a map of keys to values"},
+        Case{"InvertedElements", head + "elastic_blocks:\n  - {name: e, edges: [1, 1, -1], cells: [1, 1, 1]}\n",
+             "s.yaml, line 4: the edges of the elastic block \"e\" must be positive and finite"},
+        Case{"FlatConvex",
+             head + "bodies:\n  - {name: b, mass: 1, shapes: [{convex: {points: [[0, 0, 0], [1, 0, 0], [0, 1, 0], "
+                    "[1, 1, 0]]}}]}\n",
+             "s.yaml, line 4: the points of a convex shape must span a volume"},
+        Case{"NoPoints", head + "bodies:\n  - {name: b, mass: 1, shapes: [{convex: {}}]}\n",
+             "s.yaml, line 4: \"convex\" lacks the key \"points\""},
+        Case{"NoKind", head + "bodies:\n  - {name: b, mass: 1, shapes: [{margin: 1}]}\n",
+             "s.yaml, line 4: a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
+             "\"plane\", \"convex\""},
         Case{"PlaneMoves", head + "bodies:\n  - {name: b, mass: 1, shapes: [{plane: {}}]}\n",
              "s.yaml, line 4: a plane has no volume, so that no mass and no inertia follow from it"}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
+
+TEST(BadSceneFile, EndsTheCommandWithCodeTwoAndOneSentence) {
+    const ScratchFolder scratch;
+    const auto file = scratch / "s.yaml";
+    std::ofstream(file) << head << "bodies:\n  - {name: b, mass: 0}\n";
+    for (const std::string command : {"run ", "plan "}) {
+        const auto result = run_command(command + file.string());
+        EXPECT_EQ(result.exit_code, 2);
+        EXPECT_EQ(result.err, "delassus: " + file.string() + ", line 4: \"mass\" is 0; it must be positive\n");
+        EXPECT_EQ(result.out, "");
+    }
+}
 
 std::string told(const std::string& path, const std::string& value) {
     SceneOverrides overrides;

@@ -60,6 +60,28 @@ TEST(Scene, CapsuleAgreesWithItsParts) {
     EXPECT_NEAR(body.inertia.xx, cylinder * (r * r / 4 + 1.0 / 3) + 2 * half_across, 1e-12);
 }
 
+TEST(Scene, ConvexShapeIsTheHullOfItsPoints) {
+    // A box of given corners, with one more point inside, is the box of given size.
+    const auto scene = parse_scene(head + R"(bodies:
+  - name: given
+    density: 3
+    shapes:
+      - convex:
+          points: [[1, 2, 3], [1, 2, -3], [1, -2, 3], [1, -2, -3], [-1, 2, 3], [-1, 2, -3], [-1, -2, 3], [-1, -2, -3],
+                   [0.5, 0, 0]]
+  - {name: sized, density: 3, position: [9, 0, 0], shapes: [{box: {size: [2, 4, 6]}}]}
+)",
+                                   "s");
+    const auto& bodies = scene.systems[0].bodies;
+    EXPECT_NEAR(bodies[0].mass, bodies[1].mass, 1e-12);
+    EXPECT_NEAR(bodies[0].inertia.xx, bodies[1].inertia.xx, 1e-9);
+    EXPECT_NEAR(bodies[0].inertia.zz, bodies[1].inertia.zz, 1e-9);
+    EXPECT_NEAR(bodies[0].inertia.xy, 0.0, 1e-9);
+    const Shape& shape = scene.systems[0].system->shapes()[0];
+    EXPECT_EQ(shape.mesh->vertices.size(), 8u);
+    EXPECT_EQ(shape.mesh->triangles.size(), 12u);
+}
+
 TEST(Scene, RepeatsFillAGrid) {
     const auto scene = parse_scene(head + R"(bodies:
   - name: "b_{i}_{j}_{k}"

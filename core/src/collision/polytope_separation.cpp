@@ -111,6 +111,10 @@ std::optional<Separation> polytope_separation(Placed& a, Placed& b, const Vector
     if (best.distance > limit) return std::nullopt;
     if (best.distance <= 0.0 && !(a.normals.empty() && b.normals.empty())) return best;
     if (auto apart = gjk(a, b, offset); apart && apart->distance > best.distance + 10.0 * rounding) {
+        // What its normal parts is less than the distance of its points where rounding ended the search, which for gaps
+        // near rounding leaves a direction that is wrong.
+        const Vector3d& n = apart->normal;
+        if (n.dot(offset + b.support(-n) - a.support(n)) <= best.distance + 10.0 * rounding) return best;
         if (apart->distance > limit) return std::nullopt;
         apart->feature = feature_id(FeatureKind::Nearest, 0, 0);
         return apart;

@@ -184,9 +184,10 @@ private:
         } else {
             leave("bilateral constraints", "the system has no joint with rows");
         }
-        for (const auto& joint : system_.joints)
-            if (!std::isnan(joint.lower) || !std::isnan(joint.upper)) needs_ |= DELASSUS_CAN_NONNEGATIVE;
-        if (has_limits()) keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");
+        if (has_limits()) {
+            needs_ |= DELASSUS_CAN_NONNEGATIVE;
+            keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");
+        }
         for (const auto& motor : system_.motors) {
             if (std::isinf(motor.force_limit)) continue;
             needs_ |= DELASSUS_CAN_BOX;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Materials, bodies with their shapes, and nodes of a scene.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
+#include "scene/hull.hpp"
 #include "scene/mass_properties.hpp"
 #include "scene/system_reader.hpp"
 
@@ -45,6 +47,12 @@ void SystemReader::read_material_pair(const YAML::Node& item, const Copy&) {
     result_.material_pairs.push_back({std::min(first, second), std::max(first, second), material});
 }
 
+namespace {
+
+constexpr std::array<std::string_view, 6> shape_kinds = {"sphere", "box", "capsule", "cylinder", "plane", "convex"};
+
+}  // namespace
+
 Shape SystemReader::read_shape_kind(const YAML::Node& item, std::string_view kind, const YAML::Node& node) {
     Shape shape;
     std::optional<double> radius, length;
@@ -75,6 +83,16 @@ Shape SystemReader::read_shape_kind(const YAML::Node& item, std::string_view kin
     } else if (kind == "plane") {
         shape.kind = ShapeKind::Plane;
         if (!node.IsNull()) read_map(source_, node, name, {});
+    } else if (kind == "convex") {
+        shape.kind = ShapeKind::Convex;
+        std::optional<std::vector<Vector3>> points;
+        read_map(source_, node, name, {{"points", [&](const YAML::Node& n) {
+                                            points.emplace();
+                                            for (const YAML::Node& point : elements(source_, n, "points"))
+                                                points->push_back(vector3(source_, point, "points"));
+                                        }}});
+        const auto& given = need(points, "points");
+        shape.mesh = at(node, [&] { return std::make_shared<Mesh>(hull_of_points(given)); });
     } else {
         shape.kind = kind == "capsule" ? ShapeKind::Capsule : ShapeKind::Cylinder;
         read_map(source_, node, name, {read_radius, read_length});
@@ -130,7 +148,7 @@ std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Nod
             {"position", [&](const YAML::Node& n) { pose.position = vector3(source_, n, "position"); }},
             {"orientation", [&](const YAML::Node& n) { pose.orientation = orientation(source_, n); }},
             {"margin", [&](const YAML::Node& n) { margin = nonnegative_number(source_, n, "margin"); }}};
-        for (const char* name : {"sphere", "box", "capsule", "cylinder", "plane"})
+        for (const std::string_view name : shape_kinds)
             handlers.emplace_back(name, [&, name](const YAML::Node& n) {
                 if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
                 kind = {read_shape_kind(item, name, n)};
@@ -142,8 +160,8 @@ std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Nod
         read_map(source_, item, "a shape", handlers);
         if (kind.empty())
             source_.refuse(item,
-                           "a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
-                           "\"plane\", \"mesh\"");
+                           fmt::format("a shape must have one of the keys \"{}\", \"mesh\"",
+                                       fmt::join(shape_kinds, "\", \"")));
         for (const Shape& part : kind) {
             one.shape = part;
             one.shape.pose = pose;

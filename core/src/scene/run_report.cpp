@@ -6,11 +6,8 @@
 #include "support/json_number.hpp"
 
 namespace delassus {
-namespace {
 
 using Json = nlohmann::ordered_json;
-
-}  // namespace
 
 std::string run_report_json(const std::string& scene, const Scene& read, std::vector<Simulation>& simulations,
                             const RunOutcome& outcome) {
