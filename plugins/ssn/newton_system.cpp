@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace delassus::ssn {
 
@@ -37,19 +38,25 @@ std::int32_t position(const SparseColumns& matrix, Eigen::Index row, Eigen::Inde
                                      matrix.innerIndexPtr());
 }
 
+bool same_pattern(const SparseColumns& a, const SparseColumns& b) {
+    return a.rows() == b.rows() && a.nonZeros() == b.nonZeros() &&
+           std::equal(a.outerIndexPtr(), a.outerIndexPtr() + a.cols() + 1, b.outerIndexPtr()) &&
+           std::equal(a.innerIndexPtr(), a.innerIndexPtr() + a.nonZeros(), b.innerIndexPtr());
+}
+
 }  // namespace
 
 void NewtonSystem::factorize(const ProblemView& problem, const ScaledProblem& scaled, bool pattern_is_new) {
     const std::vector<RowGroup> groups = NaturalMap::groups(problem);
-    if (pattern_is_new) {
-        factor_.reset();
-        choose_form(problem, groups);
-    }
+    if (pattern_is_new) choose_form(problem, groups);
+    const SparseColumns before = std::move(matrix_);
     if (velocities_) {
         build_velocities(problem, scaled, groups);
     } else {
         build_rows(problem, scaled, groups);
     }
+    // Zeros that are stored in D may make entries of N come and go, though the problem's pattern is the same.
+    if (!same_pattern(before, matrix_)) factor_.reset();
 }
 
 // Velocities where they are fewer than rows; with more velocities than rows, N is the smaller matrix, unless it has too
@@ -300,10 +307,8 @@ bool NewtonSystem::solve(const ScaledProblem& scaled, const NaturalMap& map, dou
     ++factorizations_;
     if (!factor_.factorize(matrix_, map.law() == 0.0)) return false;
 
-    // g = local − A (N + τ) δ_⊥, and then the whole step is δ_⊥ + B δ_B; the residual of the rows is g − (A N B + M)
-    // δ_B.
+    // g = local − A (N + τ) δ_⊥; the step is δ_⊥ + B δ_B, and the residual of the equation g − (A N B + M) δ_B.
     step = normal;
-    work_.setZero(local.size());
     scaled.multiply(step, product);
     expanded_ = product + tau * step;
     map.contract(expanded_, residual_);

