@@ -3,7 +3,6 @@
 // cone problem a step, contacts and impacts included. Order 1.
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
@@ -46,39 +45,42 @@ public:
 
     StepReport step(State& state, double h, StepSolver& solver) override {
         require_step(system_, state, h, "euler_implicit_linearized");
-        Problem problem;
-        problem.name = "step";
-        State end = state;  // the old q and v at the new time
-        end.t = state.t + h;
-        assemble_balance(state, end, h, problem);
-        assemble_constraints(state, end, h, problem);
-        assemble_unilateral(state, h, problem);
+        problem_.name = "step";
+        end_ = state;  // the old q and v at the new time
+        end_.t = state.t + h;
+        rows_.clear();
+        if (system_.has_unilateral()) system_.collect_unilateral(state, h, rows_);
+        assemble_balance(state, h);
+        assemble_constraints(state, h);
+        assemble_unilateral(state, h);
 
         StepReport report;
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
-        Solution solution{state.v, warm_start()};
-        report.solved = solver.solve(std::move(problem), solution, true);
+        solution_.x = state.v;
+        start_from_last_impulses(solution_.lambda);
+        report.solved = solver.solve(problem_, solution_, true);
         if (!report.solved) report.message = solver.effort().unsolved;
-        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution.x[i];
-        system_.increment(state.q.data(), delta_.data(), end.q.data());
-        end.v = solution.x;
-        require_finite(state, end, h, "euler_implicit_linearized");
-        report_reactions(state, solution.lambda, h, report);
-        state = std::move(end);
-        keep(solution.lambda, h);
+        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
+        system_.increment(state.q.data(), delta_.data(), end_.q.data());
+        end_.v = solution_.x;
+        require_finite(state, end_, h, "euler_implicit_linearized");
+        report_reactions(state, solution_.lambda, h, report);
+        state = end_;
+        keep(solution_.lambda, h);
         return report;
     }
 
     [[nodiscard]] int order() const override { return 1; }
     [[nodiscard]] bool damps_at_once() const override { return true; }
     [[nodiscard]] bool pushed(std::uint64_t key) const override {
-        const auto found = impulses_.find(key);
-        return found != impulses_.end() && found->second[0] > 0.0;
+        const double* impulse = last_impulse(key, 0);
+        return impulse && *impulse > 0.0;
     }
 
     void restart() override {
         multipliers_.clear();
+        kept_.clear();
         impulses_.clear();
         last_h_ = 0.0;
     }
@@ -88,10 +90,10 @@ public:
     std::vector<double> save() const override {
         std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0};
         memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
-        for (const auto& [key, impulse] : impulses_) {
+        for (const auto& [key, first, rows] : kept_) {
             memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),
-                                         static_cast<double>(impulse.size())});
-            memory.insert(memory.end(), impulse.begin(), impulse.end());
+                                         static_cast<double>(rows)});
+            memory.insert(memory.end(), impulses_.begin() + first, impulses_.begin() + first + rows);
         }
         return memory;
     }
@@ -112,75 +114,77 @@ public:
             const auto block = take(3);
             const auto key = (static_cast<std::uint64_t>(block[0]) << 32U) | static_cast<std::uint64_t>(block[1]);
             const auto impulse = take(static_cast<std::ptrdiff_t>(block[2]));
-            impulses_[key].assign(impulse, next);
+            kept_.push_back({key, static_cast<std::int32_t>(impulses_.size()), static_cast<std::int32_t>(block[2])});
+            impulses_.insert(impulses_.end(), impulse, next);
         }
+        sort_kept();
     }
 
 private:
-    void assemble_balance(const State& state, const State& end, double h, Problem& problem) {
+    void assemble_balance(const State& state, double h) {
         const Tangent tangent = exact_ ? Tangent::Exact : Tangent::Symmetric;
         H_.begin(n_, n_);
         system_.add_mass(state, 1.0, H_);
-        problem.a.assign(static_cast<std::size_t>(n_), 0.0);
-        system_.multiply_mass(state, 1.0, state.v.data(), problem.a.data());
-        system_.add_force(end, h, problem.a.data());
+        problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
+        system_.multiply_mass(state, 1.0, state.v.data(), problem_.a.data());
+        system_.add_force(end_, h, problem_.a.data());
         if (system_.has_stiffness()) {
             R_.begin(n_, n_);
-            system_.add_damping(end, h, tangent, R_);
+            system_.add_damping(end_, h, tangent, R_);
             const SparseMatrix& R = R_.finish();
-            R.multiply_add(1.0, state.v.data(), problem.a.data());
+            R.multiply_add(1.0, state.v.data(), problem_.a.data());
             H_.add_matrix(R);
-            system_.add_stiffness(end, h * h, tangent, H_);
+            system_.add_stiffness(end_, h * h, tangent, H_);
         }
         if (constraint_stiffness_ && !multipliers_.empty())
-            system_.add_definite_constraint_stiffness(end, multipliers_.data(), h * h, H_);
-        problem.H = H_.finish();
+            system_.add_definite_constraint_stiffness(end_, multipliers_.data(), h * h, H_);
+        problem_.H = H_.finish();
     }
 
-    void assemble_constraints(const State& state, const State& end, double h, Problem& problem) {
+    void assemble_constraints(const State& state, double h) {
         D_.begin(m_, n_);
         if (m_ > 0) {
-            system_.add_constraint_jacobian(end, 0, D_);
+            system_.add_constraint_jacobian(end_, 0, D_);
             system_.constraint(state, before_.data());
-            system_.constraint(end, after_.data());
+            system_.constraint(end_, after_.data());
         }
+        problem_.b.clear();
         for (std::int32_t i = 0; i < m_; ++i) {
             const double drift = std::clamp(before_[i] / h, -recovery_speed_, recovery_speed_);
-            problem.b.push_back(drift + (after_[i] - before_[i]) / h);
+            problem_.b.push_back(drift + (after_[i] - before_[i]) / h);
         }
-        for (const auto rows : blocks_) problem.cones.push_back(Cone::free(rows));
-        problem.D = D_.finish();
+        problem_.cones.resize(blocks_.size() + rows_.blocks().size());
+        for (std::size_t k = 0; k < blocks_.size(); ++k) {
+            problem_.cones[k].kind = ConeKind::Free;
+            problem_.cones[k].rows = blocks_[k];
+        }
+        problem_.D = D_.finish();
     }
 
-    void assemble_unilateral(const State& state, double h, Problem& problem) {
-        rows_.clear();
-        if (!system_.has_unilateral()) return;
-        system_.collect_unilateral(state, h, rows_);
-        const auto count = static_cast<std::int32_t>(rows_.rows().size());
+    void assemble_unilateral(const State& state, double h) {
         // Rows are appended to D, which is by compressed rows.
-        auto& D = problem.D;
-        D.rows += count;
+        auto& D = problem_.D;
+        D.rows += static_cast<std::int32_t>(rows_.rows().size());
         D.columns = n_;
-        std::vector<UnilateralRows::Entry> sorted;
-        std::size_t row = 0;
+        std::size_t row = 0, place = blocks_.size();
         for (const auto& block : rows_.blocks()) {
-            Cone cone = block.cone;
+            Cone& cone = problem_.cones[place++];
+            cone = block.cone;
             for (auto* bounds : {&cone.lo, &cone.hi})
                 for (double& bound : *bounds) bound *= h;
             for (std::int32_t i = 0; i < cone.rows; ++i, ++row) {
                 const auto first = rows_.entries().begin() + rows_.row_start()[row];
                 const auto last = rows_.entries().begin() + rows_.row_start()[row + 1];
-                sorted.assign(first, last);
-                std::sort(sorted.begin(), sorted.end(),
+                sorted_.assign(first, last);
+                std::sort(sorted_.begin(), sorted_.end(),
                           [](const auto& a, const auto& b) { return a.column < b.column; });
-                for (const auto& entry : sorted) {
+                for (const auto& entry : sorted_) {
                     D.column.push_back(entry.column);
                     D.value.push_back(entry.value);
                 }
                 D.row_start.push_back(D.entries());
-                problem.b.push_back(offset(block, i, rows_.rows()[row], rows_.speed(row, state.v.data()), h));
+                problem_.b.push_back(offset(block, i, rows_.rows()[row], rows_.speed(row, state.v.data()), h));
             }
-            problem.cones.push_back(std::move(cone));
         }
     }
 
@@ -213,33 +217,47 @@ private:
         return row.rate + std::max(row.gap / h, -recovery_speed_);
     }
 
-    /// The impulses of the last step, for the constraints that are still there.
-    [[nodiscard]] std::vector<double> warm_start() const {
-        std::vector<double> lambda = multipliers_;
+    /// λ ← the impulses of the last step, for the constraints that are still there.
+    void start_from_last_impulses(std::vector<double>& lambda) const {
+        lambda = multipliers_;
         for (double& value : lambda) value *= last_h_;
-        lambda.resize(static_cast<std::size_t>(m_));
+        lambda.resize(static_cast<std::size_t>(m_), 0.0);
         for (const auto& block : rows_.blocks()) {
-            const auto found = impulses_.find(block.key);
-            if (found != impulses_.end() && static_cast<std::int32_t>(found->second.size()) == block.cone.rows) {
-                lambda.insert(lambda.end(), found->second.begin(), found->second.end());
-            } else {
-                lambda.insert(lambda.end(), static_cast<std::size_t>(block.cone.rows), 0.0);
-            }
+            const double* impulse = last_impulse(block.key, block.cone.rows);
+            for (std::int32_t i = 0; i < block.cone.rows; ++i) lambda.push_back(impulse ? impulse[i] : 0.0);
         }
-        return lambda;
+    }
+
+    /// The impulses of a block in the last step; null if it was not there, or with another number of rows (0: any).
+    [[nodiscard]] const double* last_impulse(std::uint64_t key, std::int32_t rows) const {
+        const auto found = std::lower_bound(kept_.begin(), kept_.end(), key,
+                                            [](const Kept& kept, std::uint64_t wanted) { return kept.key < wanted; });
+        if (found == kept_.end() || found->key != key || (rows > 0 && found->rows != rows)) return nullptr;
+        return impulses_.data() + found->first;
     }
 
     void keep(const std::vector<double>& lambda, double h) {
         last_h_ = h;
         multipliers_.resize(static_cast<std::size_t>(m_));
         for (std::int32_t i = 0; i < m_; ++i) multipliers_[i] = lambda[i] / h;
-        impulses_.clear();
-        auto next = lambda.begin() + m_;
+        impulses_.assign(lambda.begin() + m_, lambda.end());
+        kept_.clear();
+        std::int32_t first = 0;
         for (const auto& block : rows_.blocks()) {
-            impulses_[block.key].assign(next, next + block.cone.rows);
-            next += block.cone.rows;
+            kept_.push_back({block.key, first, block.cone.rows});
+            first += block.cone.rows;
         }
+        sort_kept();
     }
+    void sort_kept() {
+        std::sort(kept_.begin(), kept_.end(), [](const Kept& a, const Kept& b) { return a.key < b.key; });
+    }
+
+    /// Where the impulses of a unilateral block of the last step stand in impulses_.
+    struct Kept {
+        std::uint64_t key;
+        std::int32_t first, rows;
+    };
 
     DynamicalSystem& system_;
     double recovery_speed_, restitution_speed_;
@@ -251,7 +269,13 @@ private:
     UnilateralRows rows_;
     std::vector<double> before_, after_, delta_;
     double last_h_ = 0.0;
-    std::map<std::uint64_t, std::vector<double>> impulses_;
+    std::vector<Kept> kept_;  // by ascending keys
+    std::vector<double> impulses_;
+    // Kept so that a step like the last allocates nothing.
+    Problem problem_;
+    Solution solution_;
+    State end_;
+    std::vector<UnilateralRows::Entry> sorted_;
 };
 
 const RegisterTimestepper row{
