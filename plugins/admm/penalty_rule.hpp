@@ -40,9 +40,11 @@ public:
             milestone_iteration_ = iteration;
         }
         if (has_previous_) {
-            const double ratio = (lambda - lambda_).norm() / (z - z_).norm();
-            if (std::isfinite(ratio) && ratio > 0.0) {
-                sum_ += std::log(ratio);
+            const double reactions = (lambda - lambda_).norm(), velocities = (z - z_).norm();
+            if (reactions > 0.0 || velocities > 0.0) {
+                // One of them may rest, where all contacts stick or all are open.
+                const double ratio = reactions / (penalty * velocities);
+                sum_ += std::log(std::clamp(ratio, 1.0 / largest_ratio, largest_ratio));
                 ++terms_;
             }
         }
@@ -55,7 +57,7 @@ public:
             return shifted(0.1 * penalty, penalty);
         }
         if (terms_ < window) return penalty;
-        const double balanced = std::exp(sum_ / terms_);
+        const double balanced = penalty * std::exp(sum_ / terms_);
         sum_ = 0.0;
         terms_ = 0;
         return balanced > 3.0 * penalty || balanced < penalty / 3.0 ? shifted(balanced, penalty) : penalty;
@@ -64,6 +66,7 @@ public:
 private:
     static constexpr int window = 10;
     static constexpr std::int64_t patience = 50;
+    static constexpr double largest_ratio = 100.0;
     static constexpr double smallest = 1e-6, largest = 1e12;
 
     void restart() {

@@ -43,8 +43,6 @@ public:
     [[nodiscard]] bool primal() const { return form_ == Form::Primal; }
     [[nodiscard]] std::int64_t analyses() const { return analyses_; }
     [[nodiscard]] std::int64_t factorizations() const { return factorizations_; }
-    /// Entries of the Cholesky factor.
-    [[nodiscard]] double factor_entries() const { return factor_ ? factor_->entries() : 0.0; }
 
 private:
     void choose_form(const sdk::ProblemView& problem, const RowScaling& scaling);

@@ -9,7 +9,7 @@ namespace delassus::admm {
 
 /// λ = P λ̂, û = P u with P diagonal and positive, so that N̂ = P N P has a unit diagonal on the average: one value
 /// p = (tr N_cc / rows)^(−½) for a block that is projected as a whole, p_i = N_ii^(−½) for any other row. λ̂ and û are
-/// both in √energy. Free rows, and box rows without bounds, are equations: their p is larger by √1000, as the penalty
+/// both in √energy. Free rows are equations: their p is larger by √1000, as the penalty
 /// of equations in OSQP (Stellato et al. 2020, section 5.2). Where H is singular |diag H|⁻¹ stands in for H⁻¹, as in
 /// the core's own measure.
 class RowScaling {
