@@ -130,7 +130,7 @@ public:
     /// Whether add_stiffness or add_damping ever add anything: a step without them factorises nothing.
     [[nodiscard]] virtual bool has_stiffness() const;
 
-    // ---- Bilateral constraints; nothing by default ----
+    // ---- Bilateral constraints; nothing by default. Timesteppers ask for them only where m() > 0. ----
 
     /// C(q, t); m.
     virtual void constraint(const State& state, double* C) const;

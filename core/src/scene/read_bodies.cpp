@@ -91,7 +91,7 @@ Shape SystemReader::read_shape_kind(const YAML::Node& item, std::string_view kin
                                             for (const YAML::Node& point : elements(source_, n, "points"))
                                                 points->push_back(vector3(source_, point, "points"));
                                         }}});
-        const auto& given = need(points, "points");
+        const auto given = need(points, "points");
         shape.mesh = at(node, [&] { return std::make_shared<Mesh>(hull_of_points(given)); });
     } else {
         shape.kind = kind == "capsule" ? ShapeKind::Capsule : ShapeKind::Cylinder;
