@@ -2,6 +2,7 @@
 // Every Jacobian of a multibody system against differences, away from the configuration that its joints hold.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "delassus/error.hpp"
@@ -85,6 +86,39 @@ INSTANTIATE_TEST_SUITE_P(Kinds, JointDerivatives,
                          testing::Values(JointKind::Spherical, JointKind::Revolute, JointKind::Prismatic,
                                          JointKind::Cylindrical, JointKind::Universal, JointKind::Fixed,
                                          JointKind::PointOnPlane, JointKind::Distance));
+
+// What is kept of the stiffness under λ less what is kept under −λ is the whole, and neither has negative eigenvalues.
+TEST_P(JointDerivatives, DefiniteStiffnessIsThePositivePart) {
+    MultibodySystem system;
+    JointParameters joint;
+    joint.kind = GetParam();
+    joint.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    joint.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    joint.point = {0.5, 0.2, 0.1};
+    joint.second_point = {0.9, -0.2, 0.6};
+    joint.axis = {1.0, 2.0, -0.5};
+    joint.second_axis = {2.0, -1.0, 0.0};
+    system.add_joint(joint);
+    system.finish();
+    const State state = displaced(system);
+    const VectorXd lambda = some_lambda(system), opposite = -lambda;
+    const auto n = system.n();
+    MatrixAssembler assembler;
+    const auto definite = [&](const VectorXd& reactions) {
+        assembler.begin(n, n);
+        system.add_definite_constraint_stiffness(state, reactions.data(), 2.0, assembler);
+        return tests::dense(assembler.finish());
+    };
+    assembler.begin(n, n);
+    system.add_constraint_stiffness(state, lambda.data(), -2.0, Tangent::Symmetric, assembler);
+    const Eigen::MatrixXd whole = tests::dense(assembler.finish()), plus = definite(lambda), minus = definite(opposite);
+    EXPECT_LE((plus - minus - whole).norm(), 1e-12 * whole.norm());
+    EXPECT_GT(plus.norm() + minus.norm(), 0.1);
+    for (const auto& part : {plus, minus}) {
+        EXPECT_LE((part - part.transpose()).norm(), 1e-13);
+        EXPECT_GE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(part).eigenvalues().minCoeff(), -1e-12);
+    }
+}
 
 struct Sizes {
     JointKind kind;
