@@ -87,8 +87,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, JointDerivatives,
                                          JointKind::Cylindrical, JointKind::Universal, JointKind::Fixed,
                                          JointKind::PointOnPlane, JointKind::Distance));
 
-// What is kept of the stiffness under λ less what is kept under −λ is the whole, and neither has negative eigenvalues.
-TEST_P(JointDerivatives, DefiniteStiffnessIsThePositivePart) {
+TEST_P(JointDerivatives, KeepADefiniteStiffness) {
     MultibodySystem system;
     JointParameters joint;
     joint.kind = GetParam();
@@ -101,22 +100,42 @@ TEST_P(JointDerivatives, DefiniteStiffnessIsThePositivePart) {
     system.add_joint(joint);
     system.finish();
     const State state = displaced(system);
-    const VectorXd lambda = some_lambda(system), opposite = -lambda;
+    for (const double sign : {1.0, -1.0}) {
+        const VectorXd lambda = sign * some_lambda(system);
+        MatrixAssembler assembler;
+        assembler.begin(system.n(), system.n());
+        system.add_definite_constraint_stiffness(state, lambda.data(), 2.0, assembler);
+        const Eigen::MatrixXd G = tests::dense(assembler.finish());
+        EXPECT_LE((G - G.transpose()).norm(), 1e-13);
+        EXPECT_GE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(G).eigenvalues().minCoeff(), -1e-12);
+    }
+}
+
+// A body on a ball joint, pulled along its arm: all of the stiffness is kept. Under pressure none is.
+TEST(DefiniteStiffness, IsTheWholeUnderPull) {
+    MultibodySystem system;
+    JointParameters joint;
+    joint.kind = JointKind::Spherical;
+    joint.second = system.add_body(tumbling("b", {0.4, -0.3, 0.5}));
+    system.add_joint(joint);
+    system.finish();
+    const State state = system.initial_state();
     const auto n = system.n();
-    MatrixAssembler assembler;
-    const auto definite = [&](const VectorXd& reactions) {
+    for (const double pull : {3.0, -3.0}) {
+        const VectorXd lambda = pull * Eigen::Vector3d(-0.4, 0.3, -0.5);  // towards the joint
+        MatrixAssembler assembler;
         assembler.begin(n, n);
-        system.add_definite_constraint_stiffness(state, reactions.data(), 2.0, assembler);
-        return tests::dense(assembler.finish());
-    };
-    assembler.begin(n, n);
-    system.add_constraint_stiffness(state, lambda.data(), -2.0, Tangent::Symmetric, assembler);
-    const Eigen::MatrixXd whole = tests::dense(assembler.finish()), plus = definite(lambda), minus = definite(opposite);
-    EXPECT_LE((plus - minus - whole).norm(), 1e-12 * whole.norm());
-    EXPECT_GT(plus.norm() + minus.norm(), 0.1);
-    for (const auto& part : {plus, minus}) {
-        EXPECT_LE((part - part.transpose()).norm(), 1e-13);
-        EXPECT_GE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(part).eigenvalues().minCoeff(), -1e-12);
+        system.add_constraint_stiffness(state, lambda.data(), -2.0, Tangent::Exact, assembler);
+        const Eigen::MatrixXd whole = tests::dense(assembler.finish());
+        assembler.begin(n, n);
+        system.add_definite_constraint_stiffness(state, lambda.data(), 2.0, assembler);
+        const Eigen::MatrixXd G = tests::dense(assembler.finish());
+        EXPECT_GT(whole.norm(), 1.0);
+        if (pull > 0.0) {
+            EXPECT_LE((G - whole).norm(), 1e-13 * whole.norm());
+        } else {
+            EXPECT_EQ(G.norm(), 0.0);
+        }
     }
 }
 
