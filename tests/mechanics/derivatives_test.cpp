@@ -2,6 +2,7 @@
 // Every Jacobian of a multibody system against differences, away from the configuration that its joints hold.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "delassus/error.hpp"
@@ -85,6 +86,58 @@ INSTANTIATE_TEST_SUITE_P(Kinds, JointDerivatives,
                          testing::Values(JointKind::Spherical, JointKind::Revolute, JointKind::Prismatic,
                                          JointKind::Cylindrical, JointKind::Universal, JointKind::Fixed,
                                          JointKind::PointOnPlane, JointKind::Distance));
+
+TEST_P(JointDerivatives, KeepADefiniteStiffness) {
+    MultibodySystem system;
+    JointParameters joint;
+    joint.kind = GetParam();
+    joint.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    joint.second = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    joint.point = {0.5, 0.2, 0.1};
+    joint.second_point = {0.9, -0.2, 0.6};
+    joint.axis = {1.0, 2.0, -0.5};
+    joint.second_axis = {2.0, -1.0, 0.0};
+    system.add_joint(joint);
+    system.finish();
+    const State state = displaced(system);
+    for (const double sign : {1.0, -1.0}) {
+        const VectorXd lambda = sign * some_lambda(system);
+        MatrixAssembler assembler;
+        assembler.begin(system.n(), system.n());
+        system.add_definite_constraint_stiffness(state, lambda.data(), 2.0, assembler);
+        const Eigen::MatrixXd G = tests::dense(assembler.finish());
+        EXPECT_LE((G - G.transpose()).norm(), 1e-13);
+        EXPECT_GE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(G).eigenvalues().minCoeff(), -1e-12);
+    }
+}
+
+// A body on a ball joint, pulled along its arm: all of the stiffness is kept. Under pressure none is.
+TEST(DefiniteStiffness, IsTheWholeUnderPull) {
+    MultibodySystem system;
+    JointParameters joint;
+    joint.kind = JointKind::Spherical;
+    joint.second = system.add_body(tumbling("b", {0.4, -0.3, 0.5}));
+    system.add_joint(joint);
+    system.finish();
+    const State state = system.initial_state();
+    const auto n = system.n();
+    for (const double pull : {3.0, -3.0}) {
+        const VectorXd lambda = pull * Eigen::Vector3d(-0.4, 0.3, -0.5);  // towards the joint
+        MatrixAssembler assembler;
+        assembler.begin(n, n);
+        system.add_constraint_stiffness(state, lambda.data(), -2.0, Tangent::Exact, assembler);
+        const Eigen::MatrixXd whole = tests::dense(assembler.finish());
+        assembler.begin(n, n);
+        system.add_definite_constraint_stiffness(state, lambda.data(), 2.0, assembler);
+        const Eigen::MatrixXd G = tests::dense(assembler.finish());
+        EXPECT_GT(whole.norm(), 1.0);
+        if (pull > 0.0) {
+            EXPECT_LE((G - whole).norm(), 1e-13 * whole.norm());
+        } else {
+            EXPECT_EQ(G.norm(), 0.0);
+        }
+    }
+}
 
 struct Sizes {
     JointKind kind;

@@ -60,8 +60,6 @@ TEST(Tolerance, FindsTheImpactsOfABall) {
         worst = std::max(worst, std::abs(found.times[k] - impact_time(k)));
         worst_fixed = std::max(worst_fixed, std::abs(late.times[k] - impact_time(k)));
     }
-    std::printf("%lld steps: %.2e s with events, %.2e s with fixed steps\n", static_cast<long long>(found.steps), worst,
-                worst_fixed);
     EXPECT_LT(worst, 1e-5);
     EXPECT_GT(worst_fixed, 100.0 * worst);
 }
@@ -141,16 +139,16 @@ TEST(Tolerance, AndItsBoundsAreRead) {
     EXPECT_EQ(control.smallest, 1e-5);
     EXPECT_EQ(control.initial, 1e-4);
     EXPECT_EQ(control.largest, 0.5);
-    EXPECT_EQ(told("tolerance: 0"), "scene:1:12: \"tolerance\" must be positive, not \"0\"");
-    EXPECT_EQ(told("tolerance: {relative: 1.0e-3}"), "scene:1:12: \"tolerance\" lacks the key \"absolute\"");
+    EXPECT_EQ(told("tolerance: 0"), "scene, line 1: \"tolerance\" is 0; it must be positive");
+    EXPECT_EQ(told("tolerance: {relative: 1.0e-3}"), "scene, line 1: \"tolerance\" lacks the key \"absolute\"");
     EXPECT_EQ(
         told("tolerance: 1.0e-3\nstep: 0.1"),
-        "scene:2:7: a fixed \"step\" and a \"tolerance\" exclude each other; bounds of the step are given as step: "
+        "scene, line 2: a fixed \"step\" and a \"tolerance\" exclude each other; bounds of the step are given as step: "
         "{initial, smallest, largest}");
     EXPECT_EQ(told("step: {largest: 0.1}"),
-              "scene:1:7: a \"step\" with bounds needs a \"tolerance\", e.g. tolerance: 1.0e-4");
+              "scene, line 1: a \"step\" with bounds needs a \"tolerance\", e.g. tolerance: 1.0e-4");
     EXPECT_EQ(told("tolerance: 1.0e-3\nstep: {initial: 1, largest: 0.1}"),
-              "scene:2:7: \"step\" must have smallest ≤ initial ≤ largest, not 1e-07, 1 and 0.1");
+              "scene, line 2: \"step\" must have smallest ≤ initial ≤ largest, not 1e-07, 1 and 0.1");
 }
 
 TEST(Tolerance, AndAStepOfTheCommandLineReplaceEachOther) {

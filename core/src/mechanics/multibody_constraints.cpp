@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // C, C_q, C_t, the curvature and the stiffness of a multibody system's joints.
-#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
 
+using mechanics::arm;
+using mechanics::Feature;
 using mechanics::Gear;
-using mechanics::Joint;
 using mechanics::Matrix3d;
-using mechanics::Placements;
 using mechanics::Row;
-using mechanics::RowColumns;
-using mechanics::RowMatrix;
 using mechanics::Vector3d;
 
 std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
@@ -127,57 +125,39 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
     });
 }
 
-namespace {
-
-/// Of the bodies of a joint that move.
-RowColumns columns_of(const Joint& joint, const Placements& at) {
-    RowColumns result;
-    for (const auto body : {joint.parameters.first, joint.parameters.second})
-        if (at[body].column >= 0) result.column[static_cast<std::size_t>(result.bodies++)] = at[body].column;
-    return result;
-}
-
-/// The symmetric part of a matrix without its negative eigenvalues.
-RowMatrix positive_part(const RowMatrix& matrix) {
-    const RowMatrix symmetric = 0.5 * (matrix + matrix.transpose());
-    const Eigen::SelfAdjointEigenSolver<RowMatrix> eigen(symmetric);
-    const RowMatrix vectors = eigen.eigenvectors();
-    return vectors * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * vectors.transpose();
-}
-
-}  // namespace
-
-// −Σ λ_i ∇²C_i over the rows of a joint: the sum does not depend on the axes that its rows are written in, and so what
-// is left of it without negative eigenvalues does not either. Gears turn no force by an angle of the bodies' own.
+// A point of a body at the arm c̄ (body frame), on which a joint puts the force s y, adds s [c̄]× [Aᵀy]× to
+// ∂(C_qᵀ λ)/∂θ, which is s (Aᵀy c̄ᵀ − (c̄ · Aᵀy) I). Under a force along the arm the negative of it is
+//
+//     k (I − ĉ ĉᵀ),      k = s c̄ · Aᵀ y,   ĉ = c̄/|c̄|
+//
+// the stiffness of a pulled arm against being turned out of line. It is positive under pull, and nothing under a turn
+// about the arm. That is kept, where k > 0. The symmetric part of the whole would not do: a force across the arm, as
+// that of the last step always is a little, makes it couple turns about the arm to others, with a torque that is not
+// there. Of what a joint does to directions, and of the swing of a rod's own ends, nothing is kept. H keeps its blocks.
 void MultibodySystem::add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
                                                         MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr);
     for (const auto& joint : self.joints) {
-        const auto columns = columns_of(joint, self.at);
-        RowMatrix sum = RowMatrix::Zero(6 * columns.bodies, 6 * columns.bodies);
+        Vector3d force = Vector3d::Zero();  // of all rows on the span of points that they share
+        const Feature* span = nullptr;
         for (std::size_t i = 0; i < joint.rows.size(); ++i) {
-            const double weight = -lambda[static_cast<std::size_t>(joint.first_row) + i];
-            if (weight == 0.0) continue;
-            const auto own = joint.rows[i].columns(self.at);
-            joint.rows[i].hessian(self.at, state.t, own, self.hessian);
-            for (int a = 0; a < own.bodies; ++a)
-                for (int b = 0; b < own.bodies; ++b)
-                    sum.block<6, 6>(columns.place(own.column[static_cast<std::size_t>(a)]),
-                                    columns.place(own.column[static_cast<std::size_t>(b)])) +=
-                        weight * self.hessian.block<6, 6>(6 * a, 6 * b);
+            const Row& row = joint.rows[i];
+            if (row.u.count != 2) continue;
+            force += row.force(self.at, state.t, lambda[static_cast<std::size_t>(joint.first_row) + i]);
+            span = &row.u;
         }
-        const double size = sum.norm();
-        if (size == 0.0) continue;
-        sum = positive_part(sum);
-        // The stiffness of a point that bodies share does not couple them: H keeps its blocks.
-        for (int a = 0; a < columns.bodies; ++a)
-            for (int b = 0; b < columns.bodies; ++b) {
-                const Eigen::Matrix<double, 6, 6, Eigen::RowMajor> block = sum.block<6, 6>(6 * a, 6 * b);
-                if (block.norm() <= 1e-14 * size) continue;
-                H.add_block(columns.column[static_cast<std::size_t>(a)], columns.column[static_cast<std::size_t>(b)], 6,
-                            6, block.data(), factor);
-            }
+        if (span == nullptr) continue;
+        for (const auto& part : span->parts) {
+            const auto& place = self.at[part.body];
+            if (place.column < 0) continue;
+            const Vector3d c = arm(part, state.t);
+            const double k = std::max(part.sign * c.dot(place.A.transpose() * force), 0.0);
+            const Matrix3d G = c.isZero(0.0)
+                                   ? Matrix3d(Matrix3d::Zero())
+                                   : Matrix3d(k * (Matrix3d::Identity() - c * c.transpose() / c.squaredNorm()));
+            H.add_block(place.column + 3, place.column + 3, 3, 3, G.data(), factor);
+        }
     }
 }
 

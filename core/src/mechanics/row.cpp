@@ -126,6 +126,10 @@ Outer outer(const Row& row, double c) {
 
 }  // namespace
 
+Vector3d arm(const Part& part, double t) {
+    return arm_of(part, t).c;
+}
+
 RowColumns Row::columns(const Placements& at) const {
     RowColumns result;
     for (const Feature* feature : {&u, &w})
@@ -148,6 +152,11 @@ void Row::gradient(const Placements& at, double t, const RowColumns& columns, Ro
     result.setZero(6 * columns.bodies);
     add_transposed(u, at, t, second, columns, slope, result);
     add_transposed(w, at, t, first, columns, slope, result);
+}
+
+Vector3d Row::force(const Placements& at, double t, double lambda) const {
+    const Vector3d first = evaluate(u, at, t).value, second = evaluate(w, at, t).value;
+    return lambda * outer(*this, first.dot(second)).slope * second;
 }
 
 double Row::rate(const Placements& at, double t) const {

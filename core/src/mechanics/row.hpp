@@ -61,6 +61,9 @@ struct Part {
     const Motion* turn = nullptr;  ///< c̄(t) = cos φ(t) arm + sin φ(t) quarter; none: c̄ = arm
 };
 
+/// c̄ at a time.
+Vector3d arm(const Part& part, double t);
+
 struct Feature {
     std::array<Part, 2> parts;
     int count = 0;
@@ -114,6 +117,8 @@ struct Row {
     [[nodiscard]] double rate(const Placements& at, double t) const;
     /// C̈ at v̇ = 0.
     [[nodiscard]] double curvature(const Placements& at, double t) const;
+    /// λ f' w: the force that λ is along u.
+    [[nodiscard]] Vector3d force(const Placements& at, double t, double lambda) const;
     /// ∇²C over columns(): entry (i, j) is the derivative of ∇C_i along increment j.
     void hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const;
 };

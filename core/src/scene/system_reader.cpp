@@ -30,7 +30,7 @@ void SystemReader::build(const YAML::Node& place) {
     const auto missing = [&](std::string_view key, std::string_view example) {
         source_.refuse(place, fmt::format("system \"{}\" lacks the key \"{}\", e.g. {}", result_.name, key, example));
     };
-    if (!step_ && !tolerance_) missing("step", "step: 0.001");
+    if (!step_node_.IsDefined() && !tolerance_) missing("step", "step: 0.001");
     if (!end_) missing("end", "end: 10");
     build_step(place);
     result_.end = *end_;
