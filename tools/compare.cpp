@@ -92,7 +92,7 @@ std::string write_files(const bench::Comparison& comparison, const fs::path& fol
     write_file_atomically(folder / "results.csv", bench::csv_text(comparison));
     std::string page;
     try {
-        page = bench::html_text(comparison, bench::report_parts());
+        page = bench::html_text(comparison);
     } catch (const InputError& error) {
         std::error_code ignored;
         fs::remove(folder / "report.html", ignored);  // one of an earlier comparison would mislead

@@ -44,6 +44,7 @@ int main(int argc, char** argv) {
     Action action;
     add_solve(program, action);
     add_run(program, action);
+    add_view(program, action);
     add_plan(program, action);
     add_compare(program, action);
     add_plugins(program, action);

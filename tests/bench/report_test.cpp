@@ -8,6 +8,8 @@
 #include "bench/compare.hpp"
 #include "bench/writers.hpp"
 #include "bench_fixture.hpp"
+#include "support/browser.hpp"
+#include "support/html_page.hpp"
 
 namespace delassus::bench_test {
 namespace {
@@ -18,7 +20,7 @@ class ReportTest : public BenchTest {
 protected:
     void SetUp() override {
         BenchTest::SetUp();
-        if (!fs::exists(bench::report_parts() / "echarts.min.js"))
+        if (!fs::exists(page_parts() / "echarts.min.js"))
             GTEST_SKIP() << "built without the chart library, so no page is written";
     }
 
@@ -42,7 +44,7 @@ protected:
             problem.results.push_back(row);
         }
         comparison.problems = {problem, problem};
-        return bench::html_text(comparison, bench::report_parts());
+        return bench::html_text(comparison);
     }
 };
 
@@ -54,12 +56,9 @@ TEST_F(ReportTest, NeedsNothingFromElsewhere) {
     const auto own = text.rfind("<script>");
     // All but the chart library, whose text holds names of namespaces and licences.
     const std::string ours = text.substr(0, library) + text.substr(own);
-    EXPECT_FALSE(std::regex_search(ours, std::regex("(src|href)\\s*=\\s*[\"']?(https?:)?//")));
-    for (const char* word : {"@import", "url(", "import(", "fetch(", "XMLHttpRequest", "<link", "<iframe"})
-        EXPECT_EQ(ours.find(word), std::string::npos) << word;
-    EXPECT_NE(ours.find("default-src 'none'"), std::string::npos);  // the browser itself refuses the rest
+    tests::expect_nothing_from_elsewhere(ours);
     EXPECT_NE(text.find("Licensed to the Apache Software Foundation"), std::string::npos);
-    for (const char* mark : {"@style@", "@script@", "@library@", "@results@"})
+    for (const char* mark : {"@report.css@", "@report.js@", "@echarts.min.js@", "@data@"})
         EXPECT_EQ(text.find(mark), std::string::npos) << mark;
 }
 
@@ -74,8 +73,7 @@ TEST_F(ReportTest, HoldsTheData) {
 }
 
 TEST_F(ReportTest, IsDrawnByABrowser) {
-    const std::string chromium = DELASSUS_CHROMIUM;
-    if (chromium.empty()) GTEST_SKIP() << "chromium is not installed";
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
     {
         std::ofstream stream(folder / "report.html", std::ios::binary);
         // A mouse over the middle of the first curve, as a reader would have it.
@@ -86,31 +84,16 @@ TEST_F(ReportTest, IsDrawnByABrowser) {
                     "chart.getZr().handler.dispatch('mousemove', {zrX: x + 2, zrY: y});}</script>");
         stream << text;
     }
-    ChildSettings child;
-    child.program = chromium;
-    child.arguments = {"--headless",
-                       "--no-sandbox",
-                       "--disable-gpu",
-                       "--disable-quic",
-                       "--no-first-run",
-                       "--disable-background-networking",
-                       "--disable-component-update",
-                       "--disable-sync",
-                       "--user-data-dir=" + (folder / "profile").string(),
-                       "--virtual-time-budget=5000",
-                       "--dump-dom",
-                       "file://" + (folder / "report.html").string()};
-    child.timeout = 120.0;
-    const auto run = run_child(child);
+    const auto run = tests::open_in_browser(folder / "report.html", folder / "profile", {"--disable-gpu"});
     ASSERT_FALSE(run.timed_out);
-    const std::string head = run.output.substr(0, 400);
-    EXPECT_NE(head.find("data-charts-drawn=\"2\""), std::string::npos) << head << run.errors;
+    const std::string head = run.dom.substr(0, 400);
+    EXPECT_NE(head.find("data-charts-drawn=\"2\""), std::string::npos) << head << run.log;
     EXPECT_NE(head.find("data-series-drawn=\"8\""), std::string::npos) << head;
-    EXPECT_NE(run.output.find("iteration 10<br>0.000100 s<br>natural 1.00e-3"), std::string::npos);  // the hover
-    EXPECT_NE(run.output.find("<svg"), std::string::npos);
-    EXPECT_NE(run.output.find("solver-hung: hung"), std::string::npos);  // the marker at a curve's end
-    EXPECT_EQ(run.output.find("<img src=\"x\""), std::string::npos);     // names are text, never markup
-    EXPECT_NE(run.output.find("<li>it cannot &lt;/script&gt; solve</li>"), std::string::npos);
+    EXPECT_NE(run.dom.find("iteration 10<br>0.000100 s<br>natural 1.00e-3"), std::string::npos);  // the hover
+    EXPECT_NE(run.dom.find("<svg"), std::string::npos);
+    EXPECT_NE(run.dom.find("solver-hung: hung"), std::string::npos);  // the marker at a curve's end
+    EXPECT_EQ(run.dom.find("<img src=\"x\""), std::string::npos);     // names are text, never markup
+    EXPECT_NE(run.dom.find("<li>it cannot &lt;/script&gt; solve</li>"), std::string::npos);
 }
 
 }  // namespace

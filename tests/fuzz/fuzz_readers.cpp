@@ -21,7 +21,7 @@
 
 #include "delassus/error.hpp"
 #include "fclib/fclib.hpp"
-#include "fclib/hdf5.hpp"
+#include "hdf5/hdf5.hpp"
 #include "problem/problem_folder.hpp"
 
 namespace {
@@ -88,10 +88,10 @@ std::string path_of(const std::string& name, bool local) {
 }
 
 void put(hid_t file, const std::string& path, hid_t type, hsize_t size, const void* data) {
-    const delassus::fclib::Handle links(H5Pcreate(H5P_LINK_CREATE));
+    const delassus::hdf5::Handle links(H5Pcreate(H5P_LINK_CREATE));
     H5Pset_create_intermediate_group(links.get(), 1);
-    const delassus::fclib::Handle space(H5Screate_simple(1, &size, nullptr));
-    const delassus::fclib::Handle set(
+    const delassus::hdf5::Handle space(H5Screate_simple(1, &size, nullptr));
+    const delassus::hdf5::Handle set(
         H5Dcreate2(file, path.c_str(), type, space.get(), links.get(), H5P_DEFAULT, H5P_DEFAULT));
     if (size > 0) H5Dwrite(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
 }
@@ -138,7 +138,7 @@ void read_fclib(std::string_view spoil) {
     }
     const fs::path path = scratch() / "file.hdf5";
     {
-        const delassus::fclib::Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+        const delassus::hdf5::Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
         for (const auto& [name, values] : integers) {
             put(file.get(), path_of(name, local), H5T_NATIVE_INT, values.size(), values.data());
         }

@@ -269,12 +269,18 @@ public:
     /// Numbers what moves; call it once, after the last add_…().
     void finish();
 
+    [[nodiscard]] const Vector3& gravity() const;  ///< m/s²
+
     // ---- Reading states ----
     [[nodiscard]] std::int32_t body_count() const;
     [[nodiscard]] std::int32_t node_count() const;
     [[nodiscard]] Vector3 node_position(const State& state, std::int32_t node) const;
     /// Triangles of nodes that bound the tetrahedra, counter-clockwise from outside.
     [[nodiscard]] std::vector<std::array<std::int32_t, 3>> element_surface() const;
+    /// Nodes that no tetrahedron holds, ascending.
+    [[nodiscard]] std::vector<std::int32_t> loose_nodes() const;
+    /// The two nodes of each cable.
+    [[nodiscard]] std::vector<std::array<std::int32_t, 2>> cables() const;
     /// First entry of a node in v, −1 if it is fixed; of a body likewise.
     [[nodiscard]] std::int32_t node_column(std::int32_t node) const;
     [[nodiscard]] std::int32_t body_column(BodyIndex index) const;

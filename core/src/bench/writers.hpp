@@ -2,7 +2,6 @@
 // A comparison as people and programs read it.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "bench/results.hpp"
@@ -18,11 +17,8 @@ namespace delassus::bench {
 /// Everything, curves included; format "delassus-comparison", version 1 (docs/comparison.md).
 [[nodiscard]] std::string json_text(const Comparison& comparison);
 
-/// One HTML file that needs nothing else: charts of error against time, and the tables. parts: the folder of the page's
-/// parts (report_parts()). Throws InputError if one of them is missing.
-[[nodiscard]] std::string html_text(const Comparison& comparison, const std::filesystem::path& parts);
-
-/// The folder of the page's parts beside libdelassus.
-[[nodiscard]] std::filesystem::path report_parts();
+/// One HTML file that needs nothing else: charts of error against time, and the tables. Throws InputError if a part of
+/// the page is missing (support/html_page.hpp).
+[[nodiscard]] std::string html_text(const Comparison& comparison);
 
 }  // namespace delassus::bench

@@ -8,11 +8,16 @@
 
 #include "delassus/error.hpp"
 #include "fclib/fclib.hpp"
-#include "fclib/hdf5.hpp"
+#include "hdf5/hdf5.hpp"
 #include "problem/symmetry.hpp"
 
 namespace delassus::fclib {
 namespace {
+
+using hdf5::Group;
+using hdf5::Handle;
+using hdf5::last_complaint;
+using hdf5::Silence;
 
 constexpr std::int32_t largest = std::numeric_limits<std::int32_t>::max() - 1;
 

@@ -5,10 +5,14 @@
 
 #include "delassus/error.hpp"
 #include "fclib/fclib.hpp"
-#include "fclib/hdf5.hpp"
+#include "hdf5/hdf5.hpp"
 
 namespace delassus::fclib {
 namespace {
+
+using hdf5::Handle;
+using hdf5::last_complaint;
+using hdf5::Silence;
 
 /// The rows as FCLib orders them: those of friction cones, then the free ones.
 struct Rows {

@@ -311,6 +311,20 @@ Vector3 MultibodySystem::node_position(const State& state, std::int32_t node) co
     implementation_->check_node(node, "node_position()");
     return array(implementation_->node_at(node, state.q.data(), state.v.data()).x);
 }
+std::vector<std::int32_t> MultibodySystem::loose_nodes() const {
+    std::vector<bool> held(implementation_->nodes.size());
+    for (const auto& element : implementation_->tetrahedra)
+        for (const auto node : element.nodes()) held[static_cast<std::size_t>(node)] = true;
+    std::vector<std::int32_t> loose;
+    for (std::int32_t node = 0; node < node_count(); ++node)
+        if (!held[static_cast<std::size_t>(node)]) loose.push_back(node);
+    return loose;
+}
+std::vector<std::array<std::int32_t, 2>> MultibodySystem::cables() const {
+    std::vector<std::array<std::int32_t, 2>> nodes;
+    for (const auto& cable : implementation_->cables) nodes.push_back(cable.nodes());
+    return nodes;
+}
 std::int32_t MultibodySystem::node_column(std::int32_t node) const {
     implementation_->check_node(node, "node_column()");
     return implementation_->nodes[static_cast<std::size_t>(node)].column;
@@ -321,6 +335,9 @@ std::int32_t MultibodySystem::body_column(BodyIndex index) const {
     return implementation_->bodies[static_cast<std::size_t>(index)].column;
 }
 
+const Vector3& MultibodySystem::gravity() const {
+    return implementation_->gravity;
+}
 std::int32_t MultibodySystem::body_count() const {
     return static_cast<std::int32_t>(implementation_->bodies.size());
 }

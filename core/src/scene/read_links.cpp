@@ -3,21 +3,11 @@
 #include <algorithm>
 #include <array>
 
+#include "scene/joint_kinds.hpp"
 #include "scene/system_reader.hpp"
 
 namespace delassus::scene {
 namespace {
-
-constexpr std::array<std::pair<std::string_view, JointKind>, 9> joint_kinds = {
-    {{"spherical", JointKind::Spherical},
-     {"revolute", JointKind::Revolute},
-     {"prismatic", JointKind::Prismatic},
-     {"cylindrical", JointKind::Cylindrical},
-     {"universal", JointKind::Universal},
-     {"fixed", JointKind::Fixed},
-     {"point_on_plane", JointKind::PointOnPlane},
-     {"distance", JointKind::Distance},
-     {"gear", JointKind::Gear}}};
 
 JointKind joint_kind(const Source& source, const YAML::Node& node) {
     const std::string name = scalar(source, node, "kind");

@@ -8,6 +8,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
+#include "scene/trajectory_model.hpp"
 #include "support/atomic_file.hpp"
 
 namespace delassus {
@@ -15,8 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 7> own_files = {"checkpoint.json", "scene.yaml", "trajectory.h5", "scene.pvd",
-                                                       "report.json",     "vtk",        "problems"};
+/// scene.html is what `delassus view` makes of the rest.
+constexpr std::array<std::string_view, 8> own_files = {"checkpoint.json", "scene.yaml", "trajectory.h5", "scene.pvd",
+                                                       "report.json",     "vtk",        "problems",      "scene.html"};
 constexpr std::chrono::seconds between_checkpoints{5};
 
 /// Makes the folder, or empties that of an earlier run.
@@ -72,17 +74,9 @@ void RunFolder::open(const Scene& scene, bool resume) {
     std::vector<TrajectorySystem> systems;
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         const SceneSystem& system = scene.systems[i];
-        TrajectorySystem one{system.name,
-                             system.integrator,
-                             system.solver.name,
-                             system.system->position_size(),
-                             system.system->n(),
-                             system.step,
-                             {},
-                             simulations_[i].record().step + 1,
-                             static_cast<std::int64_t>(frame_times_[i].size())};
-        for (const auto& body : system.bodies) one.bodies.push_back(body.name);
-        systems.push_back(std::move(one));
+        systems.push_back({system.name, system.integrator, system.solver.name, system.system->position_size(),
+                           system.system->n(), system.step, trajectory_model(system), simulations_[i].record().step + 1,
+                           static_cast<std::int64_t>(frame_times_[i].size())});
         series_.emplace_back(folder_ / "vtk", system.name, *system.system);
     }
     trajectory_ = open_trajectory(folder_ / "trajectory.h5", systems, resume);
@@ -124,7 +118,7 @@ void RunFolder::add_frame(std::size_t system) {
     std::vector<Pose> poses;
     for (BodyIndex body = 0; body < mechanics.body_count(); ++body)
         poses.push_back(mechanics.pose(simulation.state(), body));
-    trajectory_->add_frame(system, simulation.state(), poses);
+    trajectory_->add_frame(system, simulation.state(), poses, mechanics.contacts());
     series_[system].write(static_cast<std::int64_t>(frame_times_[system].size()), simulation.state());
     frame_times_[system].push_back(simulation.state().t);
 }

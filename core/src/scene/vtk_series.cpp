@@ -49,6 +49,8 @@ VtkSeries::VtkSeries(std::filesystem::path folder, std::string name, const Multi
     const double plane_size = extent_of(system);
     for (const auto& shape : system.shapes()) surfaces_.push_back(surface_of(shape, plane_size));
     elements_ = system.element_surface();
+    loose_nodes_ = system.loose_nodes();
+    cables_ = system.cables();
 }
 
 std::string VtkSeries::file_name(std::int64_t number) const {
@@ -57,7 +59,7 @@ std::string VtkSeries::file_name(std::int64_t number) const {
 
 void VtkSeries::write(std::int64_t number, const State& state) const {
     std::vector<float> points, speed;
-    std::vector<std::int32_t> vertices, vertex_ends, corners, corner_ends, body_of_cell;
+    std::vector<std::int32_t> vertices, vertex_ends, lines, line_ends, corners, corner_ends, body_of_cell;
     const auto add_point = [&](const Vector3& point) {
         for (const double x : point) points.push_back(static_cast<float>(x));
     };
@@ -70,11 +72,36 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
         }
         speed.push_back(static_cast<float>(v));
     };
+    // Of nodes: no body's, and the mean of their speeds.
+    const auto add_node_cell = [&](const auto& nodes) {
+        double v = 0.0;
+        for (const auto node : nodes) {
+            const auto column = system_.node_column(node);
+            if (column < 0) continue;
+            const double* w = state.v.data() + column;
+            v += std::hypot(w[0], w[1], w[2]) / static_cast<double>(nodes.size());
+        }
+        body_of_cell.push_back(system_.body_count());
+        speed.push_back(static_cast<float>(v));
+    };
+    // The cells come in the order that VTK wants them in: vertices, lines, polygons.
     for (BodyIndex body = 0; body < system_.body_count(); ++body) {
         vertices.push_back(body);
         vertex_ends.push_back(body + 1);
         add_point(system_.pose(state, body).position);
         add_cell(body);
+    }
+    const auto first_node = static_cast<std::int32_t>(points.size() / 3);
+    for (std::int32_t node = 0; node < system_.node_count(); ++node) add_point(system_.node_position(state, node));
+    for (const auto node : loose_nodes_) {
+        vertices.push_back(first_node + node);
+        vertex_ends.push_back(static_cast<std::int32_t>(vertices.size()));
+        add_node_cell(std::array{node});
+    }
+    for (const auto& cable : cables_) {
+        for (const auto node : cable) lines.push_back(first_node + node);
+        line_ends.push_back(static_cast<std::int32_t>(lines.size()));
+        add_node_cell(cable);
     }
     for (std::size_t i = 0; i < surfaces_.size(); ++i) {
         const BodyIndex body = system_.shapes()[i].body;
@@ -87,22 +114,10 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
             add_cell(body);
         }
     }
-    if (!elements_.empty()) {
-        const auto first = static_cast<std::int32_t>(points.size() / 3);
-        for (std::int32_t node = 0; node < system_.node_count(); ++node) add_point(system_.node_position(state, node));
-        for (const auto& triangle : elements_) {
-            double v = 0.0;
-            for (const auto node : triangle) {
-                corners.push_back(first + node);
-                const auto column = system_.node_column(node);
-                if (column < 0) continue;
-                const double* w = state.v.data() + column;
-                v += std::hypot(w[0], w[1], w[2]) / 3.0;
-            }
-            corner_ends.push_back(static_cast<std::int32_t>(corners.size()));
-            body_of_cell.push_back(system_.body_count());
-            speed.push_back(static_cast<float>(v));
-        }
+    for (const auto& triangle : elements_) {
+        for (const auto node : triangle) corners.push_back(first_node + node);
+        corner_ends.push_back(static_cast<std::int32_t>(corners.size()));
+        add_node_cell(triangle);
     }
     Appended data;
     std::string xml = fmt::format(
@@ -110,14 +125,16 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
         "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
         "<PolyData>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
         "format=\"ascii\">{:.17g}</DataArray>\n</FieldData>\n"
-        "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
+        "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"{}\" NumberOfStrips=\"0\" "
         "NumberOfPolys=\"{}\">\n",
-        state.t, points.size() / 3, vertex_ends.size(), corner_ends.size());
+        state.t, points.size() / 3, vertex_ends.size(), line_ends.size(), corner_ends.size());
     xml += "<CellData>\n" + data.add("body", "Int32", 1, body_of_cell) + data.add("speed", "Float32", 1, speed) +
            "</CellData>\n";
     xml += "<Points>\n" + data.add("points", "Float32", 3, points) + "</Points>\n";
     xml += "<Verts>\n" + data.add("connectivity", "Int32", 1, vertices) + data.add("offsets", "Int32", 1, vertex_ends) +
            "</Verts>\n";
+    xml += "<Lines>\n" + data.add("connectivity", "Int32", 1, lines) + data.add("offsets", "Int32", 1, line_ends) +
+           "</Lines>\n";
     xml += "<Polys>\n" + data.add("connectivity", "Int32", 1, corners) + data.add("offsets", "Int32", 1, corner_ends) +
            "</Polys>\n";
     xml +=

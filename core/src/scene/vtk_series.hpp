@@ -7,18 +7,19 @@
 #include <string>
 #include <vector>
 
+#include "delassus/export.hpp"
 #include "delassus/multibody.hpp"
 
 namespace delassus {
 
-class VtkSeries {
+class DELASSUS_API VtkSeries {
 public:
     /// folder: of the .vtp files; it must exist. name: of the system. system outlives the series.
     VtkSeries(std::filesystem::path folder, std::string name, const MultibodySystem& system);
 
-    /// Writes frame `number`: the mass centres of the bodies as vertices, the surfaces of the shapes and of the
-    /// elements as triangles. Cell data: body (its index; the number of bodies for elements), speed (of its mass
-    /// centre, or the mean of the nodes', m/s).
+    /// Writes frame `number`: the mass centres of the bodies and loose nodes as vertices, cables as lines, the surfaces
+    /// of the shapes and of the elements as triangles. Cell data: body (its index; the number of bodies for what is
+    /// made of nodes), speed (of its mass centre, or the mean of the nodes', m/s).
     void write(std::int64_t number, const State& state) const;
 
     [[nodiscard]] std::string file_name(std::int64_t number) const;
@@ -29,6 +30,8 @@ private:
     const MultibodySystem& system_;
     std::vector<Mesh> surfaces_;                         // of the shapes, in the frames of their bodies
     std::vector<std::array<std::int32_t, 3>> elements_;  // surface of the elements, triangles of nodes
+    std::vector<std::int32_t> loose_nodes_;
+    std::vector<std::array<std::int32_t, 2>> cables_;
 };
 
 /// One system's part of a collection.

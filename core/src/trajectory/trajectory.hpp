@@ -11,6 +11,7 @@
 
 #include "delassus/collision.hpp"
 #include "delassus/simulation.hpp"
+#include "trajectory/model.hpp"
 
 namespace delassus {
 
@@ -19,8 +20,8 @@ struct TrajectorySystem {
     std::string name, integrator, solver;
     std::int32_t positions = 0, velocities = 0;  ///< sizes of q and v
     double step = 0.0;                           ///< s
-    std::vector<std::string> bodies;             ///< names, by index
-    std::int64_t steps = 0, frames = 0;          ///< rows to keep of a file that is there; 0: a new file
+    TrajectoryModel model;
+    std::int64_t steps = 0, frames = 0;  ///< rows to keep of a file that is there; 0: a new file
 };
 
 class TrajectoryWriter {
@@ -28,7 +29,9 @@ public:
     virtual ~TrajectoryWriter() = default;
     /// system: its place in the list that the writer was made with.
     virtual void add_step(std::size_t system, const StepRecord& record) = 0;
-    virtual void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses) = 0;
+    /// poses: of all bodies. contacts: of the step that led here.
+    virtual void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
+                           const std::vector<ContactPoint>& contacts) = 0;
     /// Puts everything on disk. Throws InputError if that fails, e.g. on a full disk.
     virtual void flush() = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// HDF5 for FCLib files: handles that close themselves, and datasets of numbers that are checked before anything of
-// their announced size is allocated. Whatever HDF5 has to say becomes one InputError.
+// HDF5: handles that close themselves, and datasets that are checked before anything of their announced size is
+// allocated. Whatever HDF5 has to say becomes one InputError.
 #pragma once
 
 #include <hdf5.h>
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace delassus::fclib {
+namespace delassus::hdf5 {
 
 /// Keeps HDF5 from printing its errors while it lives.
 class Silence {
@@ -69,6 +69,21 @@ public:
     [[nodiscard]] std::vector<double> first_numbers(const char* name, std::int64_t count) const;
     /// A short text of fixed length, empty if there is none.
     [[nodiscard]] std::string text(const char* name) const;
+    /// Texts of one fixed length, padded with zeros: a row each.
+    [[nodiscard]] std::vector<std::string> texts(const char* name) const;
+
+    /// The extents of the dataset.
+    [[nodiscard]] std::vector<std::int64_t> shape(const char* name) const;
+    /// The chosen rows, ascending, of a dataset whose rows have `width` numbers.
+    [[nodiscard]] std::vector<double> rows(const char* name, const std::vector<std::int64_t>& chosen,
+                                           std::int64_t width) const;
+
+    /// The names of the groups and datasets in it, by name.
+    [[nodiscard]] std::vector<std::string> members() const;
+    /// A short text that hangs on the group; empty if there is none.
+    [[nodiscard]] std::string attribute_text(const char* name) const;
+    /// A number that hangs on the group; not a number if there is none.
+    [[nodiscard]] double attribute_number(const char* name) const;
 
 private:
     struct Dataset {
@@ -86,4 +101,4 @@ private:
     std::uint64_t file_bytes_;
 };
 
-}  // namespace delassus::fclib
+}  // namespace delassus::hdf5

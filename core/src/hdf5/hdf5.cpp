@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "fclib/hdf5.hpp"
+#include "hdf5/hdf5.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <type_traits>
 
 #include "delassus/error.hpp"
 
-namespace delassus::fclib {
+namespace delassus::hdf5 {
 namespace {
 
 /// A dataset may announce more than it stores where chunks are compressed or were never written. So much is believed.
@@ -70,7 +71,7 @@ Group Group::group(const char* name) const {
     // A soft or external link could lead anywhere, even into another file.
     H5L_info_t link{};
     if (H5Lget_info(id_.get(), name, &link, H5P_DEFAULT) < 0 || link.type != H5L_TYPE_HARD) {
-        refuse(fmt::format("/{} is a link; FCLib files have none", name));
+        refuse(fmt::format("/{} is a link; it must stand in the file itself", name));
     }
     Handle id(H5Gopen2(id_.get(), name, H5P_DEFAULT));
     if (!id.valid()) refuse(fmt::format("/{} must be a group, but cannot be opened ({})", name, last_complaint()));
@@ -81,7 +82,7 @@ Group::Dataset Group::open(const char* name) const {
     if (!has(name)) refuse(fmt::format("/{} is missing", name));
     H5L_info_t link{};
     if (H5Lget_info(id_.get(), name, &link, H5P_DEFAULT) < 0 || link.type != H5L_TYPE_HARD) {
-        refuse(fmt::format("/{} is a link; FCLib files have none", name));
+        refuse(fmt::format("/{} is a link; it must stand in the file itself", name));
     }
     Dataset dataset;
     dataset.id = Handle(H5Dopen2(id_.get(), name, H5P_DEFAULT));
@@ -97,7 +98,7 @@ Group::Dataset Group::open(const char* name) const {
     }
     const H5D_layout_t layout = H5Pget_layout(creation.get());
     if (layout == H5D_VIRTUAL || layout == H5D_LAYOUT_ERROR || H5Pget_external_count(creation.get()) != 0) {
-        refuse(fmt::format("/{} is stored outside the file; FCLib files hold their data", name));
+        refuse(fmt::format("/{} is stored outside the file", name));
     }
     dataset.count = count;
     const std::uint64_t element = std::max<std::uint64_t>(1, H5Tget_size(dataset.type.get()));
@@ -167,4 +168,94 @@ std::string Group::text(const char* name) const {
     return value;
 }
 
-}  // namespace delassus::fclib
+std::vector<std::string> Group::texts(const char* name) const {
+    const Dataset dataset = open(name);
+    const hid_t type = dataset.type.get();
+    const std::size_t length = H5Tget_size(type);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || length == 0 || length > longest_text)
+        refuse(fmt::format("/{} must hold texts of fixed length", name));
+    std::string block(static_cast<std::size_t>(dataset.count) * length, '\0');
+    if (!block.empty() && H5Dread(dataset.id.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, block.data()) < 0)
+        refuse(fmt::format("/{} cannot be read ({})", name, last_complaint()));
+    std::vector<std::string> texts;
+    for (std::size_t at = 0; at < block.size(); at += length) {
+        const std::string text = block.substr(at, length);
+        texts.push_back(text.substr(0, text.find('\0')));
+    }
+    return texts;
+}
+
+std::vector<std::int64_t> Group::shape(const char* name) const {
+    const Dataset dataset = open(name);
+    const Handle space(H5Dget_space(dataset.id.get()));
+    const int rank = H5Sget_simple_extent_ndims(space.get());
+    if (rank < 0) refuse(fmt::format("/{} has no readable size ({})", name, last_complaint()));
+    std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
+    H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr);
+    return {extents.begin(), extents.end()};
+}
+
+std::vector<double> Group::rows(const char* name, const std::vector<std::int64_t>& chosen, std::int64_t width) const {
+    const Dataset dataset = open(name);
+    if (!is_plain_number(dataset.type.get())) refuse(fmt::format("/{} must hold floating-point numbers", name));
+    const auto extents = shape(name);
+    std::int64_t found = 1;
+    for (std::size_t i = 1; i < extents.size(); ++i) found *= extents[i];
+    if (extents.empty() || found != width)
+        refuse(fmt::format("/{} has rows of {} numbers, but must have {} in a row", name, found, width));
+    if (!chosen.empty() && (chosen.front() < 0 || chosen.back() >= extents[0]))
+        refuse(fmt::format("/{} has {} rows, but must have {}", name, extents[0], chosen.back() + 1));
+    std::vector<double> values(chosen.size() * static_cast<std::size_t>(width));
+    const Handle space(H5Dget_space(dataset.id.get()));
+    std::vector<hsize_t> start(extents.size(), 0), block(extents.begin(), extents.end());
+    // Neighbours are read at once.
+    for (std::size_t i = 0; i < chosen.size() && width > 0; i += block[0]) {
+        std::size_t end = i + 1;
+        while (end < chosen.size() && chosen[end] == chosen[end - 1] + 1) ++end;
+        start[0] = static_cast<hsize_t>(chosen[i]);
+        block[0] = end - i;
+        const Handle memory(H5Screate_simple(static_cast<int>(block.size()), block.data(), nullptr));
+        double* to = values.data() + i * static_cast<std::size_t>(width);
+        if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) < 0 ||
+            H5Dread(dataset.id.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, to) < 0)
+            refuse(fmt::format("/{} cannot be read ({})", name, last_complaint()));
+    }
+    return values;
+}
+
+std::vector<std::string> Group::members() const {
+    std::vector<std::string> names;
+    const auto add = [](hid_t, const char* name, const H5L_info_t*, void* data) -> herr_t {
+        static_cast<std::vector<std::string>*>(data)->emplace_back(name);
+        return 0;
+    };
+    if (H5Literate(id_.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &names) < 0)
+        refuse(fmt::format(" cannot be listed ({})", last_complaint()));
+    return names;
+}
+
+std::string Group::attribute_text(const char* name) const {
+    const Handle attribute(H5Aopen(id_.get(), name, H5P_DEFAULT));
+    if (!attribute.valid()) return {};
+    const Handle type(H5Aget_type(attribute.get())), space(H5Aget_space(attribute.get()));
+    const std::size_t size = H5Tget_size(type.get());
+    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) != 0 || size > longest_text ||
+        H5Sget_simple_extent_npoints(space.get()) != 1)
+        return {};
+    std::string value(size, '\0');
+    if (H5Aread(attribute.get(), type.get(), value.data()) < 0) return {};
+    value.resize(std::min(value.find('\0'), value.size()));
+    return value;
+}
+
+double Group::attribute_number(const char* name) const {
+    const Handle attribute(H5Aopen(id_.get(), name, H5P_DEFAULT));
+    double value = std::numeric_limits<double>::quiet_NaN();
+    if (!attribute.valid()) return value;
+    const Handle type(H5Aget_type(attribute.get())), space(H5Aget_space(attribute.get()));
+    if (!is_plain_number(type.get()) || H5Sget_simple_extent_npoints(space.get()) != 1) return value;
+    H5Aread(attribute.get(), H5T_NATIVE_DOUBLE, &value);
+    return value;
+}
+
+}  // namespace delassus::hdf5

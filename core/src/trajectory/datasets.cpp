@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "trajectory/datasets.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "delassus/error.hpp"
+
+namespace delassus::trajectory {
+
+using hdf5::Handle;
+
+namespace {
+
+void describe(hid_t set, const Column& column, const std::string& file) {
+    put_text(set, "unit", column.unit, file);
+    put_text(set, "description", column.description, file);
+}
+
+[[noreturn]] void fail(const std::string& file) {
+    throw InputError(fmt::format("{}: the trajectory cannot be written", file));
+}
+
+void put(hid_t group, const Column& column, hid_t stored, hid_t native, const void* values, std::size_t count,
+         const std::vector<hsize_t>& shape, const std::string& file) {
+    hsize_t width = 1;
+    for (const auto extent : shape) width *= extent;
+    if (count == 0 || width == 0) return;
+    std::vector<hsize_t> size = {count / width};
+    size.insert(size.end(), shape.begin(), shape.end());
+    const Handle space = made(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), file);
+    const Handle set =
+        made(H5Dcreate2(group, column.name, stored, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), file);
+    if (H5Dwrite(set.get(), native, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) fail(file);
+    describe(set.get(), column, file);
+}
+
+}  // namespace
+
+Handle made(hid_t id, const std::string& file) {
+    if (id < 0) throw InputError(fmt::format("{}: HDF5 cannot write or continue the trajectory", file));
+    return Handle(id);
+}
+
+Handle group_in(hid_t parent, const char* name, bool open, const std::string& file) {
+    return made(
+        open ? H5Gopen2(parent, name, H5P_DEFAULT) : H5Gcreate2(parent, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+        file);
+}
+
+void put_text(hid_t object, const char* name, const std::string& text, const std::string& file) {
+    const Handle type = made(H5Tcopy(H5T_C_S1), file);
+    H5Tset_size(type.get(), std::max<std::size_t>(1, text.size()));
+    H5Tset_cset(type.get(), H5T_CSET_UTF8);
+    const Handle space = made(H5Screate(H5S_SCALAR), file);
+    const Handle attribute = made(H5Acreate2(object, name, type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), file);
+    H5Awrite(attribute.get(), type.get(), text.data());
+}
+
+void put_number(hid_t object, const char* name, double value, const std::string& file) {
+    const Handle space = made(H5Screate(H5S_SCALAR), file);
+    const Handle attribute =
+        made(H5Acreate2(object, name, H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), file);
+    H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, &value);
+}
+
+void put_texts(hid_t group, const char* name, const std::vector<std::string>& texts, const std::string& file) {
+    if (texts.empty()) return;
+    std::size_t length = 1;
+    for (const auto& text : texts) length = std::max(length, text.size());
+    std::string block;
+    for (const auto& text : texts) {
+        block += text;
+        block.resize(block.size() + length - text.size(), '\0');
+    }
+    const Handle type = made(H5Tcopy(H5T_C_S1), file);
+    H5Tset_size(type.get(), length);
+    H5Tset_cset(type.get(), H5T_CSET_UTF8);
+    H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+    const hsize_t count = texts.size();
+    const Handle space = made(H5Screate_simple(1, &count, nullptr), file);
+    const Handle set =
+        made(H5Dcreate2(group, name, type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), file);
+    if (H5Dwrite(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, block.data()) < 0) fail(file);
+}
+
+void put_rows(hid_t group, const Column& column, const std::vector<double>& values, const std::vector<hsize_t>& shape,
+              const std::string& file) {
+    put(group, column, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), values.size(), shape, file);
+}
+
+void put_rows(hid_t group, const Column& column, const std::vector<std::int32_t>& values,
+              const std::vector<hsize_t>& shape, const std::string& file) {
+    put(group, column, H5T_STD_I32LE, H5T_NATIVE_INT32, values.data(), values.size(), shape, file);
+}
+
+Series::Series(hid_t group, const Column& column, std::vector<hsize_t> shape, bool resume, std::int64_t rows,
+               const std::string& file)
+    : file_(file), shape_(std::move(shape)), set_(resume ? open(group, column, rows) : create(group, column)) {
+    rows_ = resume ? static_cast<hsize_t>(rows) : 0;
+}
+
+hsize_t Series::width() const {
+    hsize_t width = 1;
+    for (const auto extent : shape_) width *= extent;
+    return width;
+}
+
+void Series::write() {
+    if (waiting_.empty()) return;
+    const hsize_t count = waiting_.size() / width();
+    std::vector<hsize_t> size = {rows_ + count}, start = {rows_}, block = {count};
+    for (const auto extent : shape_) {
+        size.push_back(extent);
+        start.push_back(0);
+        block.push_back(extent);
+    }
+    bool written = H5Dset_extent(set_.get(), size.data()) >= 0;
+    const Handle space = made(H5Dget_space(set_.get()), file_);
+    const Handle memory = made(H5Screate_simple(static_cast<int>(block.size()), block.data(), nullptr), file_);
+    written =
+        written && H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) >= 0;
+    written = written &&
+              H5Dwrite(set_.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, waiting_.data()) >= 0;
+    if (!written) fail(file_);
+    rows_ += count;
+    waiting_.clear();
+}
+
+double Series::last() const {
+    if (rows_ == 0) return 0.0;
+    std::vector<hsize_t> start(shape_.size() + 1, 0), block(shape_.size() + 1, 1);
+    start[0] = rows_ - 1;
+    for (std::size_t i = 0; i < shape_.size(); ++i) start[i + 1] = shape_[i] - 1;
+    const Handle space = made(H5Dget_space(set_.get()), file_);
+    const Handle memory = made(H5Screate_simple(static_cast<int>(block.size()), block.data(), nullptr), file_);
+    double value = 0.0;
+    if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) < 0 ||
+        H5Dread(set_.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, &value) < 0)
+        throw InputError(fmt::format("{}: the trajectory cannot be continued", file_));
+    return value;
+}
+
+Handle Series::create(hid_t group, const Column& column) const {
+    std::vector<hsize_t> size = {0}, most = {H5S_UNLIMITED}, chunk = {std::max<hsize_t>(1, 4096 / width())};
+    for (const auto extent : shape_) {
+        size.push_back(extent);
+        most.push_back(extent);
+        chunk.push_back(extent);
+    }
+    const Handle space = made(H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), file_);
+    const Handle creation = made(H5Pcreate(H5P_DATASET_CREATE), file_);
+    H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
+    Handle set = made(H5Dcreate2(group, column.name, column.integer ? H5T_STD_I64LE : H5T_IEEE_F64LE, space.get(),
+                                 H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+                      file_);
+    describe(set.get(), column, file_);
+    return set;
+}
+
+Handle Series::open(hid_t group, const Column& column, std::int64_t rows) const {
+    Handle set = made(H5Dopen2(group, column.name, H5P_DEFAULT), file_);
+    const Handle space = made(H5Dget_space(set.get()), file_);
+    std::vector<hsize_t> size(static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space.get()))));
+    H5Sget_simple_extent_dims(space.get(), size.data(), nullptr);
+    if (size.size() != shape_.size() + 1 || !std::equal(shape_.begin(), shape_.end(), size.begin() + 1) ||
+        size[0] < static_cast<hsize_t>(rows))
+        throw InputError(
+            fmt::format("{}: \"{}\" is shorter than the checkpoint says, or of another shape", file_, column.name));
+    size[0] = static_cast<hsize_t>(rows);
+    H5Dset_extent(set.get(), size.data());
+    return set;
+}
+
+}  // namespace delassus::trajectory

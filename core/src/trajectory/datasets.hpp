@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Writing HDF5 objects of a trajectory. Each function throws InputError if HDF5 fails; file: its name for the message.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hdf5/hdf5.hpp"
+
+namespace delassus::trajectory {
+
+/// A handle of what HDF5 has just made or opened.
+hdf5::Handle made(hid_t id, const std::string& file);
+
+/// Makes the group in parent, or opens it.
+hdf5::Handle group_in(hid_t parent, const char* name, bool open, const std::string& file);
+
+void put_text(hid_t object, const char* name, const std::string& text, const std::string& file);
+void put_number(hid_t object, const char* name, double value, const std::string& file);
+
+/// A dataset's name, with what its attributes say of it.
+struct Column {
+    const char* name;
+    const char* unit;
+    const char* description;
+    bool integer = false;
+};
+
+/// A dataset of texts of one length, padded with zeros. Nothing is written if there are none; the next ones likewise.
+void put_texts(hid_t group, const char* name, const std::vector<std::string>& texts, const std::string& file);
+/// A dataset of rows of the given shape.
+void put_rows(hid_t group, const Column& column, const std::vector<double>& values, const std::vector<hsize_t>& shape,
+              const std::string& file);
+void put_rows(hid_t group, const Column& column, const std::vector<std::int32_t>& values,
+              const std::vector<hsize_t>& shape, const std::string& file);
+
+/// A dataset of numbers that grows by rows. Rows wait in memory until write().
+class Series {
+public:
+    /// shape: of one row. rows: to keep of a dataset that is there; a new one otherwise.
+    Series(hid_t group, const Column& column, std::vector<hsize_t> shape, bool resume, std::int64_t rows,
+           const std::string& file);
+
+    void add(double value) { waiting_.push_back(value); }
+    void add(const double* values, std::size_t count) { waiting_.insert(waiting_.end(), values, values + count); }
+    void write();
+
+    /// The last number on disk, 0 if there is none.
+    [[nodiscard]] double last() const;
+
+private:
+    [[nodiscard]] hdf5::Handle create(hid_t group, const Column& column) const;
+    [[nodiscard]] hdf5::Handle open(hid_t group, const Column& column, std::int64_t rows) const;
+    [[nodiscard]] hsize_t width() const;
+
+    const std::string& file_;
+    std::vector<hsize_t> shape_;
+    hdf5::Handle set_;
+    hsize_t rows_ = 0;
+    std::vector<double> waiting_;
+};
+
+}  // namespace delassus::trajectory

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a picture of a system needs and what does not change while it moves. It stands in trajectory.h5 beside the
+// motion.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "delassus/collision.hpp"
+
+namespace delassus {
+
+/// The names of ShapeKind's values, in their order.
+inline constexpr std::array<std::string_view, 6> shape_names = {"sphere",   "box",   "capsule",
+                                                                "cylinder", "plane", "convex"};
+
+/// A joint, a spring or a bushing: what holds two bodies together, at a point of each.
+struct TrajectoryLink {
+    std::string name, kind;              ///< the joint's kind as in scene files, "spring" or "bushing"
+    std::array<std::int32_t, 2> bodies;  ///< −1: the world
+    std::array<Vector3, 2> points;       ///< in the bodies' frames; of the world in its own, m
+};
+
+struct TrajectoryModel {
+    Vector3 gravity{};                ///< m/s²
+    std::vector<std::string> bodies;  ///< names
+    std::vector<std::int32_t> fixed;  ///< of each body: 1 if it never moves
+    std::vector<Shape> shapes;
+    std::vector<Vector3> nodes;                        ///< positions at the start, m
+    std::vector<std::int32_t> node_entry;              ///< of each node: its first entry in q, −1 if it is fixed
+    std::vector<std::int32_t> loose;                   ///< nodes that no tetrahedron holds
+    std::vector<std::array<std::int32_t, 3>> surface;  ///< of the tetrahedra: triangles of nodes
+    std::vector<std::array<std::int32_t, 2>> cables;   ///< their nodes
+    std::vector<TrajectoryLink> links;
+};
+
+}  // namespace delassus

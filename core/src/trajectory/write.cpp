@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "delassus/error.hpp"
+#include "delassus/export.hpp"
+#include "trajectory/datasets.hpp"
+#include "trajectory/model_file.hpp"
+#include "trajectory/trajectory.hpp"
+
+namespace delassus::trajectory {
+namespace {
+
+using hdf5::Handle;
+
+constexpr std::size_t step_columns = 12;
+
+class SystemFile {
+public:
+    SystemFile(hid_t parent, const TrajectorySystem& system, bool resume, const std::string& file) {
+        const Handle group = group_in(parent, system.name.c_str(), resume, file);
+        if (!resume) {
+            put_text(group.get(), "integrator", system.integrator, file);
+            put_text(group.get(), "solver", system.solver, file);
+            put_number(group.get(), "step", system.step, file);
+            put_texts(group.get(), "bodies", system.model.bodies, file);
+            write_model(group.get(), system.model, file);
+        }
+        const Handle steps = group_in(group.get(), "steps", resume, file);
+        const auto step = [&](const Column& column, std::vector<hsize_t> shape = {}) {
+            steps_.emplace_back(steps.get(), column, std::move(shape), resume, system.steps, file);
+        };
+        steps_.reserve(step_columns);
+        step({"t", "s", "time at the end of the step; the first row is the initial state"});
+        step({"energy", "J", "kinetic and potential energy"});
+        step({"momentum", "kg m/s", "linear momentum, world frame"}, {3});
+        step({"angular_momentum", "kg m^2/s", "angular momentum about the origin, world frame"}, {3});
+        step({"drift", "m, rad", "largest violation of a bilateral constraint"});
+        step({"penetration", "m", "depth of the deepest contact where the step began"});
+        step({"contacts", "1", "contacts and other unilateral blocks in the step's problem", true});
+        step({"newton_iterations", "1", "linear or cone problems solved", true});
+        step({"solver_iterations", "1", "iterations of the solver plugin", true});
+        step({"natural", "1", "largest natural error of the step's solves"});
+        step({"seconds", "s", "wall time of the step"});
+        step({"solved", "1", "1 if every solve reached its tolerance", true});
+        const Handle frames = group_in(group.get(), "frames", resume, file);
+        const auto frame = [&](const Column& column, std::vector<hsize_t> shape = {}) {
+            frames_.emplace_back(frames.get(), column, std::move(shape), resume, system.frames, file);
+        };
+        frames_.reserve(5);
+        frame({"t", "s", "time"});
+        if (system.positions > 0) {
+            frame({"q", "m, 1", "positions: mass centre and unit quaternion w x y z of moving bodies, then nodes"},
+                  {static_cast<hsize_t>(system.positions)});
+            frame({"v", "m/s, rad/s", "velocities: of the mass centre, angular in the body frame; then nodes"},
+                  {static_cast<hsize_t>(system.velocities)});
+        }
+        if (!system.model.bodies.empty())
+            frame({"poses", "m, 1", "mass centre and unit quaternion w x y z of every body, fixed ones too"},
+                  {system.model.bodies.size(), 7});
+        frame({"contact_end", "1", "where the contacts of the frame end in contacts/point", true});
+        const Handle contacts = group_in(group.get(), "contacts", resume, file);
+        contacts_before_ = static_cast<std::int64_t>(frames_.back().last());
+        contacts_.reserve(3);
+        const auto contact = [&](const Column& column, std::vector<hsize_t> shape = {}) {
+            contacts_.emplace_back(contacts.get(), column, std::move(shape), resume, contacts_before_, file);
+        };
+        contact({"point", "m", "midway between the two surfaces"}, {3});
+        contact({"normal", "1", "unit vector from the first surface to the second"}, {3});
+        contact({"gap", "m", "distance of the surfaces where the step began; negative in penetration"});
+    }
+
+    void add_step(const StepRecord& record) {
+        std::size_t i = 0;
+        steps_[i++].add(record.t);
+        steps_[i++].add(record.energy);
+        steps_[i++].add(record.momentum.data(), 3);
+        steps_[i++].add(record.angular_momentum.data(), 3);
+        steps_[i++].add(record.drift);
+        steps_[i++].add(record.penetration);
+        steps_[i++].add(static_cast<double>(record.contacts));
+        steps_[i++].add(static_cast<double>(record.newton_iterations));
+        steps_[i++].add(static_cast<double>(record.solver_iterations));
+        steps_[i++].add(record.natural);
+        steps_[i++].add(record.seconds);
+        steps_[i++].add(record.solved ? 1.0 : 0.0);
+        if (++waiting_ >= 1000) write();
+    }
+
+    void add_frame(const State& state, const std::vector<Pose>& poses, const std::vector<ContactPoint>& contacts) {
+        std::size_t i = 0;
+        frames_[i++].add(state.t);
+        if (!state.q.empty()) {
+            frames_[i++].add(state.q.data(), state.q.size());
+            frames_[i++].add(state.v.data(), state.v.size());
+        }
+        for (const auto& pose : poses) {
+            frames_[i].add(pose.position.data(), 3);
+            frames_[i].add(pose.orientation.data(), 4);
+        }
+        for (const auto& contact : contacts) {
+            for (std::size_t k = 0; k < 3; ++k) contacts_[0].add(0.5 * (contact.point_a[k] + contact.point_b[k]));
+            contacts_[1].add(contact.normal.data(), 3);
+            contacts_[2].add(contact.gap);
+        }
+        contacts_before_ += static_cast<std::int64_t>(contacts.size());
+        frames_.back().add(static_cast<double>(contacts_before_));
+        waiting_ += 1 + static_cast<std::int64_t>((state.q.size() + contacts.size()) / 50);
+        if (waiting_ >= 1000) write();
+    }
+
+    void write() {
+        for (auto& series : steps_) series.write();
+        for (auto& series : contacts_) series.write();
+        for (auto& series : frames_) series.write();
+        waiting_ = 0;
+    }
+
+private:
+    std::vector<Series> steps_, frames_, contacts_;
+    std::int64_t waiting_ = 0, contacts_before_ = 0;
+};
+
+class Hdf5Writer : public TrajectoryWriter {
+public:
+    Hdf5Writer(const std::filesystem::path& path, const std::vector<TrajectorySystem>& systems, bool resume)
+        : name_(path.string()),
+          file_(made(resume ? H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT)
+                            : H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
+                     name_)) {
+        if (!resume) {
+            put_text(file_.get(), "format", "delassus-trajectory", name_);
+            put_number(file_.get(), "version", 1.0, name_);
+        }
+        const Handle group = group_in(file_.get(), "systems", resume, name_);
+        systems_.reserve(systems.size());
+        for (const auto& system : systems) systems_.emplace_back(group.get(), system, resume, name_);
+    }
+
+    void add_step(std::size_t system, const StepRecord& record) override { systems_[system].add_step(record); }
+    void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
+                   const std::vector<ContactPoint>& contacts) override {
+        systems_[system].add_frame(state, poses, contacts);
+    }
+    void flush() override {
+        for (auto& system : systems_) system.write();
+        if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0)
+            throw InputError(fmt::format("{}: the trajectory cannot be written", name_));
+    }
+
+private:
+    std::string name_;
+    Handle file_;
+    std::vector<SystemFile> systems_;
+};
+
+}  // namespace
+}  // namespace delassus::trajectory
+
+extern "C" DELASSUS_API delassus::TrajectoryWriter* delassus_trajectory_open(
+    const std::filesystem::path& file, const std::vector<delassus::TrajectorySystem>& systems, bool resume) {
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures become sentences
+    return new delassus::trajectory::Hdf5Writer(file, systems, resume);
+}
