@@ -134,8 +134,7 @@ int info(const PluginsArguments& arguments) {
     }
     fmt::print("{} {}: {}\n", plugin.name, plugin.version, plugin.description);
     if (!plugin.library.empty()) fmt::print("library  {}\n", plugin.library.string());
-    fmt::print("licence  {}\ncan      {}\n", plugin.licence,
-               fmt::join(capability_names(plugin.capabilities), " "));
+    fmt::print("licence  {}\ncan      {}\n", plugin.licence, fmt::join(capability_names(plugin.capabilities), " "));
     if (!plugin.options.empty()) fmt::print("options\n");
     for (const auto& option : plugin.options)
         fmt::print("  {}={}\n      {} ({}{}{})\n", option.key, option.default_value, option.doc, option.domain(),

@@ -159,9 +159,8 @@ std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Nod
         });
         read_map(source_, item, "a shape", handlers);
         if (kind.empty())
-            source_.refuse(item,
-                           fmt::format("a shape must have one of the keys \"{}\", \"mesh\"",
-                                       fmt::join(shape_kinds, "\", \"")));
+            source_.refuse(item, fmt::format("a shape must have one of the keys \"{}\", \"mesh\"",
+                                             fmt::join(shape_kinds, "\", \"")));
         for (const Shape& part : kind) {
             one.shape = part;
             one.shape.pose = pose;
