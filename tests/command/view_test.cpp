@@ -169,8 +169,10 @@ std::string played(std::string page) {
                 "const slider = document.getElementById('time'); slider.value = 0.5;"
                 "slider.dispatchEvent(new Event('input'));"
                 "if (canvas) { dispatchEvent(new Event('beforeprint')); look(); } };"
-                "let waits = 0; const wait = () => { ++waits; if (root.dataset.time > 0 || waits > 30) press();"
-                "else setTimeout(wait, 100); };"
+                // The browser's clock runs ahead of its frames; work gives them time.
+                "const work = () => { let sum = 0; for (let i = 0; i < 1e7; ++i) sum += Math.sqrt(i); return sum; };"
+                "let waits = 0; const wait = () => { ++waits; root.dataset.work = work();"
+                "if (root.dataset.time > 0 || waits > 150) press(); else setTimeout(wait, 20); };"
                 "play.click(); root.dataset.label = play.textContent; wait();}</script>");
     return page;
 }

@@ -69,7 +69,8 @@
 
   function tick(now) {
     if (!playing) return;
-    if (last !== null) setTime(time + ((now - last) / 1000) * Number(speed.value));
+    // At most a tenth of a second: a page that was hidden goes on from where it was.
+    if (last !== null) setTime(time + Math.min(0.1, (now - last) / 1000) * Number(speed.value));
     last = now;
     if (time >= end) setPlaying(false);
     else requestAnimationFrame(tick);
