@@ -39,13 +39,13 @@ TEST_P(HeavyChain, HoldsForTenSeconds) {
         farthest = std::max(farthest, std::hypot(at[0], at[1], at[2]));
     }
     EXPECT_LT(run.simulation.totals().worst_drift, GetParam().drift);
-    EXPECT_LT(farthest, 4.1 + 21 * GetParam().drift);
+    EXPECT_LT(farthest, 4.1 + 21 * GetParam().drift + 1e-9);
     // Dissipative methods: no energy comes in but by the drift's own work on the weight.
     EXPECT_LT(run.simulation.totals().energy, 1000 * 9.81 * 21 * GetParam().drift + 1.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, HeavyChain,
-                         testing::Values(Method{"euler_implicit_linearized", 0.005, 1e-3},
+                         testing::Values(Method{"euler_implicit_linearized", 0.005, 2e-5},
                                          Method{"euler_implicit(newton_tolerance=1e-6)", 0.01, 1e-8}),
                          [](const auto& chosen) {
                              return std::string(chosen.param.integrator, std::strcspn(chosen.param.integrator, "("));
@@ -59,7 +59,8 @@ TEST(HeavyChainWithout, ConstraintStiffnessIsLost) {
     EXPECT_GT(run.simulation.totals().worst_drift, 0.01);
 }
 
-// A bob of 1 kg on a spring of 1e8 N/m: ω = 1e4 rad/s, a hundred times faster than a step. It stretches by up to 3 m g.
+// A bob of 1 kg on a spring of 1e8 N/m: ω = 1e4 rad/s, 20 to 100 times faster than a step. 3 m g stretch it by 2.94e-7
+// m.
 constexpr const char* stiff_pendulum = R"(
 step: 0.01
 end: 10
@@ -84,9 +85,9 @@ TEST_P(StiffPendulum, KeepsItsLengthForTenSeconds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, StiffPendulum,
-                         testing::Values(Method{"euler_implicit_linearized", 0.01, 1e-2},
-                                         Method{"euler_implicit", 0.01, 1e-6}, Method{"hht", 0.01, 1e-3},
-                                         Method{"generalized_alpha", 0.01, 1e-3}),
+                         testing::Values(Method{"euler_implicit_linearized", 0.01, 2e-5},
+                                         Method{"euler_implicit", 0.002, 3e-7}, Method{"hht", 0.002, 3e-7},
+                                         Method{"generalized_alpha", 0.002, 3e-7}),
                          [](const auto& chosen) { return std::string(chosen.param.integrator); });
 
 }  // namespace
