@@ -35,8 +35,6 @@ public:
     /// θ of a row that is held where it is.
     static constexpr double held = 1e40;
 
-    void analyze(const sdk::ProblemView& problem) { groups_ = groups_of(problem); }
-
     /// Takes the cones' parameters in units of system.
     void load(const sdk::ProblemView& problem, const ScaledSystem& system);
 
@@ -101,7 +99,6 @@ private:
     void renew_products(Block& block) const;
     [[nodiscard]] double products(double step) const;
 
-    std::vector<Group> groups_;
     std::vector<std::int32_t> block_of_group_;
     std::vector<Interval> intervals_;
     std::vector<Block> blocks_;

@@ -34,7 +34,6 @@ InteriorPoint::InteriorPoint(const sdk::OptionValues& options)
 
 void InteriorPoint::analyze(const sdk::ProblemView& problem) {
     scaling_.analyze(problem);
-    cones_.analyze(problem);
     kkt_.analyze(problem);
 }
 
@@ -61,6 +60,8 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
     }
     if (monitor.best().size() == problem.m) lambda = monitor.best();
     x = best_x_;
+    std::string& message = monitor.outcome().message;
+    message += (message.empty() ? "" : "; ") + kkt_.description();
     return monitor.outcome();
 }
 

@@ -11,7 +11,7 @@
 // and refined with the residual of the system as it stands. The patterns depend on those of H, D and E alone.
 #pragma once
 
-#include <memory>
+#include <string>
 
 #include "complementarity.hpp"
 #include "sparse_factor.hpp"
@@ -45,9 +45,8 @@ public:
     double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx,
                  sdk::Vector& dz);
 
-    [[nodiscard]] Form form() const { return form_; }
-    [[nodiscard]] double regularization() const { return delta_; }
-    [[nodiscard]] double entries() const { return factor_.entries(); }
+    /// The form in use, its fill and the regularisation, for a message.
+    [[nodiscard]] std::string description() const;
     [[nodiscard]] std::int64_t analyses() const { return analyses_; }
     [[nodiscard]] std::int64_t factorizations() const { return factorizations_; }
 
@@ -70,7 +69,7 @@ private:
     [[nodiscard]] sdk::SparseColumns pattern(const sdk::ProblemView& problem, Form form) const;
     void find_places(const sdk::ProblemView& problem);
     void rotate(const Complementarity& cones);
-    void assemble(const Complementarity& cones, const sdk::Vector& theta);
+    void assemble(const sdk::Vector& theta);
     void add_normal_block(std::size_t group);
     void solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz);
 

@@ -10,10 +10,11 @@ using delassus::sdk::real_option;
 constexpr const char* forms[] = {"auto", "normal", "augmented"};
 
 constexpr delassus_option options[] = {
-    choice_option("form", "auto", forms,
-                  "what is factored: H + D'T D, or the quasi-definite saddle point; auto: by the fill"),
+    choice_option(
+        "form", "auto", forms,
+        "what is factored where n > 0: H + D'TD (if E couples no two cones), or the quasi-definite saddle point"),
     real_option("step_fraction", "0.99", 0.5, 0.9999, "", "part of the way to the boundary that a step may take"),
-    real_option("regularization", "1e-12", 1e-15, 1e-4, "",
+    real_option("regularization", "1e-13", 1e-15, 1e-4, "",
                 "static regularisation of the rows, relative to the diagonal of N; refinement removes its effect"),
     integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
     integer_option("stall_iterations", "15", 0, 1e9, "iterations",

@@ -53,7 +53,6 @@ public:
 
     /// Whether H is known to be definite.
     [[nodiscard]] bool definite() const { return definite_; }
-    [[nodiscard]] std::int64_t analyses() const { return operator_.inverse().analyses(); }
     [[nodiscard]] std::int64_t factorizations() const { return operator_.inverse().factorizations(); }
 
 private:
