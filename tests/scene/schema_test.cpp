@@ -81,6 +81,13 @@ std::map<std::string, std::string> scenes_of_parts() {
     for (const std::string kind : {"sphere", "box", "capsule", "cylinder", "plane", "convex"})
         scenes[kind] = "step: 1\nend: 1\nbodies: [{shapes: [{" + kind + ": {@}}]}]";
     for (const std::string kind : {"joint", "motor", "spring", "load"}) scenes[kind] = ball + kind + "s: [{@}]";
+    scenes["mesh"] = "step: 1\nend: 1\nbodies: [{shapes: [{mesh: {@}}]}]";
+    scenes["elastic_mesh"] = "step: 1\nend: 1\nelastic_meshes: [{@}]";
+    scenes["fixed_box"] = "step: 1\nend: 1\nelastic_meshes: [{fixed_boxes: [{@}]}]";
+    scenes["beam"] = "step: 1\nend: 1\nbeams: [{@}]";
+    scenes["section"] = "step: 1\nend: 1\nbeams: [{section: {@}}]";
+    scenes["step_bounds"] = "step: {@}";
+    scenes["tolerance"] = "tolerance: {@}";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;
 }
@@ -138,7 +145,9 @@ TEST(SceneSchema, RefusesWhatIsWrong) {
     const auto fault = [&](const std::string& yaml) { return published.fault(json_of(YAML::Load(yaml))); };
     EXPECT_EQ(fault("{step: 1, end: 1}"), "");
     EXPECT_EQ(fault("{step: 1}"), ": required end");
-    EXPECT_EQ(fault("{step: 0, end: 1}"), "/step: exclusiveMinimum");
+    EXPECT_EQ(fault("{step: 0, end: 1}"), "/step: oneOf");
+    EXPECT_EQ(fault("{end: 1}"), ": anyOf");
+    EXPECT_EQ(fault("{tolerance: 1.0e-4, step: {initial: 0.1}, end: 1}"), "");
     EXPECT_EQ(fault("{step: 1, end: 1, gravty: [0, 0, 0]}"), "/gravty: additionalProperties");
     EXPECT_EQ(fault("{step: 1, end: 1, gravity: [0, 0]}"), "/gravity: minItems");
     EXPECT_EQ(fault("{step: 1, end: 1, bodies: [{name: b, mass: heavy}]}"), "/bodies/0/mass: type \"number\"");

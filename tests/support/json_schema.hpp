@@ -46,6 +46,10 @@ private:
                 if (std::count_if(rule.begin(), rule.end(),
                                   [&](const Json& part) { return fault(part, value, place).empty(); }) != 1)
                     return wrong("oneOf");
+            } else if (keyword == "anyOf") {
+                if (std::none_of(rule.begin(), rule.end(),
+                                 [&](const Json& part) { return fault(part, value, place).empty(); }))
+                    return wrong("anyOf");
             } else if (keyword == "not") {
                 if (fault(rule, value, place).empty()) return wrong("not");
             } else if (keyword == "if") {
@@ -125,6 +129,7 @@ private:
                                   "type",
                                   "enum",
                                   "allOf",
+                                  "anyOf",
                                   "oneOf",
                                   "not",
                                   "if",
