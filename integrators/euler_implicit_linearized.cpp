@@ -250,7 +250,8 @@ private:
         sort_kept();
     }
     void sort_kept() {
-        std::sort(kept_.begin(), kept_.end(), [](const Kept& a, const Kept& b) { return a.key < b.key; });
+        std::sort(kept_.begin(), kept_.end(),
+                  [](const Kept& a, const Kept& b) { return a.key != b.key ? a.key < b.key : a.first < b.first; });
     }
 
     /// Where the impulses of a unilateral block of the last step stand in impulses_.

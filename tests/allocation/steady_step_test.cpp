@@ -52,6 +52,7 @@ namespace {
 
 /// Steps often enough for every array to have its size, then counts over some steps.
 long steady_allocations(MultibodySystem& system, const std::string& method, bool within_the_solver) {
+    system.finish();
     const Registry registry;
     SolverConfig config;
     config.name = DELASSUS_QUIET_PLUGIN;
