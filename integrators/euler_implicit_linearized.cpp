@@ -19,10 +19,12 @@ namespace {
 // those of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so H also has h² G.
 // It is what holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the pull P
 // at the arm l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1 on. Of G
-// the part is taken that keeps H definite for every solver; what is left out is of the order of the method's own
-// error. Constraints at the end of the step, again to
-// first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows with b = C(q, t⁺)/h. The part C(q, t)/h of
-// it is error of earlier steps; it is recovered with at most the speed η_s (seed footnote 5). A gap Φ ≥ 0 likewise:
+// only that part is taken that a step does not bear explicitly and that keeps H definite for every solver; what is left
+// out is of the order of the method's own error.
+//
+// Constraints at the end of the step, again to first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows
+// with b = C(q, t⁺)/h. The part C(q, t)/h of it is error of earlier steps; it is recovered with at most the speed η_s
+// (seed footnote 5). A gap Φ ≥ 0 likewise:
 //
 //     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most η_s
 //

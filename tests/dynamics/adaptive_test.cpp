@@ -117,8 +117,9 @@ TEST(AdaptiveStepping, RejectsStepsOverASuddenLoad) {
         const auto after = run_to(system, method, {}, control, 1.5);
         EXPECT_GE(after.rejected, 3) << method;
         EXPECT_LT(after.smallest, 1e-3) << method;
-        EXPECT_NEAR(after.state.q[0], 12.5, 0.01) << method;
-        EXPECT_NEAR(after.state.v[0], 50.0, 0.02) << method;
+        // A step h over the jump is off by up to 100 h in v, of which h times as much is allowed.
+        EXPECT_NEAR(after.state.v[0], 50.0, 0.1) << method;
+        EXPECT_NEAR(after.state.q[0], 12.5, 0.05) << method;
     }
 }
 

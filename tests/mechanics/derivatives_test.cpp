@@ -111,8 +111,9 @@ TEST_P(JointDerivatives, KeepADefiniteStiffness) {
     }
 }
 
-// A body on a ball joint, pulled along its arm: all of the stiffness is kept. Under pressure none is.
-TEST(DefiniteStiffness, IsTheWholeUnderPull) {
+// A body on a ball joint, pulled along its arm: all of a stiffness is kept that is large beside the moment of inertia,
+// nothing of a small one, and nothing under pressure.
+TEST(DefiniteStiffness, IsTheWholeUnderAStrongPull) {
     MultibodySystem system;
     JointParameters joint;
     joint.kind = JointKind::Spherical;
@@ -121,7 +122,7 @@ TEST(DefiniteStiffness, IsTheWholeUnderPull) {
     system.finish();
     const State state = system.initial_state();
     const auto n = system.n();
-    for (const double pull : {3.0, -3.0}) {
+    for (const double pull : {3e6, 1e-2, -3e6}) {
         const VectorXd lambda = pull * Eigen::Vector3d(-0.4, 0.3, -0.5);  // towards the joint
         MatrixAssembler assembler;
         assembler.begin(n, n);
@@ -130,9 +131,9 @@ TEST(DefiniteStiffness, IsTheWholeUnderPull) {
         assembler.begin(n, n);
         system.add_definite_constraint_stiffness(state, lambda.data(), 2.0, assembler);
         const Eigen::MatrixXd G = tests::dense(assembler.finish());
-        EXPECT_GT(whole.norm(), 1.0);
-        if (pull > 0.0) {
-            EXPECT_LE((G - whole).norm(), 1e-13 * whole.norm());
+        EXPECT_GT(whole.norm(), 1e-3);
+        if (pull > 1.0) {
+            EXPECT_LE((G - whole).norm(), 1e-6 * whole.norm());
         } else {
             EXPECT_EQ(G.norm(), 0.0);
         }

@@ -143,8 +143,8 @@ public:
     /// H += factor · ∂(C_qᵀ λ)/∂q for fixed λ; m. Default: nothing.
     virtual void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
                                           MatrixAssembler& H) const;
-    /// H += factor · G, G what should be kept of −∂(C_qᵀ λ)/∂q in a matrix that must stay positive definite: symmetric,
-    /// positive semidefinite, any part of it. Default: nothing.
+    /// H += what must not be left out of −factor · ∂(C_qᵀ λ)/∂q beside M and keeps H positive definite: symmetric and
+    /// positive semidefinite. Default: nothing.
     virtual void add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
                                                    MatrixAssembler& H) const;
 
