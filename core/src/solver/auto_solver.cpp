@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 /// The first ranking.json of the plugin folders.
 fs::path ranking_file(const Registry& registry) {
     for (const auto& folder : registry.folders())
-        if (fs::exists(folder / "ranking.json")) return folder / "ranking.json";
+        if (fs::exists(folder / ranking_file_name)) return folder / ranking_file_name;
     throw InputError(
         fmt::format("auto finds no ranking.json in the plugin folders, of which the last is {}; name a solver instead",
                     registry.folders().back().string()));
@@ -73,10 +73,9 @@ private:
 
     /// The solver of a stage, kept from problem to problem; null if it is not installed or cannot take the problem.
     Solver* usable(const RankedStage& ranked, const PreparedProblem& problem) {
-        std::uint64_t needs = needs_of(problem, {});
         if (ranked.stage.law && problem.problem().law != *ranked.stage.law)
-            needs = needs_of(problem.with_law(*ranked.stage.law), {});
-        const auto capable = registry_.capable(needs);
+            return usable(ranked, problem.with_law(*ranked.stage.law));
+        const auto capable = registry_.capable(needs_of(problem, {}));
         if (std::find(capable.begin(), capable.end(), ranked.solver) == capable.end()) return nullptr;
         const auto key = std::make_pair(ranked.solver, ranked.options);
         auto place = solvers_.find(key);

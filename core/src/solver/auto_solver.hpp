@@ -8,6 +8,8 @@
 namespace delassus {
 
 inline constexpr const char* auto_name = "auto";
+/// In a plugin folder: who solves what. It is no sidecar.
+inline constexpr const char* ranking_file_name = "ranking.json";
 
 /// What `delassus plugins info auto` shows. It can what any plugin of the registry can.
 [[nodiscard]] PluginInfo auto_info(const Registry& registry);

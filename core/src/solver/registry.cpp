@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "delassus/error.hpp"
+#include "solver/auto_solver.hpp"
 #include "support/library_location.hpp"
 #include "support/nearest_name.hpp"
 
@@ -53,7 +54,8 @@ void Registry::scan(const fs::path& folder) {
         return;
     }
     for (const auto& entry : fs::directory_iterator(folder, error)) {
-        if (entry.path().extension() == ".json") sidecars.insert(entry.path());
+        if (entry.path().extension() == ".json" && entry.path().filename() != ranking_file_name)
+            sidecars.insert(entry.path());
         if (entry.path().extension() == ".so") libraries.insert(entry.path());
     }
     if (error) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 namespace delassus {
 
@@ -14,19 +15,27 @@ DecreaseWatch::DecreaseWatch(double tolerance, std::int64_t max_iterations)
 
 bool DecreaseWatch::hopeless(std::int64_t iteration, double natural) {
     if (!std::isfinite(natural)) return false;
-    bool fails = false;
-    if (last_ > 0 && natural > tolerance_) {
-        const double doubled = std::log2(static_cast<double>(iteration) / static_cast<double>(last_));
-        const double rate = std::log2(natural / last_error_) / doubled;  // per doubling; negative if it falls
-        const double doublings = std::log2(tolerance_ / natural) / rate;
-        fails =
-            rate >= 0.0 || std::exp2(doublings) * static_cast<double>(iteration) > static_cast<double>(max_iterations_);
-    }
-    failed_ = fails ? failed_ + 1 : 0;
-    last_ = iteration;
-    last_error_ = natural;
     next_ = 2 * iteration;
+    const double now = std::log(std::max(natural, std::numeric_limits<double>::min()));
+    const bool fails =
+        measured_ >= 2 && natural > tolerance_ && !in_reach(iteration, natural, before_ - last_, last_ - now);
+    failed_ = fails ? failed_ + 1 : 0;
+    before_ = std::exchange(last_, now);
+    ++measured_;
     return failed_ >= 2;
+}
+
+bool DecreaseWatch::in_reach(std::int64_t iteration, double natural, double first, double second) const {
+    if (!(second > 0.0)) return false;
+    const double growth = first > 0.0 ? std::clamp(second / first, 1.0, 2.0) : 1.0;
+    const double limit = static_cast<double>(max_iterations_);
+    double rest = std::log(natural / tolerance_), fall = growth * second;
+    for (double k = static_cast<double>(iteration); k <= limit; k *= 2.0) {
+        if (rest <= fall) return k * std::exp2(rest / fall) <= limit;
+        rest -= fall;
+        fall *= growth;
+    }
+    return false;
 }
 
 StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,

@@ -23,10 +23,11 @@ struct Stage {
     std::optional<Law> law = {};
 };
 
-/// Foretells by measurement whether an iteration will reach a tolerance in time. At iterations k₀, 2k₀, 4k₀, … the
-/// natural error e is taken. Where it fell by the factor ρ during the last doubling, a further log(tolerance/e)/log ρ
-/// doublings are needed: exact for the algebraic rates e ~ k^(−p) of first-order methods, and too many for linear ones,
-/// so that a forecast is trusted only when it fails twice in a row. Iterations, not seconds: the same on every machine.
+/// Foretells by measurement whether an iteration will reach a tolerance in time. At iterations 16, 32, 64, … the
+/// natural error e is taken; let ln e fall by r₁ and then by r₂ in the last two doublings. An algebraic rate e ~ k^(−p)
+/// has r₂ = r₁, a linear one e ~ q^k has r₂ = 2 r₁; so the next doublings are taken to bring g r₂, g² r₂, … with g =
+/// r₂/r₁ held between 1 and 2. A forecast is trusted when it fails twice in a row. Iterations, not seconds: the same on
+/// every machine.
 class DecreaseWatch {
 public:
     DELASSUS_API DecreaseWatch(double tolerance, std::int64_t max_iterations);
@@ -37,11 +38,14 @@ public:
     DELASSUS_API bool hopeless(std::int64_t iteration, double natural);
 
 private:
+    /// Whether the tolerance would be reached by max_iterations, from this error after falls of r₁ and r₂.
+    [[nodiscard]] bool in_reach(std::int64_t iteration, double natural, double first, double second) const;
+
     double tolerance_;
     std::int64_t max_iterations_;
-    std::int64_t next_ = 16, last_ = 0;
-    double last_error_ = std::numeric_limits<double>::infinity();
-    int failed_ = 0;
+    std::int64_t next_ = 16;
+    int measured_ = 0, failed_ = 0;
+    double before_ = 0.0, last_ = 0.0;  // ln e
 };
 
 /// Runs stages on one problem and adds them up in its report.
