@@ -382,7 +382,8 @@ TEST(Pgs, AnswersTheReducedFormAsTheFullOne) {
     const auto a = solve(full, {}, to(1e-9)), b = solve(reduced, {}, to(1e-9));
     EXPECT_EQ(a.report.status, Status::Solved);
     EXPECT_EQ(b.report.status, Status::Solved);
-    const std::vector<double> x = ErrorMeter(prepared).velocity_of(b.solution.lambda);
+    std::vector<double> x;
+    ErrorMeter(prepared).velocity_of(b.solution.lambda, x);
     EXPECT_LE(ErrorMeter(prepared).velocity(x, a.solution.x), 1e-6);
 }
 

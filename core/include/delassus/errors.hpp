@@ -47,8 +47,8 @@ public:
     /// velocities without reactions, H⁻¹a, in the same norm), relative to those.
     [[nodiscard]] DELASSUS_API double velocity(std::span<const double> x, std::span<const double> reference) const;
 
-    /// x = H⁻¹(a + Dᵀλ); throws InputError where H is not definite.
-    [[nodiscard]] DELASSUS_API std::vector<double> velocity_of(std::span<const double> lambda) const;
+    /// x ← H⁻¹(a + Dᵀλ), n; throws InputError where H is not definite.
+    DELASSUS_API void velocity_of(std::span<const double> lambda, std::vector<double>& x) const;
 
 private:
     friend class PreparedProblem;

@@ -61,21 +61,21 @@ struct StepSolver::Implementation {
         return instances[instance];
     }
 
-    [[nodiscard]] std::string choice(std::uint64_t needs) const {
+    /// Empty if there is none.
+    [[nodiscard]] const std::string& choice(std::uint64_t needs) const {
         if (!config.name.empty()) return config.name;
-        const auto can = [&](const std::string& name) {
-            return std::any_of(registry.plugins().begin(), registry.plugins().end(), [&](const PluginInfo& plugin) {
-                return plugin.name == name && plugin.missing(needs) == 0;
-            });
-        };
-        const auto found = std::find_if(preferred.begin(), preferred.end(), can);
-        if (found != preferred.end()) return *found;
-        const auto capable = registry.capable(needs);
-        return capable.empty() ? std::string() : capable.front();
+        const auto& plugins = registry.plugins();
+        for (const auto& name : preferred)
+            for (const auto& plugin : plugins)
+                if (plugin.name == name && plugin.missing(needs) == 0) return name;
+        const auto able = std::find_if(plugins.begin(), plugins.end(),
+                                       [&](const PluginInfo& plugin) { return plugin.missing(needs) == 0; });
+        static const std::string none;
+        return able == plugins.end() ? none : able->name;
     }
 
     Solver& choose(const PreparedProblem& problem, std::size_t instance) {
-        const std::string name = choice(problem.needs());
+        const std::string& name = choice(problem.needs());
         if (!name.empty()) return named(name, instance);
         throw Unsupported(
             fmt::format("no installed solver can take the step's problem: {}", problem.describe(problem.needs())));
@@ -155,7 +155,11 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
                               structure == Structure::Definite || structure == Structure::Reduced;
-        solution.x = definite ? prepared.meter().velocity_of({}) : solve_by_lu(prepared);
+        if (definite) {
+            prepared.meter().velocity_of({}, solution.x);
+        } else {
+            solution.x = solve_by_lu(prepared);
+        }
         solution.lambda.clear();
         return true;
     }

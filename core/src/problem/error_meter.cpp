@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/SparseLU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -234,17 +235,18 @@ double ErrorMeter::velocity(std::span<const double> x_values, std::span<const do
     return ratio(energy_norm(difference), scale);
 }
 
-std::vector<double> ErrorMeter::velocity_of(std::span<const double> lambda_values) const {
+void ErrorMeter::velocity_of(std::span<const double> lambda_values, std::vector<double>& x) const {
     const auto& self = *implementation_;
     if (self.view.n > 0 && !self.prepared.operator_of_definite)
         throw InputError("velocities follow from reactions alone only where H is definite");
     if (static_cast<Eigen::Index>(lambda_values.size()) != self.view.m)
         throw InputError(
             fmt::format("{} reactions do not fit a problem with m = {}", lambda_values.size(), self.view.m));
-    if (self.view.n == 0) return {};
-    const Vector x =
-        self.prepared.operator_of_definite->velocity(self.view, VectorView(lambda_values.data(), self.view.m));
-    return {x.begin(), x.end()};
+    x.resize(static_cast<std::size_t>(self.view.n));
+    if (x.empty()) return;
+    self.prepared.operator_of_definite->velocity(self.view, VectorView(lambda_values.data(), self.view.m),
+                                                 self.momentum);
+    std::copy(self.momentum.begin(), self.momentum.end(), x.begin());
 }
 
 }  // namespace delassus

@@ -54,12 +54,18 @@ public:
     /// x = H⁻¹ (a + Dᵀ λ); n.
     template <class Lambda>
     [[nodiscard]] Vector velocity(const ProblemView& problem, const Lambda& lambda) const {
-        Vector x = problem.a;
+        Vector x;
+        velocity(problem, lambda, x);
+        return x;
+    }
+    /// The same into x, which is resized.
+    template <class Lambda>
+    void velocity(const ProblemView& problem, const Lambda& lambda, Vector& x) const {
+        x = problem.a;
         if (problem.n > 0) {
             x.noalias() += problem.D.transpose() * lambda;
             inverse_.apply(x);
         }
-        return x;
     }
 
     /// The diagonal of N; m.
