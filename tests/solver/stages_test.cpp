@@ -170,6 +170,20 @@ TEST(Auto, AStageMayTakeTheOtherLaw) {
     EXPECT_NEAR(solution.x[0], 0.0, 1e-7);
 }
 
+// A warm start may hold velocities of another time: its small natural error is no success.
+TEST(Auto, AStartThatDoesNotBalanceIsNoSolution) {
+    const PreparedProblem problem(point_on_plane(2.0, 10.0, 3.0, 0.5, Law::Associated));  // it sticks: λ = −a, x = 0
+    Solution solution{{1.0, -1.0, 2.0}, {10.0, -3.0, 0.0}};
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "apgd", "reason": "any"}]}])");
+    SolveSettings settings;
+    settings.warm_start = true;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution, settings);
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    for (const double x : solution.x) EXPECT_NEAR(x, 0.0, 1e-7);
+}
+
 TEST(Auto, BadRankingsAreRefused) {
     const ScratchFolder scratch;
     const auto sentence = [&](const std::string& rules) {

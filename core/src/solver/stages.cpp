@@ -38,10 +38,19 @@ bool DecreaseWatch::in_reach(std::int64_t iteration, double natural, double firs
     return false;
 }
 
+namespace {
+
+/// A start with velocities and reactions of different steps may have a small natural error and yet not balance.
+double worst_of(const Errors& error) {
+    return std::max(error.natural, error.balance);
+}
+
+}  // namespace
+
 StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                          SolveReport& report)
     : problem_(problem), best_(solution), settings_(settings), report_(report), started_(settings.warm_start) {
-    if (started_) natural_ = problem_.meter().measure(best_.x, best_.lambda).natural;
+    if (started_) worst_ = worst_of(problem_.meter().measure(best_.x, best_.lambda));
 }
 
 bool StageRunner::run(Solver& solver, const Stage& stage) {
@@ -59,16 +68,16 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
 
     const Errors error = other ? problem_.meter().measure(solution.x, solution.lambda) : result.error;
     // A stage with the other law is there for its end point, whatever that is worth under the problem's own.
-    if (!started_ || error.natural < natural_ || other) {
+    if (!started_ || worst_of(error) < worst_ || other) {
         best_ = std::move(solution);
-        natural_ = error.natural;
+        worst_ = worst_of(error);
         started_ = true;
     }
     add({result.solver, result.options, law, stage.reason, tolerance, result.status, result.message, result.iterations,
          result.seconds_setup + result.seconds_solve, error.natural},
         result);
     if (result.status == Status::Cancelled) return true;
-    if (std::max(error.natural, error.balance) <= settings_.tolerance ||
+    if (worst_of(error) <= settings_.tolerance ||
         (result.status == Status::Solved && tolerance == settings_.tolerance && !other)) {
         report_.status = Status::Solved;
         return true;

@@ -57,9 +57,6 @@ public:
     /// Runs one stage. True if nothing is left to do: solved, cancelled, or a limit of the whole solve reached.
     bool run(Solver& solver, const Stage& stage);
 
-    /// The natural error of the best so far; infinity before the first stage of a cold start.
-    [[nodiscard]] double natural() const { return natural_; }
-
     /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".
     [[nodiscard]] std::string sentence() const;
 
@@ -72,7 +69,7 @@ private:
     Solution& best_;
     const SolveSettings& settings_;
     SolveReport& report_;
-    double natural_ = std::numeric_limits<double>::infinity();
+    double worst_ = std::numeric_limits<double>::infinity();  // of the best so far, its natural and its balance error
     bool started_ = false;
 };
 
