@@ -16,6 +16,7 @@
 #include "support/dense.hpp"
 #include "support/shared_problems.hpp"
 #include "support/small_problems.hpp"
+#include "support/solving.hpp"
 
 namespace delassus {
 namespace {
@@ -23,51 +24,22 @@ namespace {
 using tests::dense;
 using tests::diagonal_matrix;
 using tests::identity;
+using tests::infinity;
+using tests::one_row;
 using tests::point_on_plane;
+using tests::to;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-struct Result {
-    Solution solution;
-    SolveReport report;
-};
-
-SolveSettings to(double tolerance, std::int64_t max_iterations = 100'000) {
-    SolveSettings settings;
-    settings.tolerance = tolerance;
-    settings.max_iterations = max_iterations;
-    return settings;
-}
+using Result = tests::Solved;
 
 Result solve(const Problem& problem, const SolveSettings& settings, const OptionTexts& options = {}) {
-    const Registry registry;
-    const PreparedProblem prepared(problem);
-    Solver solver(registry.load("admm"), options, &registry);
-    Result result;
-    result.report = solver.solve(prepared, result.solution, settings);
-    return result;
+    return tests::solve_with("admm", problem, settings, options);
 }
 
 void expect_answer(const Problem& problem, const std::vector<double>& x, const std::vector<double>& lambda) {
     for (const char* acceleration : {"none", "nesterov", "anderson"}) {
-        const auto [solution, report] = solve(problem, to(1e-11), {{"acceleration", acceleration}});
-        EXPECT_EQ(report.status, Status::Solved) << acceleration << ' ' << report.message;
-        ASSERT_EQ(solution.x.size(), x.size());
-        ASSERT_EQ(solution.lambda.size(), lambda.size());
-        for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(solution.x[i], x[i], 1e-9) << acceleration << " x " << i;
-        for (std::size_t i = 0; i < lambda.size(); ++i)
-            EXPECT_NEAR(solution.lambda[i], lambda[i], 1e-9) << acceleration << " λ " << i;
+        tests::expect_solution(solve(problem, to(1e-11, 100'000), {{"acceleration", acceleration}}), x, lambda, 1e-9,
+                               acceleration);
     }
-}
-
-Problem one_row(double mass, double a, Cone cone) {
-    Problem problem;
-    problem.H = diagonal_matrix({mass});
-    problem.D = identity(1);
-    problem.a = {a};
-    problem.b = {0.0};
-    problem.cones = {std::move(cone)};
-    return problem;
 }
 
 // ---- The contact law -----------------------------------------------------------------------------------------------
@@ -122,31 +94,13 @@ TEST(AdmmContactLaw, GivesThePairThatObeysCoulomb) {
 
 // ---- Known answers -------------------------------------------------------------------------------------------------
 
-TEST(Admm, TiesMassesByAFreeRow) {
-    expect_answer(tests::tied_masses(), {1.0, 1.0}, {-3.0});
-}
-
-TEST(Admm, StopsAtANonnegativeRow) {
-    expect_answer(one_row(2.0, -6.0, Cone::nonnegative(1)), {0.0}, {6.0});
-    expect_answer(one_row(2.0, 6.0, Cone::nonnegative(1)), {3.0}, {0.0});
-}
-
-TEST(Admm, KeepsToTheBoundsOfABox) {
-    expect_answer(one_row(2.0, 5.0, Cone::box({-1.0}, {2.0})), {2.0}, {-1.0});
-    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {2.0})), {-1.5}, {2.0});
-    expect_answer(one_row(2.0, 0.5, Cone::box({-1.0}, {2.0})), {0.0}, {-0.5});
-    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {infinity})), {0.0}, {5.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {infinity})), {0.0}, {-5.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({1.0}, {1.0})), {3.0}, {1.0});
+TEST(Admm, KnowsFreeNonnegativeAndBoxRows) {
+    for (const auto& [problem, x, lambda] : tests::known_answers_of_rows()) expect_answer(problem, x, lambda);
 }
 
 TEST(Admm, SticksSlidesAndOpensByTheAssociatedLaw) {
-    const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
-    expect_answer(point_on_plane(2.0, 6.0, 2.0, mu, Law::Associated), {0.0, 0.0, 0.0}, {6.0, -2.0, 0.0});
-    expect_answer(point_on_plane(2.0, 6.0, 5.0, mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0, 0.0},
-                  {s, -mu * s, 0.0});
-    expect_answer(point_on_plane(2.0, -6.0, 1.0, mu, Law::Associated), {3.0, 0.5, 0.0}, {0.0, 0.0, 0.0});
-    expect_answer(point_on_plane(2.0, 6.0, 5.0, 0.0, Law::Associated), {0.0, 2.5, 0.0}, {6.0, 0.0, 0.0});
+    for (const auto& [problem, x, lambda] : tests::known_answers_of_associated_friction())
+        expect_answer(problem, x, lambda);
 }
 
 TEST(Admm, SticksSlidesAndOpensByTheCoulombLaw) {
@@ -160,7 +114,7 @@ TEST(Admm, SharesTheLoadOfRedundantRows) {
     Problem problem = one_row(2.0, -6.0, Cone::nonnegative(3));
     problem.D = SparseMatrix::from_triplets(3, 1, {{0, 0, 1.0}, {1, 0, 1.0}, {2, 0, 1.0}});
     problem.b = {0.0, 0.0, 0.0};
-    const auto [solution, report] = solve(problem, to(1e-11));
+    const auto [solution, report] = solve(problem, to(1e-11, 100'000));
     EXPECT_EQ(report.status, Status::Solved);
     EXPECT_NEAR(solution.x[0], 0.0, 1e-9);
     EXPECT_NEAR(solution.lambda[0] + solution.lambda[1] + solution.lambda[2], 6.0, 1e-9);
@@ -171,7 +125,7 @@ TEST(Admm, WithoutRowsGivesTheFreeVelocity) {
     problem.H = diagonal_matrix({2.0, 4.0});
     problem.D = SparseMatrix::zero(0, 2);
     problem.a = {1.0, 2.0};
-    const auto [solution, report] = solve(problem, to(1e-10));
+    const auto [solution, report] = solve(problem, to(1e-10, 100'000));
     EXPECT_EQ(report.status, Status::Solved);
     EXPECT_EQ(solution.x, (std::vector<double>{0.5, 0.5}));
 }
@@ -192,7 +146,7 @@ TEST(Admm, SaysThatNoRowHoldsASingularDirection) {
     problem.H = diagonal_matrix({1.0, 0.0});
     problem.D = SparseMatrix::from_triplets(1, 2, {{0, 0, 1.0}});
     problem.a = {1.0, 0.0};
-    const auto report = solve(problem, to(1e-8)).report;
+    const auto report = solve(problem, to(1e-8, 100'000)).report;
     EXPECT_EQ(report.status, Status::NumericalFailure);
     EXPECT_NE(report.message.find("no row of D holds"), std::string::npos) << report.message;
 }
@@ -261,10 +215,10 @@ class AdmmForms : public testing::TestWithParam<std::tuple<Compliance, Law>> {};
 TEST_P(AdmmForms, AgreeWithTheReducedProblem) {
     Problem problem = mixed(std::get<0>(GetParam()));
     problem.law = std::get<1>(GetParam());
-    const auto small = solve(reduced(problem), to(1e-11));
+    const auto small = solve(reduced(problem), to(1e-11, 100'000));
     ASSERT_EQ(small.report.status, Status::Solved) << small.report.message;
     for (const char* form : {"primal", "dual", "auto"}) {
-        const auto [solution, report] = solve(problem, to(1e-11), {{"form", form}});
+        const auto [solution, report] = solve(problem, to(1e-11, 100'000), {{"form", form}});
         EXPECT_EQ(report.status, Status::Solved) << form << ' ' << report.message;
         for (std::size_t i = 0; i < solution.lambda.size(); ++i)
             EXPECT_NEAR(solution.lambda[i], small.solution.lambda[i], 1e-8) << form << ' ' << i;
@@ -326,21 +280,21 @@ TEST(Admm, KeepsItsFactorForNewRightHandSides) {
         for (double& value : problem.a) value += 0.1;
         prepared.set_right_hand_side(problem.a, problem.b);
         Solution solution;
-        const auto report = solver.solve(prepared, solution, to(1e-6));
+        const auto report = solver.solve(prepared, solution, to(1e-6, 100'000));
         EXPECT_EQ(report.status, Status::Solved);
         EXPECT_EQ(report.analyses, 1);
         EXPECT_EQ(report.factorizations, 1);
     }
     for (double& value : problem.H.value) value *= 2.0;
     Solution solution;
-    const auto report = solver.solve(PreparedProblem(problem), solution, to(1e-6));
+    const auto report = solver.solve(PreparedProblem(problem), solution, to(1e-6, 100'000));
     EXPECT_EQ(report.status, Status::Solved);
     EXPECT_EQ(report.analyses, 1);
     EXPECT_EQ(report.factorizations, 2);
 }
 
 TEST(Admm, AnalysesOnceHoweverOftenThePenaltyChanges) {
-    const auto report = solve(mixed(Compliance::Full), to(1e-9), {{"rho", "1e4"}}).report;
+    const auto report = solve(mixed(Compliance::Full), to(1e-9, 100'000), {{"rho", "1e4"}}).report;
     EXPECT_EQ(report.status, Status::Solved);
     EXPECT_EQ(report.analyses, 1);
     EXPECT_GT(report.factorizations, 1);
@@ -351,8 +305,8 @@ TEST(Admm, StopsAtOnceFromTheSolution) {
     const PreparedProblem prepared(mixed(Compliance::Diagonal));
     Solver solver(registry.load("admm"), {}, &registry);
     Solution solution;
-    ASSERT_EQ(solver.solve(prepared, solution, to(1e-10)).status, Status::Solved);
-    SolveSettings settings = to(1e-9);
+    ASSERT_EQ(solver.solve(prepared, solution, to(1e-10, 100'000)).status, Status::Solved);
+    SolveSettings settings = to(1e-9, 100'000);
     settings.warm_start = true;
     const auto report = solver.solve(prepared, solution, settings);
     EXPECT_EQ(report.status, Status::Solved);
@@ -363,7 +317,7 @@ TEST(Admm, GivesUpWhereRowsContradict) {
     Problem problem = one_row(1.0, 0.0, Cone::free(2));
     problem.D = SparseMatrix::from_triplets(2, 1, {{0, 0, 1.0}, {1, 0, 1.0}});
     problem.b = {0.0, 1.0};
-    const auto report = solve(problem, to(1e-8), {{"stall_iterations", "200"}}).report;
+    const auto report = solve(problem, to(1e-8, 100'000), {{"stall_iterations", "200"}}).report;
     EXPECT_EQ(report.status, Status::Stalled);
     EXPECT_GT(report.error.natural, 1e-3);
 }

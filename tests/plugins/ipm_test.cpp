@@ -10,76 +10,41 @@
 #include "delassus/solver.hpp"
 #include "support/shared_problems.hpp"
 #include "support/small_problems.hpp"
+#include "support/solving.hpp"
 
 namespace delassus {
 namespace {
 
 using tests::diagonal_matrix;
 using tests::identity;
+using tests::infinity;
+using tests::one_row;
 using tests::point_on_plane;
+using tests::to;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-struct Result {
-    Solution solution;
-    SolveReport report;
-};
+using Result = tests::Solved;
 
 Result solve(const Problem& problem, double tolerance, const OptionTexts& options = {},
              const Solution* start = nullptr) {
-    const Registry registry;
-    Solver solver(registry.load("ipm"), options, &registry);
-    Result result;
-    SolveSettings settings;
-    settings.tolerance = tolerance;
-    if (start) {
-        settings.warm_start = true;
-        result.solution = *start;
-    }
-    result.report = solver.solve(PreparedProblem(problem), result.solution, settings);
-    return result;
+    SolveSettings settings = to(tolerance);
+    settings.warm_start = start != nullptr;
+    return tests::solve_with("ipm", problem, settings, options, start ? *start : Solution{});
 }
 
 void expect_answer(const Problem& problem, const std::vector<double>& x, const std::vector<double>& lambda,
                    const OptionTexts& options = {}) {
-    const auto [solution, report] = solve(problem, 1e-11, options);
-    EXPECT_EQ(report.status, Status::Solved) << report.message;
-    ASSERT_EQ(solution.x.size(), x.size());
-    ASSERT_EQ(solution.lambda.size(), lambda.size());
-    for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(solution.x[i], x[i], 1e-9) << "x " << i;
-    for (std::size_t i = 0; i < lambda.size(); ++i) EXPECT_NEAR(solution.lambda[i], lambda[i], 1e-9) << "λ " << i;
-}
-
-Problem one_row(double mass, double a, Cone cone) {
-    Problem problem;
-    problem.H = diagonal_matrix({mass});
-    problem.D = identity(1);
-    problem.a = {a};
-    problem.b = {0.0};
-    problem.cones = {std::move(cone)};
-    return problem;
+    tests::expect_solution(solve(problem, 1e-11, options), x, lambda);
 }
 
 TEST(Ipm, SolvesEachKindOfRow) {
-    expect_answer(tests::tied_masses(), {1.0, 1.0}, {-3.0});
-    expect_answer(one_row(2.0, -6.0, Cone::nonnegative(1)), {0.0}, {6.0});
-    expect_answer(one_row(2.0, 6.0, Cone::nonnegative(1)), {3.0}, {0.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({-1.0}, {2.0})), {2.0}, {-1.0});
-    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {2.0})), {-1.5}, {2.0});
-    expect_answer(one_row(2.0, 0.5, Cone::box({-1.0}, {2.0})), {0.0}, {-0.5});
-    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {infinity})), {0.0}, {5.0});
+    for (const auto& [problem, x, lambda] : tests::known_answers_of_rows()) expect_answer(problem, x, lambda);
     expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {2.0})), {0.0}, {-5.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {infinity})), {0.0}, {-5.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({1.0}, {1.0})), {3.0}, {1.0});
 }
 
 TEST(Ipm, SticksSlidesAndOpens) {
     const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
-    expect_answer(point_on_plane(2.0, 6.0, 2.0, mu, Law::Associated), {0.0, 0.0, 0.0}, {6.0, -2.0, 0.0});
-    expect_answer(point_on_plane(2.0, 6.0, 5.0, mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0, 0.0},
-                  {s, -mu * s, 0.0});
-    expect_answer(point_on_plane(2.0, -6.0, 1.0, mu, Law::Associated), {3.0, 0.5, 0.0}, {0.0, 0.0, 0.0});
-    expect_answer(point_on_plane(2.0, 6.0, 5.0, 0.0, Law::Associated), {0.0, 2.5, 0.0}, {6.0, 0.0, 0.0});
+    for (const auto& [problem, x, lambda] : tests::known_answers_of_associated_friction())
+        expect_answer(problem, x, lambda);
     Problem planar;
     planar.H = diagonal_matrix({2.0, 2.0});
     planar.D = identity(2);

@@ -17,15 +17,17 @@
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
 #include "support/small_problems.hpp"
+#include "support/solving.hpp"
 
 namespace delassus {
 namespace {
 
 using tests::diagonal_matrix;
 using tests::identity;
+using tests::infinity;
+using tests::one_row;
 using tests::point_on_plane;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using tests::to;
 
 // ---- One-contact problems ------------------------------------------------------------------------------------------
 
@@ -208,25 +210,10 @@ TEST(PgsSweep, JacobiBlocksBoundN) {
 
 // ---- The plugin ----------------------------------------------------------------------------------------------------
 
-struct Result {
-    Solution solution;
-    SolveReport report;
-};
+using Result = tests::Solved;
 
 Result solve(const Problem& problem, const OptionTexts& options, const SolveSettings& settings, Solution start = {}) {
-    const Registry registry;
-    const PreparedProblem prepared(problem);
-    Solver solver(registry.load("pgs"), options, &registry);
-    Result result{std::move(start), {}};
-    result.report = solver.solve(prepared, result.solution, settings);
-    return result;
-}
-
-SolveSettings to(double tolerance) {
-    SolveSettings settings;
-    settings.tolerance = tolerance;
-    settings.max_iterations = 1000000;
-    return settings;
+    return tests::solve_with("pgs", problem, settings, options, std::move(start));
 }
 
 using Choice = std::tuple<std::string, std::string, std::string>;  // variant, local solver, form
@@ -239,24 +226,9 @@ protected:
     }
 
     void expect_answer(const Problem& problem, const std::vector<double>& x, const std::vector<double>& lambda) const {
-        const auto [solution, report] = solve(problem, options(), to(1e-11));
-        EXPECT_EQ(report.status, Status::Solved) << report.message;
-        ASSERT_EQ(solution.x.size(), x.size());
-        ASSERT_EQ(solution.lambda.size(), lambda.size());
-        for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(solution.x[i], x[i], 1e-9) << "x " << i;
-        for (std::size_t i = 0; i < lambda.size(); ++i) EXPECT_NEAR(solution.lambda[i], lambda[i], 1e-9) << "λ " << i;
+        tests::expect_solution(solve(problem, options(), to(1e-11)), x, lambda);
     }
 };
-
-Problem one_row(double mass, double a, Cone cone) {
-    Problem problem;
-    problem.H = diagonal_matrix({mass});
-    problem.D = identity(1);
-    problem.a = {a};
-    problem.b = {0.0};
-    problem.cones = {std::move(cone)};
-    return problem;
-}
 
 TEST_P(Variant, KnowsFreeNonnegativeAndBoxRows) {
     expect_answer(tests::tied_masses(), {1.0, 1.0}, {-3.0});

@@ -16,15 +16,17 @@
 #include "support/dense.hpp"
 #include "support/shared_problems.hpp"
 #include "support/small_problems.hpp"
+#include "support/solving.hpp"
 
 namespace delassus {
 namespace {
 
 using tests::diagonal_matrix;
 using tests::identity;
+using tests::infinity;
+using tests::one_row;
 using tests::point_on_plane;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using tests::to;
 
 // A deterministic number in (−1, 1).
 double noise(int i) {
@@ -124,25 +126,11 @@ INSTANTIATE_TEST_SUITE_P(Laws, NewtonStep, testing::Values(0.0, 0.4, 1.0), [](co
 
 // ---- Whole solves --------------------------------------------------------------------------------------------------
 
-struct Result {
-    Solution solution;
-    SolveReport report;
-};
+using Result = tests::Solved;
 
 Result solve(const Problem& problem, const SolveSettings& settings, OptionTexts options = {}, Solution start = {},
              const std::string& name = "ssn") {
-    const Registry registry;
-    const PreparedProblem prepared(problem);
-    Solver solver(registry.load(name), std::move(options), &registry);
-    Result result{std::move(start), {}};
-    result.report = solver.solve(prepared, result.solution, settings);
-    return result;
-}
-
-SolveSettings to(double tolerance) {
-    SolveSettings settings;
-    settings.tolerance = tolerance;
-    return settings;
+    return tests::solve_with(name, problem, settings, std::move(options), std::move(start));
 }
 
 class Ssn : public testing::TestWithParam<std::string> {
@@ -150,50 +138,17 @@ protected:
     [[nodiscard]] OptionTexts form() const { return {{"form", GetParam()}}; }
 
     void expect_answer(const Problem& problem, const std::vector<double>& x, const std::vector<double>& lambda) const {
-        const auto [solution, report] = solve(problem, to(1e-12), form());
-        EXPECT_EQ(report.status, Status::Solved) << report.message;
-        ASSERT_EQ(solution.x.size(), x.size());
-        ASSERT_EQ(solution.lambda.size(), lambda.size());
-        for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(solution.x[i], x[i], 1e-10) << "x " << i;
-        for (std::size_t i = 0; i < lambda.size(); ++i) EXPECT_NEAR(solution.lambda[i], lambda[i], 1e-10) << "λ " << i;
+        tests::expect_solution(solve(problem, to(1e-12), form()), x, lambda, 1e-10);
     }
 };
 
-Problem one_row(double mass, double a, Cone cone) {
-    Problem problem;
-    problem.H = diagonal_matrix({mass});
-    problem.D = identity(1);
-    problem.a = {a};
-    problem.b = {0.0};
-    problem.cones = {std::move(cone)};
-    return problem;
-}
-
-TEST_P(Ssn, TiesMassesByAFreeRow) {
-    expect_answer(tests::tied_masses(), {1.0, 1.0}, {-3.0});
-}
-
-TEST_P(Ssn, StopsAtANonnegativeRow) {
-    expect_answer(one_row(2.0, -6.0, Cone::nonnegative(1)), {0.0}, {6.0});
-    expect_answer(one_row(2.0, 6.0, Cone::nonnegative(1)), {3.0}, {0.0});
-}
-
-TEST_P(Ssn, KeepsToTheBoundsOfABox) {
-    expect_answer(one_row(2.0, 5.0, Cone::box({-1.0}, {2.0})), {2.0}, {-1.0});
-    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {2.0})), {-1.5}, {2.0});
-    expect_answer(one_row(2.0, 0.5, Cone::box({-1.0}, {2.0})), {0.0}, {-0.5});
-    expect_answer(one_row(2.0, -5.0, Cone::box({-1.0}, {infinity})), {0.0}, {5.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {infinity})), {0.0}, {-5.0});
-    expect_answer(one_row(2.0, 5.0, Cone::box({1.0}, {1.0})), {3.0}, {1.0});
+TEST_P(Ssn, KnowsFreeNonnegativeAndBoxRows) {
+    for (const auto& [problem, x, lambda] : tests::known_answers_of_rows()) expect_answer(problem, x, lambda);
 }
 
 TEST_P(Ssn, SticksSlidesAndOpensWithTheAssociatedLaw) {
-    const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
-    expect_answer(point_on_plane(2.0, 6.0, 2.0, mu, Law::Associated), {0.0, 0.0, 0.0}, {6.0, -2.0, 0.0});
-    expect_answer(point_on_plane(2.0, 6.0, 5.0, mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0, 0.0},
-                  {s, -mu * s, 0.0});
-    expect_answer(point_on_plane(2.0, -6.0, 1.0, mu, Law::Associated), {3.0, 0.5, 0.0}, {0.0, 0.0, 0.0});
-    expect_answer(point_on_plane(2.0, 6.0, 5.0, 0.0, Law::Associated), {0.0, 2.5, 0.0}, {6.0, 0.0, 0.0});
+    for (const auto& [problem, x, lambda] : tests::known_answers_of_associated_friction())
+        expect_answer(problem, x, lambda);
 }
 
 TEST_P(Ssn, SticksSlidesAndOpensWithTheExactLaw) {
