@@ -32,19 +32,6 @@ void add_to_diagonal(SparseColumns& matrix, double value) {
             if (entry.row() == j) entry.valueRef() += value;
 }
 
-/// The rows that share their columns: those of a block, or single rows of separable kinds.
-std::vector<sdk::RowGroup> row_groups(const sdk::ProblemView& problem) {
-    std::vector<sdk::RowGroup> groups;
-    for (const delassus_cone& cone : problem.cones) {
-        if (!sdk::is_separable(cone)) {
-            groups.push_back({cone.first_row, cone.rows});
-        } else {
-            for (std::int32_t i = 0; i < cone.rows; ++i) groups.push_back({cone.first_row + i, 1});
-        }
-    }
-    return groups;
-}
-
 bool is_diagonal(const sdk::SparseRowsView& matrix) {
     for (Eigen::Index i = 0; i < matrix.rows(); ++i)
         for (sdk::SparseRowsView::InnerIterator entry(matrix, i); entry; ++entry)
@@ -64,7 +51,7 @@ void Resolvent::load_matrices(const sdk::ProblemView& problem, const RowScaling&
     diagonal_compliance_ = is_diagonal(problem.E);
     if (pattern_is_new_) choose_form(problem, scaling);
     if (primal()) {
-        rows_ = sdk::BlockRows(problem.D, row_groups(problem), scale_.data(), nullptr);
+        rows_ = sdk::BlockRows(problem.D, sdk::row_groups(problem.cones), scale_.data(), nullptr);
         if (diagonal_compliance_) {
             compliance_.resize(problem.m);
             for (Eigen::Index i = 0; i < problem.m; ++i) compliance_[i] = problem.E.coeff(i, i) * scale_[i] * scale_[i];

@@ -24,13 +24,7 @@ void RowScaling::factorize(const sdk::ProblemView& problem) {
         diagonal_ = N_.diagonal();
     } else {
         stand_in_ = sdk::magnitude_of_diagonal(problem);
-        diagonal_.setZero(problem.m);
-        for (Eigen::Index k = 0; k < problem.m; ++k) {
-            for (sdk::SparseRowsView::InnerIterator entry(problem.D, k); entry; ++entry)
-                diagonal_[k] += entry.value() * entry.value() / stand_in_[entry.col()];
-            for (sdk::SparseRowsView::InnerIterator entry(problem.E, k); entry; ++entry)
-                if (entry.col() == k) diagonal_[k] += entry.value();
-        }
+        diagonal_ = sdk::stand_in_diagonal(problem, stand_in_);
     }
     const std::vector<double> block = sdk::block_scaling(problem.cones, diagonal_);
     scale_.resize(problem.m);

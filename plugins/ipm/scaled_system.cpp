@@ -26,18 +26,8 @@ void Scaling::analyze(const sdk::ProblemView& problem) {
 
 void Scaling::factorize(const sdk::ProblemView& problem) {
     h_ = sdk::magnitude_of_diagonal(problem);
-    if (definite_) {
-        operator_.factorize(problem);
-        diagonal_ = operator_.diagonal();
-        return;
-    }
-    diagonal_.setZero(problem.m);
-    for (Eigen::Index i = 0; i < problem.m; ++i) {
-        for (sdk::SparseRowsView::InnerIterator entry(problem.D, i); entry; ++entry)
-            diagonal_[i] += entry.value() * entry.value() / h_[entry.col()];
-        for (sdk::SparseRowsView::InnerIterator entry(problem.E, i); entry; ++entry)
-            if (entry.col() == i) diagonal_[i] += entry.value();
-    }
+    if (definite_) operator_.factorize(problem);
+    diagonal_ = definite_ ? operator_.diagonal() : sdk::stand_in_diagonal(problem, h_);
 }
 
 void Scaling::load(const sdk::ProblemView& problem) {

@@ -38,18 +38,6 @@ double clamp_row(const sdk::ScaledProblem& scaled, std::int32_t row, double z) {
 
 }  // namespace
 
-std::vector<sdk::RowGroup> NaturalMap::groups(const sdk::ProblemView& problem) {
-    std::vector<sdk::RowGroup> groups;
-    for (const delassus_cone& cone : problem.cones) {
-        if (!sdk::is_separable(cone)) {
-            groups.push_back({cone.first_row, cone.rows});
-        } else {
-            for (std::int32_t i = 0; i < cone.rows; ++i) groups.push_back({cone.first_row + i, 1});
-        }
-    }
-    return groups;
-}
-
 void NaturalMap::load(const sdk::ScaledProblem& scaled) {
     scaled_ = &scaled;
     pieces_.clear();

@@ -71,8 +71,6 @@ public:
                    Vector& local);
 
     [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
-    /// The same rows for every problem of a pattern.
-    static std::vector<sdk::RowGroup> groups(const sdk::ProblemView& problem);
 
     /// result ← B v and result ← A v; m. v and result are different vectors, local ones as above.
     void expand(const Vector& v, Vector& result) const;

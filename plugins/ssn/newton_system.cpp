@@ -47,7 +47,7 @@ bool same_pattern(const SparseColumns& a, const SparseColumns& b) {
 }  // namespace
 
 void NewtonSystem::factorize(const ProblemView& problem, const ScaledProblem& scaled, bool pattern_is_new) {
-    const std::vector<RowGroup> groups = NaturalMap::groups(problem);
+    const std::vector<RowGroup> groups = sdk::row_groups(problem.cones);
     if (pattern_is_new) choose_form(problem, groups);
     const SparseColumns before = std::move(matrix_);
     if (velocities_) {

@@ -11,6 +11,7 @@
 #include "delassus/errors.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/residual.hpp"
+#include "delassus/sdk/saddle_point.hpp"
 #include "problem/prepared_problem.hpp"
 
 namespace delassus {
@@ -37,24 +38,8 @@ void add_compliance(const sdk::ProblemView& problem, Vector& diagonal) {
 
 /// |diag H|⁻¹ in place of an H⁻¹ that does not exist.
 Mobility of_singular(const sdk::ProblemView& problem) {
-    Vector inverse(problem.n);
-    double sum = 0.0;
-    Eigen::Index positive = 0;
-    for (Eigen::Index i = 0; i < problem.n; ++i) {
-        inverse[i] = std::abs(problem.H.coeff(i, i));
-        sum += inverse[i];
-        if (inverse[i] > 0.0) ++positive;
-    }
-    const double mean = positive > 0 ? sum / static_cast<double>(positive) : 1.0;
-    for (Eigen::Index i = 0; i < problem.n; ++i) inverse[i] = 1.0 / (inverse[i] > 0.0 ? inverse[i] : mean);
-    Mobility mobility;
-    mobility.diagonal.setZero(problem.m);
-    for (Eigen::Index row = 0; row < problem.m; ++row)
-        for (sdk::SparseRowsView::InnerIterator entry(problem.D, row); entry; ++entry)
-            mobility.diagonal[row] += entry.value() * entry.value() * inverse[entry.col()];
-    add_compliance(problem, mobility.diagonal);
-    mobility.r = problem.D * inverse.cwiseProduct(problem.a) + problem.b;
-    return mobility;
+    const Vector h = sdk::magnitude_of_diagonal(problem);
+    return {sdk::stand_in_diagonal(problem, h), problem.D * problem.a.cwiseQuotient(h) + problem.b};
 }
 
 Mobility of_unsymmetric(const sdk::ProblemView& problem) {
@@ -214,8 +199,8 @@ double ErrorMeter::natural(const double* x, const double* lambda_values) const {
     if (x || problem.n == 0)
         return self.residual.natural(lambda, self.constraint_velocity(VectorView(x, problem.n), lambda));
     if (!self.prepared.operator_of_definite) return std::numeric_limits<double>::quiet_NaN();
-    const Vector computed = self.prepared.operator_of_definite->velocity(problem, lambda);
-    return self.residual.natural(lambda, self.constraint_velocity(VectorView(computed.data(), problem.n), lambda));
+    self.prepared.operator_of_definite->velocity(problem, lambda, self.momentum);
+    return self.residual.natural(lambda, self.constraint_velocity(VectorView(self.momentum.data(), problem.n), lambda));
 }
 
 double ErrorMeter::velocity(std::span<const double> x_values, std::span<const double> reference_values) const {

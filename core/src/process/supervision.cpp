@@ -9,16 +9,32 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 
 namespace delassus {
 
 namespace {
 
-volatile std::sig_atomic_t interrupt_count = 0;
+volatile std::sig_atomic_t was_interrupted = 0;
+timespec first_interrupt{};
 
+double seconds_between(const timespec& from, const timespec& to) {
+    return static_cast<double>(to.tv_sec - from.tv_sec) + 1e-9 * static_cast<double>(to.tv_nsec - from.tv_nsec);
+}
+
+// The first interrupt asks for an end, a later one insists. One request may arrive as two signals: `timeout` sends to
+// the process and again to its group.
 void on_interrupt(int signal_number) {
-    interrupt_count = interrupt_count + 1;
-    std::signal(signal_number, SIG_DFL);
+    constexpr double one_request = 0.5;  // s
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    if (!was_interrupted) {
+        first_interrupt = now;
+        was_interrupted = 1;
+    } else if (seconds_between(first_interrupt, now) > one_request) {
+        std::signal(signal_number, SIG_DFL);
+        raise(signal_number);
+    }
 }
 
 // Signal handlers may only touch what is laid out beforehand.
@@ -45,7 +61,7 @@ void install_interrupt_handler() {
 }
 
 bool interrupted() {
-    return interrupt_count > 0;
+    return was_interrupted != 0;
 }
 
 void install_crash_handler(const std::string& who, int exit_code) {

@@ -9,7 +9,8 @@
 
 namespace delassus {
 
-/// Makes Ctrl-C a request: interrupted() turns true. A second Ctrl-C ends the process at once.
+/// Makes Ctrl-C a request: interrupted() turns true. A second Ctrl-C, more than half a second later, ends the process
+/// at once; an earlier one belongs to the same request (`timeout -s INT` sends two).
 void install_interrupt_handler();
 [[nodiscard]] bool interrupted();
 

@@ -47,7 +47,7 @@ public:
         StageRunner runner(problem, solution, settings, report);
         bool done = false;
         for (const auto& ranked : rule.stages) {
-            Solver* solver = usable(ranked, problem);
+            Solver* solver = usable(ranked, runner.problem_of(ranked.stage));
             if (solver) done = runner.run(*solver, ranked.stage);
             if (done) break;
         }
@@ -73,10 +73,12 @@ private:
 
     /// The solver of a stage, kept from problem to problem; null if it is not installed or cannot take the problem.
     Solver* usable(const RankedStage& ranked, const PreparedProblem& problem) {
-        if (ranked.stage.law && problem.problem().law != *ranked.stage.law)
-            return usable(ranked, problem.with_law(*ranked.stage.law));
-        const auto capable = registry_.capable(needs_of(problem, {}));
-        if (std::find(capable.begin(), capable.end(), ranked.solver) == capable.end()) return nullptr;
+        const std::uint64_t needs = needs_of(problem, {});
+        const auto& plugins = registry_.plugins();
+        if (std::none_of(plugins.begin(), plugins.end(), [&](const PluginInfo& plugin) {
+                return plugin.name == ranked.solver && plugin.missing(needs) == 0;
+            }))
+            return nullptr;
         const auto key = std::make_pair(ranked.solver, ranked.options);
         auto place = solvers_.find(key);
         if (place == solvers_.end())

@@ -53,12 +53,16 @@ StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, con
     if (started_) worst_ = worst_of(problem_.meter().measure(best_.x, best_.lambda));
 }
 
-bool StageRunner::run(Solver& solver, const Stage& stage) {
+const PreparedProblem& StageRunner::problem_of(const Stage& stage) {
     const Law law = stage.law.value_or(problem_.problem().law);
-    std::optional<PreparedProblem> other;
-    if (law != problem_.problem().law) other = problem_.with_law(law);
-    const PreparedProblem& problem = other ? *other : problem_;
+    if (law == problem_.problem().law) return problem_;
+    if (!other_) other_ = problem_.with_law(law);
+    return *other_;
+}
 
+bool StageRunner::run(Solver& solver, const Stage& stage) {
+    const PreparedProblem& problem = problem_of(stage);
+    const bool other = &problem != &problem_;
     const bool warm = started_ && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const double tolerance = stage.tolerance > 0.0 ? stage.tolerance : settings_.tolerance;
     DecreaseWatch watch(tolerance, stage.max_iterations);
@@ -73,8 +77,8 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
         worst_ = worst_of(error);
         started_ = true;
     }
-    add({result.solver, result.options, law, stage.reason, tolerance, result.status, result.message, result.iterations,
-         result.seconds_setup + result.seconds_solve, error.natural},
+    add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, result.status, result.message,
+         result.iterations, result.seconds_setup + result.seconds_solve, error.natural},
         result);
     if (result.status == Status::Cancelled) return true;
     if (worst_of(error) <= settings_.tolerance ||

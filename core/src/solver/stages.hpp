@@ -54,6 +54,9 @@ public:
     /// solution: the start if settings.warm_start; the best so far at any time. All must outlive the runner.
     StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings, SolveReport& report);
 
+    /// The problem as the stage's solver sees it: the own one, or a copy under the other law, which is made once.
+    [[nodiscard]] const PreparedProblem& problem_of(const Stage& stage);
+
     /// Runs one stage. True if nothing is left to do: solved, cancelled, or a limit of the whole solve reached.
     bool run(Solver& solver, const Stage& stage);
 
@@ -66,6 +69,7 @@ private:
     void add(const StageReport& stage, const SolveReport& result);
 
     const PreparedProblem& problem_;
+    std::optional<PreparedProblem> other_;  // problem_ under the other law
     Solution& best_;
     const SolveSettings& settings_;
     SolveReport& report_;

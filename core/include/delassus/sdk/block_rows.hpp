@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
 
 namespace delassus::sdk {
@@ -17,6 +18,16 @@ struct RowGroup {
     std::int32_t first = 0;
     std::int32_t rows = 0;
 };
+
+/// The rows of a problem by what is projected together: the blocks of friction, and single rows of the other kinds.
+inline std::vector<RowGroup> row_groups(std::span<const delassus_cone> cones) {
+    std::vector<RowGroup> groups;
+    for (const delassus_cone& cone : cones) {
+        const std::int32_t rows = is_separable(cone) ? 1 : cone.rows;
+        for (std::int32_t i = 0; i < cone.rows; i += rows) groups.push_back({cone.first_row + i, rows});
+    }
+    return groups;
+}
 
 class BlockRows {
 public:

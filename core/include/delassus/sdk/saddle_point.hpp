@@ -36,6 +36,18 @@ inline Vector magnitude_of_diagonal(const ProblemView& problem) {
     return diagonal;
 }
 
+/// The diagonal of D diag(h)⁻¹ Dᵀ + E, which stands in for that of N where H⁻¹ does not exist; h: n, positive; m.
+inline Vector stand_in_diagonal(const ProblemView& problem, const Vector& h) {
+    Vector diagonal = Vector::Zero(problem.m);
+    for (Eigen::Index i = 0; i < problem.m; ++i) {
+        for (SparseRowsView::InnerIterator entry(problem.D, i); entry; ++entry)
+            diagonal[i] += entry.value() * entry.value() / h[entry.col()];
+        for (SparseRowsView::InnerIterator entry(problem.E, i); entry; ++entry)
+            if (entry.col() == i) diagonal[i] += entry.value();
+    }
+    return diagonal;
+}
+
 /// The factors C, first n for x, then m for λ.
 inline Vector saddle_point_scaling(const ProblemView& problem) {
     const auto power_of_two = [](double square) {  // the nearest to square^(−½)
