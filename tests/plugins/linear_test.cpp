@@ -14,40 +14,17 @@
 #include "delassus/solver.hpp"
 #include "support/dense.hpp"
 #include "support/small_problems.hpp"
+#include "support/solving.hpp"
 
 namespace delassus {
 namespace {
 
 using tests::dense;
 
-const Registry& registry() {
-    static const Registry instance;
-    return instance;
-}
-
-bool is_built(const std::string& name) {
-    return std::ranges::any_of(registry().plugins(), [&](const PluginInfo& info) { return info.name == name; });
-}
-
-SolveSettings to(double tolerance) {
-    SolveSettings settings;
-    settings.tolerance = tolerance;
-    return settings;
-}
-
-struct Answer {
-    SolveReport report;
-    Solution solution;
-};
-
-Answer solve(const std::string& name, Problem problem, const SolveSettings& settings, OptionTexts options = {},
-             Solution start = {}) {
-    const PreparedProblem prepared(std::move(problem));
-    Solver solver(registry().load(name), std::move(options), &registry());
-    Answer answer{{}, std::move(start)};
-    answer.report = solver.solve(prepared, answer.solution, settings);
-    return answer;
-}
+using tests::is_built;
+using tests::solve_with;
+using tests::Solved;
+using tests::to;
 
 /// x and λ of [H −Dᵀ; D E]{x; λ} = {a; −b} by dense LU with full pivoting.
 Eigen::VectorXd dense_solution(const Problem& problem) {
@@ -61,7 +38,7 @@ Eigen::VectorXd dense_solution(const Problem& problem) {
     return A.fullPivLu().solve(right);
 }
 
-void expect_equal(const Answer& answer, const Eigen::VectorXd& expected, double tolerance) {
+void expect_equal(const Solved& answer, const Eigen::VectorXd& expected, double tolerance) {
     const auto& [x, lambda] = answer.solution;
     ASSERT_EQ(static_cast<Eigen::Index>(x.size() + lambda.size()), expected.size());
     for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(x[i], expected[static_cast<Eigen::Index>(i)], tolerance);
@@ -116,7 +93,7 @@ protected:
 };
 
 TEST_P(Linear, TiedMassesShareTheirMomentum) {
-    const auto answer = solve(name(), tests::tied_masses(), to(1e-12));
+    const auto answer = solve_with(name(), tests::tied_masses(), to(1e-12));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, Eigen::Vector3d(1.0, 1.0, -3.0), 1e-11);
 }
@@ -127,7 +104,7 @@ TEST_P(Linear, WithoutConstraintsXIsHInverseA) {
     problem.b.clear();
     problem.cones.clear();
     const auto expected = dense_solution(problem);
-    const auto answer = solve(name(), problem, to(1e-10));
+    const auto answer = solve_with(name(), problem, to(1e-10));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, expected, 1e-10);
 }
@@ -135,7 +112,7 @@ TEST_P(Linear, WithoutConstraintsXIsHInverseA) {
 TEST_P(Linear, SparseMassThatIsNotDiagonal) {
     const Problem problem = tridiagonal(40, 8, 2.5);
     ASSERT_EQ(PreparedProblem(problem).structure(), Structure::Definite);
-    const auto answer = solve(name(), problem, to(1e-11));
+    const auto answer = solve_with(name(), problem, to(1e-11));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, dense_solution(problem), 1e-9);
 }
@@ -144,7 +121,7 @@ TEST_P(Linear, ComplianceSoftensTheRows) {
     Problem problem = tridiagonal(20, 4, 2.5);
     problem.E = SparseMatrix::from_triplets(
         4, 4, {{0, 0, 2.0}, {0, 3, 1.0}, {3, 0, 1.0}, {3, 3, 1.0}, {1, 1, 1e-3}});  // row 2 stays rigid
-    const auto answer = solve(name(), problem, to(1e-11));
+    const auto answer = solve_with(name(), problem, to(1e-11));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, dense_solution(problem), 1e-9);
 }
@@ -156,12 +133,12 @@ TEST_P(Linear, ReducedProblem) {
     problem.E = SparseMatrix::from_triplets(3, 3, {{0, 0, 2.0}, {0, 1, 1.0}, {1, 0, 1.0}, {1, 1, 2.0}, {2, 2, 4.0}});
     problem.b = {-3.0, -3.0, 2.0};
     problem.cones = {Cone::free(3)};
-    const auto answer = solve(name(), problem, to(1e-12));
+    const auto answer = solve_with(name(), problem, to(1e-12));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, Eigen::Vector3d(1.0, 1.0, -0.5), 1e-11);
 
     problem.E = SparseMatrix::from_triplets(3, 3, {{0, 0, 1.0}, {0, 1, 1.0}, {1, 0, 1.0}, {1, 1, 1.0}, {2, 2, 4.0}});
-    const auto singular = solve(name(), problem, to(1e-12));
+    const auto singular = solve_with(name(), problem, to(1e-12));
     EXPECT_EQ(singular.report.status, Status::Solved) << singular.report.message;
     EXPECT_NEAR(singular.solution.lambda[0] + singular.solution.lambda[1], 3.0, 1e-10);
 }
@@ -173,7 +150,7 @@ TEST_P(Linear, SemidefiniteMassHeldByTheRows) {
     problem.H.value.back() = 1.0;
     problem.D = SparseMatrix::from_triplets(1, 12, {{0, 0, 1.0}});
     ASSERT_EQ(PreparedProblem(problem).structure(), Structure::Semidefinite);
-    const auto answer = solve(name(), problem, to(1e-10));
+    const auto answer = solve_with(name(), problem, to(1e-10));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, dense_solution(problem), 1e-7);
 }
@@ -184,13 +161,13 @@ TEST_P(Linear, RepeatedJointsAndHeavyEnds) {
         for (const double ratio : {1.0, 1e9, 1e-9}) {
             for (const double heavy_end : {0.0, 1.0}) {
                 for (const double speed : {0.0, 1.0}) {
-                    const auto answer = solve(name(),
-                                              generate("chain", {{"bodies", bodies},
-                                                                 {"mass_ratio", ratio},
-                                                                 {"heavy_end", heavy_end},
-                                                                 {"speed", speed},
-                                                                 {"repeated", 3.0}}),
-                                              to(limit));
+                    const auto answer = solve_with(name(),
+                                                   generate("chain", {{"bodies", bodies},
+                                                                      {"mass_ratio", ratio},
+                                                                      {"heavy_end", heavy_end},
+                                                                      {"speed", speed},
+                                                                      {"repeated", 3.0}}),
+                                                   to(limit));
                     EXPECT_EQ(answer.report.status, Status::Solved)
                         << bodies << " bodies, ratio " << ratio << ": " << answer.report.message;
                     EXPECT_LE(answer.report.error.natural, limit);
@@ -202,13 +179,13 @@ TEST_P(Linear, RepeatedJointsAndHeavyEnds) {
 }
 
 TEST_P(Linear, ClosedLoopWithRedundantHinges) {
-    const auto answer =
-        solve(name(), generate("chain", {{"bodies", 50}, {"revolute", 1}, {"planar", 1}, {"closed", 1}}), to(1e-8));
+    const auto answer = solve_with(
+        name(), generate("chain", {{"bodies", 50}, {"revolute", 1}, {"planar", 1}, {"closed", 1}}), to(1e-8));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
 }
 
 TEST_P(Linear, ContradictionIsInfeasibleWithTheLeastSquaresResidual) {
-    const auto answer = solve(name(), contradiction(), to(1e-8));
+    const auto answer = solve_with(name(), contradiction(), to(1e-8));
     EXPECT_EQ(answer.report.status, Status::Infeasible) << answer.report.message;
     EXPECT_NEAR(answer.solution.x[0], 0.5, 1e-8);  // u = (½, −½); r = (0, −1)
     EXPECT_NEAR(answer.report.error.natural, std::sqrt(0.5), 1e-8);
@@ -218,14 +195,15 @@ TEST_P(Linear, ContradictionIsInfeasibleWithTheLeastSquaresResidual) {
 TEST_P(Linear, RepeatedJointThatDriftedApartIsInfeasible) {
     Problem problem = generate("chain", {{"bodies", 20}, {"repeated", 2}});
     problem.b[7] += 0.01;  // one copy only
-    const auto answer = solve(name(), problem, to(1e-8));
+    const auto answer = solve_with(name(), problem, to(1e-8));
     EXPECT_EQ(answer.report.status, Status::Infeasible) << answer.report.message;
     for (const double value : answer.solution.lambda) EXPECT_LT(std::abs(value), 1e6);
 }
 
 TEST_P(Linear, HundredSolvesOneAnalysis) {
     Problem problem = tridiagonal(40, 8, 2.5);
-    Solver solver(registry().load(name()), {}, &registry());
+    const Registry registry;
+    Solver solver(registry.load(name()), {}, &registry);
     PreparedProblem prepared(problem);
     Solution solution;
     SolveReport report;
@@ -254,13 +232,13 @@ TEST_P(Linear, HundredSolvesOneAnalysis) {
 TEST_P(Linear, WarmStartAtTheSolutionCostsNoIteration) {
     const Problem problem = generate("chain", {{"bodies", 100}, {"mass_ratio", 100.0}});
     const OptionTexts options = name() == "minres" ? OptionTexts{{"schur", "diagonal"}} : OptionTexts{};
-    const auto cold = solve(name(), problem, to(1e-8), options);
+    const auto cold = solve_with(name(), problem, to(1e-8), options);
     ASSERT_EQ(cold.report.status, Status::Solved) << cold.report.message;
     EXPECT_GT(cold.report.iterations, 0);
     SolveSettings settings = to(1e-6);
     settings.warm_start = true;
     settings.max_iterations = 0;
-    const auto warm = solve(name(), problem, settings, options, cold.solution);
+    const auto warm = solve_with(name(), problem, settings, options, cold.solution);
     EXPECT_EQ(warm.report.status, Status::Solved) << warm.report.message;
     EXPECT_EQ(warm.report.iterations, 0);
 }
@@ -268,7 +246,7 @@ TEST_P(Linear, WarmStartAtTheSolutionCostsNoIteration) {
 TEST_P(Linear, WithoutIterationsTheStartIsReturned) {
     SolveSettings settings = to(1e-8);
     settings.max_iterations = 0;
-    const auto answer = solve(name(), tests::tied_masses(), settings);
+    const auto answer = solve_with(name(), tests::tied_masses(), settings);
     EXPECT_EQ(answer.report.status, Status::IterationLimit);
     EXPECT_EQ(answer.solution.x, std::vector<double>({0.0, 0.0}));
 }
@@ -276,13 +254,13 @@ TEST_P(Linear, WithoutIterationsTheStartIsReturned) {
 TEST_P(Linear, CancelStopsTheSolve) {
     SolveSettings settings = to(1e-8);
     settings.cancelled = [] { return true; };
-    const auto answer = solve(name(), generate("chain", {{"bodies", 50}}), settings);
+    const auto answer = solve_with(name(), generate("chain", {{"bodies", 50}}), settings);
     EXPECT_EQ(answer.report.status, Status::Cancelled);
     for (const double value : answer.solution.x) EXPECT_TRUE(std::isfinite(value));
 }
 
 TEST_P(Linear, FrictionIsRefused) {
-    EXPECT_THROW(solve(name(), tests::point_on_plane(1.0, 1.0, 0.5, 0.5, Law::Associated), to(1e-8)), Unsupported);
+    EXPECT_THROW(solve_with(name(), tests::point_on_plane(1.0, 1.0, 0.5, 0.5, Law::Associated), to(1e-8)), Unsupported);
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, Linear, testing::Values("cholmod", "minres"),
@@ -291,13 +269,13 @@ INSTANTIATE_TEST_SUITE_P(Solvers, Linear, testing::Values("cholmod", "minres"),
 TEST(Cholmod, EveryFormOrderingAndMethodGivesTheSameVelocities) {
     if (!is_built("cholmod")) GTEST_SKIP() << "cholmod is not built";
     const Problem problem = generate("net", {{"rows", 12}, {"columns", 12}, {"diagonals", 2}, {"speed", 1.0}});
-    const auto reference = solve("cholmod", problem, to(1e-10));
+    const auto reference = solve_with("cholmod", problem, to(1e-10));
     ASSERT_EQ(reference.report.status, Status::Solved) << reference.report.message;
     for (const char* form : {"schur", "quasi_definite"}) {
         for (const char* ordering : {"amd", "metis", "best"}) {
             for (const char* method : {"simplicial", "supernodal"}) {
-                const auto answer = solve("cholmod", problem, to(1e-10),
-                                          {{"form", form}, {"ordering", ordering}, {"factorization", method}});
+                const auto answer = solve_with("cholmod", problem, to(1e-10),
+                                               {{"form", form}, {"ordering", ordering}, {"factorization", method}});
                 EXPECT_EQ(answer.report.status, Status::Solved) << form << ": " << answer.report.message;
                 for (std::size_t i = 0; i < answer.solution.x.size(); ++i)
                     ASSERT_NEAR(answer.solution.x[i], reference.solution.x[i], 1e-8) << form << ' ' << ordering;
@@ -311,7 +289,8 @@ TEST(Cholmod, ElasticBlockWithSupernodalMass) {
     const Problem problem = generate("elastic_block", {{"elements", 5}, {"glue", 1}, {"speed", 1.0}});
     const auto expected = dense_solution(problem);
     for (const char* form : {"auto", "schur", "quasi_definite"}) {
-        const auto answer = solve("cholmod", problem, to(1e-10), {{"form", form}, {"factorization", "supernodal"}});
+        const auto answer =
+            solve_with("cholmod", problem, to(1e-10), {{"form", form}, {"factorization", "supernodal"}});
         EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
         EXPECT_LE(answer.report.error.balance, 1e-10);
         for (std::size_t i = 0; i < answer.solution.x.size(); ++i)
@@ -325,9 +304,9 @@ TEST(Cholmod, ForceOnAnUnheldMasslessFreedomIsInfeasible) {
     problem.H = SparseMatrix::from_triplets(3, 3, {{0, 0, 1.0}, {1, 1, 3.0}});
     problem.D = SparseMatrix::from_triplets(1, 3, {{0, 0, 1.0}, {0, 1, -1.0}});
     problem.a = {4.0, 0.0, 1.0};
-    EXPECT_EQ(solve("cholmod", problem, to(1e-8)).report.status, Status::Infeasible);
+    EXPECT_EQ(solve_with("cholmod", problem, to(1e-8)).report.status, Status::Infeasible);
     problem.a[2] = 0.0;
-    const auto answer = solve("cholmod", problem, to(1e-10));
+    const auto answer = solve_with("cholmod", problem, to(1e-10));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     EXPECT_NEAR(answer.solution.x[0], 1.0, 1e-9);
 }
@@ -336,7 +315,7 @@ TEST(Minres, IndefiniteMass) {
     if (!is_built("minres")) GTEST_SKIP() << "minres is not built";
     const Problem problem = tridiagonal(30, 6, 0.5);
     ASSERT_EQ(PreparedProblem(problem).structure(), Structure::Indefinite);
-    const auto answer = solve("minres", problem, to(1e-11));
+    const auto answer = solve_with("minres", problem, to(1e-11));
     EXPECT_EQ(answer.report.status, Status::Solved) << answer.report.message;
     expect_equal(answer, dense_solution(problem), 1e-8);
 }
@@ -346,7 +325,7 @@ TEST(Minres, EveryPreconditionerReachesTheSameAnswer) {
     const Problem problem = tridiagonal(60, 12, 2.5);
     const auto expected = dense_solution(problem);
     for (const char* schur : {"auto", "diagonal", "blocks", "incomplete_cholesky", "identity"}) {
-        const auto answer = solve("minres", problem, to(1e-11), {{"schur", schur}});
+        const auto answer = solve_with("minres", problem, to(1e-11), {{"schur", schur}});
         EXPECT_EQ(answer.report.status, Status::Solved) << schur << ": " << answer.report.message;
         expect_equal(answer, expected, 1e-9);
     }
@@ -356,12 +335,12 @@ TEST(Minres, CloserStartTakesFewerIterations) {
     if (!is_built("minres")) GTEST_SKIP() << "minres is not built";
     Problem problem = generate("chain", {{"bodies", 200}, {"mass_ratio", 100.0}, {"speed", 1.0}});
     const OptionTexts options{{"schur", "diagonal"}};
-    const auto cold = solve("minres", problem, to(1e-8), options);
+    const auto cold = solve_with("minres", problem, to(1e-8), options);
     ASSERT_EQ(cold.report.status, Status::Solved) << cold.report.message;
     for (double& value : problem.a) value *= 1.0 + 1e-6;
     SolveSettings settings = to(1e-8);
     settings.warm_start = true;
-    const auto warm = solve("minres", problem, settings, options, cold.solution);
+    const auto warm = solve_with("minres", problem, settings, options, cold.solution);
     EXPECT_EQ(warm.report.status, Status::Solved) << warm.report.message;
     EXPECT_LT(warm.report.iterations, cold.report.iterations);
 }
@@ -369,7 +348,7 @@ TEST(Minres, CloserStartTakesFewerIterations) {
 TEST(Minres, WhatItCannotReachIsStalledAndNotSolved) {
     if (!is_built("minres")) GTEST_SKIP() << "minres is not built";
     SolveSettings settings = to(1e-15);  // below rounding
-    const auto answer = solve("minres", generate("chain", {{"bodies", 200}, {"mass_ratio", 1e9}}), settings);
+    const auto answer = solve_with("minres", generate("chain", {{"bodies", 200}, {"mass_ratio", 1e9}}), settings);
     EXPECT_EQ(answer.report.status, Status::Stalled) << answer.report.message;
     EXPECT_LT(answer.report.error.natural, 1e-9);
 }

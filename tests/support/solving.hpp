@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <vector>
@@ -14,6 +15,11 @@
 namespace delassus::tests {
 
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
+
+inline bool is_built(const std::string& name) {
+    const Registry registry;
+    return std::ranges::any_of(registry.plugins(), [&](const PluginInfo& info) { return info.name == name; });
+}
 
 struct Solved {
     Solution solution;
