@@ -8,7 +8,7 @@ install(TARGETS delassus_sdk EXPORT delassusSdkTargets)
 install(TARGETS delassus_command EXPORT delassusSdkTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS delassus delassus_dynamics delassus_mechanics delassus_scene EXPORT delassusCoreTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 foreach(module delassus_fclib delassus_trajectory delassus_collision delassus_surface_mesh
-        delassus_volume_mesh)
+        delassus_volume_mesh delassus_sparse_rank)
   if(TARGET ${module})
     install(TARGETS ${module} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus)
   endif()

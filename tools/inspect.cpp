@@ -2,12 +2,15 @@
 // delassus inspect: what a problem is, what it needs, and who could solve it.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/qualification.hpp"
 #include "delassus/rank.hpp"
 
 namespace delassus::command {
@@ -20,12 +23,79 @@ struct InspectArguments {
     std::filesystem::path problem;
     std::string law;
     std::vector<std::filesystem::path> plugin_path;
+    bool qualification = false;
     bool json = false;
 };
 
 struct ConeCount {
     std::int64_t blocks = 0, rows = 0;
 };
+
+Json json_of(Answer answer) {
+    return answer == Answer::Undecided ? Json(nullptr) : Json(answer == Answer::Yes);
+}
+
+/// The blocks of the problem that take part in reactions that cancel, with their largest component.
+std::vector<std::pair<std::size_t, double>> cancelling_blocks(const Problem& problem,
+                                                              const std::vector<double>& reactions) {
+    constexpr double noticeable = 1e-4;  // of the sum of the normal reactions
+    std::vector<std::pair<std::size_t, double>> blocks;
+    std::size_t row = 0;
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        double largest = 0.0;
+        for (std::int32_t i = 0; i < problem.cones[c].rows; ++i)
+            largest = std::max(largest, std::abs(reactions[row++]));
+        if (largest > noticeable) blocks.emplace_back(c, largest);
+    }
+    return blocks;
+}
+
+Json json_of(const Problem& problem, const Qualification& found) {
+    Json json = {{"licq", json_of(found.independent)},
+                 {"rank", found.rank ? Json(*found.rank) : Json(nullptr)},
+                 {"free_rows", found.free_rows},
+                 {"free_rank", found.free_rank ? Json(*found.free_rank) : Json(nullptr)},
+                 {"pointed", json_of(found.pointed)},
+                 {"pointedness", std::isfinite(found.pointedness) ? Json(found.pointedness) : Json(nullptr)},
+                 {"cancelling_blocks", Json::array()}};
+    if (!found.cancelling.empty())
+        for (const auto& [block, size] : cancelling_blocks(problem, found.cancelling))
+            json["cancelling_blocks"].push_back({{"block", block}, {"reaction", size}});
+    return json;
+}
+
+void print(const Problem& problem, const Qualification& found) {
+    fmt::print("  qualification\n");
+    if (found.independent == Answer::Undecided) {
+        fmt::print("    LICQ undecided: the rank was not found\n");
+    } else if (found.independent == Answer::Yes) {
+        fmt::print("    LICQ holds: all {} rows are independent; the reactions are unique\n", found.rows);
+    } else {
+        fmt::print("    LICQ fails: rank {} of {} rows; the reactions need not be unique, the velocities are\n",
+                   *found.rank, found.rows);
+    }
+    if (found.free_rank && *found.free_rank < found.free_rows)
+        fmt::print("    free rows: rank {} of {}: their reactions have no bound\n", *found.free_rank, found.free_rows);
+    if (found.pointed == Answer::Undecided) {
+        fmt::print("    pointed friction cone undecided: no solver got near enough\n");
+    } else if (found.pointed == Answer::Yes && std::isinf(found.pointedness)) {
+        fmt::print("    pointed friction cone holds: there are free rows only, and they are independent\n");
+    } else if (found.pointed == Answer::Yes) {
+        fmt::print(
+            "    pointed friction cone holds: reactions are bounded (net effect at least {:.2g} of the normals)\n",
+            found.pointedness);
+    } else if (found.cancelling.empty()) {
+        fmt::print("    pointed friction cone fails by the free rows alone\n");
+    } else {
+        constexpr std::size_t most = 8;
+        const auto blocks = cancelling_blocks(problem, found.cancelling);
+        fmt::print(
+            "    pointed friction cone fails: reactions of {} blocks can cancel out, so they have no bound:\n     ",
+            blocks.size());
+        for (std::size_t k = 0; k < std::min(most, blocks.size()); ++k) fmt::print(" {}", blocks[k].first);
+        fmt::print("{}\n", blocks.size() > most ? " …" : "");
+    }
+}
 
 int inspect(const InspectArguments& arguments) {
     Problem data = read_problem(arguments.problem);
@@ -35,6 +105,9 @@ int inspect(const InspectArguments& arguments) {
     const Registry registry(absolute(arguments.plugin_path));
     const auto capable = registry.capable(prepared.needs());
     const auto rank = estimate_rank(problem);
+
+    std::optional<Qualification> qualification;
+    if (arguments.qualification) qualification = qualify(problem, registry);
 
     std::map<std::string, ConeCount> cones;
     for (const Cone& cone : problem.cones) {
@@ -58,6 +131,7 @@ int inspect(const InspectArguments& arguments) {
                      {"source", problem.source},
                      {"notes", problem.notes}};
         for (const auto& [kind, count] : cones) json["cones"][kind] = {{"blocks", count.blocks}, {"rows", count.rows}};
+        if (qualification) json["qualification"] = json_of(problem, *qualification);
         fmt::print("{}\n", json.dump(2));
         return exit_solved;
     }
@@ -71,8 +145,9 @@ int inspect(const InspectArguments& arguments) {
         fmt::print("  rank of N about {} of {}{}\n", *rank, problem.m(),
                    *rank < problem.m() ? ": reactions are not unique, velocities are" : "");
     } else {
-        fmt::print("  rank of N not estimated at this size\n");
+        fmt::print("  rank of N not found: the factorisation failed\n");
     }
+    if (qualification) print(problem, *qualification);
     fmt::print("  needs   {}\n", fmt::join(capability_names(prepared.needs()), " "));
     fmt::print("  solvers {}\n", capable.empty() ? "none installed" : fmt::format("{}", fmt::join(capable, " ")));
     if (!problem.source.empty()) fmt::print("  source  {}\n", problem.source);
@@ -92,6 +167,8 @@ void add_inspect(CLI::App& program, Action& action) {
     command->add_option("--law", arguments->law, "Friction law in place of the problem's own: associated | coulomb")
         ->type_name("LAW");
     add_plugin_path(*command, arguments->plugin_path);
+    command->add_flag("--qualification", arguments->qualification,
+                      "Tell whether LICQ and the pointed friction cone hold: are reactions unique, are they bounded?");
     command->add_flag("--json", arguments->json, "Print JSON");
     command->callback([arguments, &action] { action.run = [arguments] { return inspect(*arguments); }; });
 }

@@ -9,10 +9,12 @@
 
 namespace delassus {
 
-/// An estimate of the rank of N = D H⁻¹ Dᵀ + E for a definite H: the number of reactions that motion determines.
-/// Rows are scaled to unit length first; singular directions below 1e-10 count as zero. For E = 0 it is the rank of D
-/// (dense QR with column pivoting up to 3000 rows and columns, sparse QR beyond); for a reduced problem that of E; with
-/// both, that of [D E]. Empty where m exceeds 3000 and E is present.
+/// An estimate of the rank of N = D H⁻¹ Dᵀ + E for a definite H: the number of reactions that motion determines. It is
+/// the rank of D where E = 0, that of E in a reduced problem, and with both that of [D E] (as N = [D E] diag(H⁻¹, E⁺)
+/// [D E]ᵀ). Rows are scaled to unit length first. Dense QR with column pivoting up to some seconds of work, directions
+/// below 1e-10 count as zero; beyond, SuiteSparseQR (where it is missing Eigen's sparse QR, which is slow) with 1e-8,
+/// which may be a few too many where rows are nearly dependent. Empty if the factorisation failed, for lack of memory
+/// as a rule.
 [[nodiscard]] DELASSUS_API std::optional<std::int32_t> estimate_rank(const Problem& problem);
 
 }  // namespace delassus

@@ -8,6 +8,9 @@
 
 namespace delassus {
 
+/// Whether this installation has the module.
+[[nodiscard]] DELASSUS_API bool has_module(std::string_view module);
+
 /// A symbol of <folder of libdelassus>/delassus/<module>.so, which is loaded if it is not yet and stays loaded.
 /// Throws InputError: "<refusal>: this build has no <dependency> (… is missing)<advice>", or with the loader's reason.
 [[nodiscard]] DELASSUS_API void* module_symbol(std::string_view module, const char* symbol, std::string_view refusal,
