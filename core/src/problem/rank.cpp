@@ -29,6 +29,7 @@ sdk::SparseColumns columns_of(const SparseMatrix& D, const SparseMatrix& E, std:
     std::vector<Eigen::Triplet<double, std::int32_t>> entries;
     entries.reserve(D.value.size() + E.value.size());
     const auto add = [&](const SparseMatrix& matrix, std::int32_t first) {
+        if (matrix.entries() == 0) return;
         const auto view = view_of(matrix);
         const double size = view.norm();
         if (!(size > 0.0)) return;
