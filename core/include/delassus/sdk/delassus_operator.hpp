@@ -80,7 +80,9 @@ public:
     /// N as a sparse matrix. Costs memory of its fill: dense where H couples everything.
     [[nodiscard]] SparseRows formed(const ProblemView& problem) const {
         SparseRows N(problem.m, problem.m);
-        if (problem.n > 0) {
+        if (problem.n > 0 && inverse_.kind() == HInverse::Kind::Sparse) {
+            N = formed_by_panels(problem);
+        } else if (problem.n > 0) {
             const SparseColumns Z = inverse_.half_solved(problem.D);
             N = SparseColumns(Z.transpose() * Z);
         }
@@ -106,8 +108,61 @@ private:
         if (problem.E.nonZeros() > 0) add_compliance(problem);
     }
 
+    // D H⁻¹ Dᵀ = Σ ZᵀZ over the panels of Z: dense products, gathered in a dense matrix where most pairs of rows
+    // couple.
+    [[nodiscard]] SparseRows formed_by_panels(const ProblemView& problem) const {
+        const SparseFactor& factor = inverse_.sparse();
+        const SparseFactor::Reach reach = factor.reach(problem.D);
+        if (problem.m * problem.m > 4 * reach.coupled) {
+            const SparseColumns Z = inverse_.half_solved(problem.D);
+            return SparseColumns(Z.transpose() * Z);
+        }
+        Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(problem.m, problem.m), product;
+        factor.half_solve(
+            problem.D, reach, [&](Eigen::Index, std::span<const std::int32_t> rows, const Eigen::MatrixXd& panel) {
+                product.setZero(panel.cols(), panel.cols());
+                product.selfadjointView<Eigen::Lower>().rankUpdate(panel.transpose());
+                for (std::size_t j = 0; j < rows.size(); ++j)
+                    for (std::size_t i = j; i < rows.size(); ++i)
+                        sum(rows[i], rows[j]) += product(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+            });
+        sum.triangularView<Eigen::StrictlyUpper>() = sum.transpose();
+        return sum.sparseView();
+    }
+
+    // The same sum, for pairs of rows in one block only.
+    void add_inertia_by_panels(const ProblemView& problem) {
+        std::vector<std::size_t> cone_of(static_cast<std::size_t>(problem.m));
+        for (std::size_t c = 0; c < problem.cones.size(); ++c)
+            for (std::int32_t i = 0; i < problem.cones[c].rows; ++i)
+                cone_of[static_cast<std::size_t>(problem.cones[c].first_row + i)] = c;
+        const SparseFactor& factor = inverse_.sparse();
+        factor.half_solve(problem.D, factor.reach(problem.D),
+                          [&](Eigen::Index, std::span<const std::int32_t> rows, const Eigen::MatrixXd& panel) {
+                              for (std::size_t j = 0; j < rows.size(); ++j) {
+                                  const auto column = panel.col(static_cast<Eigen::Index>(j));
+                                  diagonal_[rows[j]] += column.squaredNorm();
+                                  const std::size_t c = cone_of[static_cast<std::size_t>(rows[j])];
+                                  if (block_offset_[c] < 0) continue;
+                                  const delassus_cone& cone = problem.cones[c];
+                                  double* block = blocks_.data() + block_offset_[c];
+                                  for (std::size_t i = j; i < rows.size() && rows[i] < cone.first_row + cone.rows;
+                                       ++i) {
+                                      const double product = column.dot(panel.col(static_cast<Eigen::Index>(i)));
+                                      const std::int32_t p = rows[i] - cone.first_row, q = rows[j] - cone.first_row;
+                                      block[p * cone.rows + q] += product;
+                                      if (p != q) block[q * cone.rows + p] += product;
+                                  }
+                              }
+                          });
+    }
+
     // D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
     void add_inertia(const ProblemView& problem) {
+        if (inverse_.kind() == HInverse::Kind::Sparse) {
+            add_inertia_by_panels(problem);
+            return;
+        }
         rows_.resize(largest_block);
         std::size_t c = 0;
         inverse_.for_each_half_solved_row(

@@ -174,10 +174,7 @@ private:
         whitened_ = true;
         const HInverse& inverse = operator_.inverse();
         if (inverse.kind() == HInverse::Kind::Sparse) {
-            double whitened = 0.0;
-            inverse.for_each_half_solved_row(problem.D, [&](Eigen::Index, const auto& reach, const Vector&) {
-                whitened += 2.0 * static_cast<double>(reach.size());
-            });
+            const double whitened = 2.0 * static_cast<double>(inverse.sparse().reach(problem.D).entries);
             const double solved = 2.0 * static_cast<double>(problem.D.nonZeros() + inverse.factor_entries());
             const double formed = static_cast<double>(problem.m) * static_cast<double>(problem.m);
             if (formed <= std::min(whitened, solved)) {
