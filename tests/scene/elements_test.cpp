@@ -103,8 +103,8 @@ TEST(ElasticScene, StackStandsAtTheHeightOfItsCompression) {
     GTEST_SKIP() << "this build has no collision";
 #endif
     SceneOverrides overrides;
-    for (const std::string block : {"rubber", "plastic", "steel"})
-        overrides.values.emplace_back("elastic_blocks." + block + ".cells", "[2,2,2]");
+    for (const std::string layer : {"rubber", "plastic", "steel"})
+        overrides.values.emplace_back("elastic_blocks." + layer + ".cells", "[2,2,2]");
     Running run(read_scene(example_scene("elastic_stack"), overrides));
     double before = 0.0;  // the vertical momentum, a step before the end
     while (!run.simulation.finished()) {

@@ -177,6 +177,12 @@ double Newton::merit(const StepResidual& residual, double s) const {
 // (a heavy pull across a light link that is off its balance), the rest of it is not small, and the iteration creeps or
 // goes astray. A step in which it does is finished with the whole matrix, if there is a solver that takes one.
 
+namespace {
+
+constexpr int most_symmetric_iterations = 10;
+
+}  // namespace
+
 void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
                    StepSolver& solver, StepReport& report) {
     const double s = 1.0 / slopes.beta;
@@ -203,7 +209,7 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
     StepResidual trial_residual;
     double rho = 0.0, threshold = 0.0;
     for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
-        if (may_become_exact && 2 * iteration >= settings_.max_iterations) become_exact();
+        if (may_become_exact && iteration >= most_symmetric_iterations) become_exact();
         if (renew) assemble(point, slopes);
         const bool fresh = renew;
         rho = merit(residual, s);
@@ -382,7 +388,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
          .doc = "residual and remaining increment, relative to the way that the step goes (docs/integrators.md)"},
         {.key = "max_newton_iterations",
          .type = DELASSUS_OPTION_INTEGER,
-         .default_value = "20",
+         .default_value = "50",
          .minimum = 1.0,
          .maximum = 1e6,
          .doc = "linear problems in a step before it fails"}};
