@@ -99,7 +99,7 @@ private:
     static constexpr Eigen::Index most_rows_formed = 4000;
 
     void compute_blocks(const ProblemView& problem, bool will_form) {
-        inertia_.resize(0, 0);
+        if (inertia_.rows() > 0) inertia_.resize(0, 0);  // which allocates, even from nothing to nothing
         diagonal_.setZero(problem.m);
         block_offset_.assign(problem.cones.size(), -1);
         std::ptrdiff_t size = 0;
