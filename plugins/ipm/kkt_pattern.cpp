@@ -31,7 +31,7 @@ void KktSystem::analyze(const sdk::ProblemView& problem) {
         const sdk::SparseColumns normal = pattern(problem, Form::Normal);
         const double stored = static_cast<double>(problem.H.nonZeros() + problem.D.nonZeros() + n_ + m_);
         if (static_cast<double>(normal.nonZeros()) > 8.0 * stored) {
-            SparseFactor trial;
+            sdk::SparseFactor trial;
             trial.analyze(normal, n_);
             const double fill = trial.entries();
             trial.analyze(pattern(problem, Form::Augmented), n_);
@@ -40,8 +40,7 @@ void KktSystem::analyze(const sdk::ProblemView& problem) {
     }
     matrix_ = pattern(problem, form_);
     find_places(problem);
-    factor_.analyze(matrix_, form_ == Form::Augmented ? n_ : matrix_.rows());
-    ++analyses_;
+    if (factor_.analyze(matrix_, form_ == Form::Augmented ? n_ : matrix_.rows())) ++analyses_;
 }
 
 void KktSystem::find_blocks(const sdk::ProblemView& problem) {

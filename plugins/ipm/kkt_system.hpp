@@ -14,7 +14,7 @@
 #include <string>
 
 #include "complementarity.hpp"
-#include "sparse_factor.hpp"
+#include "delassus/sdk/sparse_factor.hpp"
 
 namespace delassus::ipm {
 
@@ -94,7 +94,7 @@ private:
     sdk::SparseColumns matrix_;                              // the lower triangle of the form
     std::vector<std::int32_t> h_place_, d_place_, e_place_;  // into its values
     std::vector<Triple> t_;                                  // rows of T, three a group
-    SparseFactor factor_;
+    sdk::SparseFactor factor_;
     std::int64_t analyses_ = 0, factorizations_ = 0;
     sdk::Vector stacked_, f_rest_, g_rest_, correction_x_, correction_z_, unrotated_, product_;
     sdk::Vector weight_, theta_;

@@ -53,8 +53,9 @@ public:
     void analyze(const ProblemView& problem) override { operator_.analyze(problem); }
 
     void factorize(const ProblemView& problem) override {
-        operator_.factorize(problem);
-        model_.build(problem, operator_, form_ != "operator" && can_sweep_on_velocities(problem), jacobi_);
+        const bool on_velocities = form_ != "operator" && can_sweep_on_velocities(problem);
+        operator_.factorize(problem, !on_velocities);
+        model_.build(problem, operator_, on_velocities, jacobi_);
     }
 
     sdk::Outcome solve(const ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "delassus/multibody.hpp"
 #include "delassus/timestepper.hpp"
@@ -71,6 +72,63 @@ TEST(ElasticBlock, SlidesWithTheFrictionOfItsWeight) {
         // The softest block still trembles a little.
         EXPECT_NEAR(normal, weight, 1e-4 * weight);
         EXPECT_NEAR(momentum[1], 0.0, 1e-5 * weight);
+    }
+}
+
+// A soft block is thrown down and bounces: its nodes meet the ground and leave it one after another. D gains and loses
+// rows, H has its entries in the same places: one symbolic factorisation has to serve all steps.
+TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
+#ifndef DELASSUS_HAS_FCL
+    GTEST_SKIP() << "this build has no collision";
+#endif
+    MultibodySystem system;
+    Shape plane;
+    plane.kind = ShapeKind::Plane;
+    const auto material = system.add_material({0.3, 0.0});
+    system.add_shape(plane, material);
+    ElasticBlockParameters block;
+    block.corner = {0.0, 0.0, 0.02};
+    block.edges = {0.4, 0.2, 0.2};
+    block.cells = {4, 2, 2};
+    block.material = {1e5, 0.3, 1000.0, 0.0};
+    block.velocity = {0.5, 0.2, -1.0};
+    block.contact_radius = 0.01;
+    block.contact_material = material;
+    system.add_elastic_block(block);
+    system.set_envelope(0.002);
+    system.finish();
+
+    const Registry registry;
+    SolverConfig config;
+    config.name = "pgs";
+    config.tolerance = 1e-8;
+    StepSolver solver(registry, config);
+    std::vector<Problem> problems;
+    solver.on_problem = [&](const Problem& seen) { problems.push_back(seen); };
+    const auto stepper = make_timestepper("euler_implicit_linearized", system);
+    State state = system.initial_state();
+    std::set<std::size_t> numbers;  // of contacts
+    for (int step = 0; step < 100; ++step) {
+        ASSERT_TRUE(stepper->step(state, 2e-3, solver).solved);
+        numbers.insert(problems.back().cones.size());
+    }
+    EXPECT_EQ(*numbers.begin(), 0U) << "it flies before and after";
+    EXPECT_GE(numbers.size(), 4U) << "contacts come and go one after another";
+    std::erase_if(problems, [](const Problem& problem) { return problem.cones.empty(); });
+
+    for (const char* name : {"pgs", "apgd", "spg", "ipm"}) {
+        config.name = name;
+        Solver plugin = make_solver(registry, config);
+        SolveReport report;
+        for (const Problem& problem : problems) {
+            Solution solution;
+            SolveSettings settings;
+            settings.tolerance = 1e-8;
+            report = plugin.solve(PreparedProblem(problem), solution, settings);
+            ASSERT_EQ(report.status, Status::Solved) << name << ": " << report.message;
+        }
+        EXPECT_EQ(report.analyses, 1) << name;
+        EXPECT_GE(report.factorizations, static_cast<std::int64_t>(problems.size())) << name;
     }
 }
 

@@ -7,6 +7,7 @@
 #include "delassus/error.hpp"
 #include "delassus/scene.hpp"
 #include "delassus/simulation.hpp"
+#include "support/scenes.hpp"
 
 namespace delassus::tests {
 namespace {
@@ -69,6 +70,60 @@ TEST(ElasticScene, BlockSlidesAgainstFriction) {
     EXPECT_EQ(simulation.totals().most_contacts, 15);
     // μ g t of each kilogram's momentum, while the block settles on the ground.
     EXPECT_NEAR(before - simulation.record().momentum[0], 0.3 * 9.81 * 0.1 * 16.0, 0.02 * 16.0);
+}
+
+// examples/scenes/elastic_slide.yaml, coarse: deceleration μ g whatever the modulus, and then rest.
+TEST(ElasticScene, BlocksOfAllModuliStopAfterTheSameWay) {
+#ifndef DELASSUS_HAS_FCL
+    GTEST_SKIP() << "this build has no collision";
+#endif
+    SceneOverrides overrides;
+    for (const std::string system : {"soft", "stiff", "steel"})
+        overrides.values.emplace_back("systems." + system + ".elastic_blocks.block.cells", "[4,2,2]");
+    for (const std::size_t number : {0U, 1U, 2U}) {
+        Running run(read_scene(example_scene("elastic_slide"), overrides), number);
+        const std::string name = run.simulation.system().name;
+        const double mass = 16.0, start = run.simulation.record().momentum[0];
+        while (run.simulation.state().t < 0.1 - 1e-9) run.simulation.step();
+        EXPECT_NEAR((start - run.simulation.record().momentum[0]) / mass, 0.3 * 9.81 * 0.1, 0.01 * 0.5) << name;
+        run.finish();
+        EXPECT_EQ(run.simulation.totals().unsolved_steps, 0) << name << ": " << run.simulation.totals().first_unsolved;
+        EXPECT_NEAR(run.simulation.record().momentum[0] / mass, 0.0, 0.01 * 0.5) << name;
+        EXPECT_LT(run.simulation.totals().worst_penetration, 1e-6) << name;
+        double way = 0.0;
+        for (std::int32_t node = 0; node < run.system().node_count(); ++node)
+            way += run.system().node_position(run.simulation.state(), node)[0] / run.system().node_count();
+        EXPECT_NEAR(way - 0.2, 0.5 * 0.5 / (2 * 0.3 * 9.81), 0.02 * 0.0425) << name;
+    }
+}
+
+// examples/scenes/elastic_stack.yaml, coarse: weight on the ground, and how much each block shrinks.
+TEST(ElasticScene, StackStandsAtTheHeightOfItsCompression) {
+#ifndef DELASSUS_HAS_FCL
+    GTEST_SKIP() << "this build has no collision";
+#endif
+    SceneOverrides overrides;
+    for (const std::string layer : {"rubber", "plastic", "steel"})
+        overrides.values.emplace_back("elastic_blocks." + layer + ".cells", "[2,2,2]");
+    Running run(read_scene(example_scene("elastic_stack"), overrides));
+    double before = 0.0;  // the vertical momentum, a step before the end
+    while (!run.simulation.finished()) {
+        before = run.simulation.record().momentum[2];
+        run.simulation.step();
+    }
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0) << run.simulation.totals().first_unsolved;
+    const double plate = 7800 * 0.24 * 0.24 * 0.02, rubber = 1100 * 0.008, plastic = 1200 * 0.008, steel = 7800 * 0.008;
+    const auto shrinks = [](double on_it, double own, double young) {
+        return (on_it + 0.5 * own) * 9.81 * 0.2 / (young * 0.04);
+    };
+    const double first = shrinks(3 * plate + plastic + steel, rubber, 1e6);
+    const double second = first + shrinks(2 * plate + steel, plastic, 1e9);
+    EXPECT_NEAR(run.pose("on_rubber").position[2], 0.22 - first, 0.01 * first);
+    EXPECT_NEAR(run.pose("on_plastic").position[2], 0.45 - second, 0.01 * second);
+    EXPECT_NEAR(run.pose("on_steel").position[2], 0.68 - second - shrinks(plate, steel, 2e11), 0.01 * second);
+    const double weight = (3 * plate + rubber + plastic + steel) * 9.81;
+    const double carried = weight + (run.simulation.record().momentum[2] - before) / 0.005;
+    EXPECT_NEAR(carried / weight, 1.0, 1e-3);
 }
 
 TEST(ElasticScene, CableHangsByItsTension) {

@@ -46,10 +46,26 @@ TEST_P(HeavyChain, HoldsForTenSeconds) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, HeavyChain,
                          testing::Values(Method{"euler_implicit_linearized", 0.005, 2e-5},
-                                         Method{"euler_implicit(newton_tolerance=1e-6)", 0.01, 1e-8}),
+                                         Method{"euler_implicit(newton_tolerance=1e-6)", 0.01, 1e-8},
+                                         Method{"hht(alpha=-0.3,newton_tolerance=1e-8)", 0.01, 1e-8}),
                          [](const auto& chosen) {
                              return std::string(chosen.param.integrator, std::strcspn(chosen.param.integrator, "("));
                          });
+
+// Out of its plane links turn about three axes under the pull, and the symmetric part of Newton's matrix leads astray:
+// the steps are finished with the whole one. At 0.1 m/s the links, which start at rest, do not fit to the weight's
+// speed.
+TEST(HeavyChainOutOfItsPlane, HoldsWithNewtonsMethod) {
+    for (const char* speed : {"0.01", "0.1"}) {
+        SceneOverrides overrides = overrides_of({"euler_implicit(newton_tolerance=1e-6)", 0.01, 0.0}, 5.0);
+        overrides.values = {{"bodies.weight.velocity", std::string("[0, ") + speed + ", 0]"}};
+        Running run(read_scene(example_scene("chain_heavy_end"), overrides));
+        run.finish();
+        EXPECT_LT(run.simulation.totals().worst_drift, 2e-6) << speed;
+        const auto at = run.pose("weight").position;
+        EXPECT_NEAR(std::hypot(at[0], at[1], at[2]), 4.1, 1e-3) << speed;
+    }
+}
 
 // What the method does without the stiffness of its constraints.
 TEST(HeavyChainWithout, ConstraintStiffnessIsLost) {

@@ -81,6 +81,12 @@ TEST_P(OperatorOfStructure, AgreesWithDenseAlgebra) {
     EXPECT_LT((product - N * lambda).norm(), 1e-12 * scale * lambda.norm());
     EXPECT_LT((op.diagonal() - N.diagonal()).norm(), 1e-12 * scale);
     EXPECT_LT((Dense(op.formed(view)) - N).norm(), 1e-12 * scale);
+    // N and its blocks made in one pass are the same, and so are they after another one without.
+    for (const bool will_form : {true, false}) {
+        op.factorize(view, will_form);
+        EXPECT_LT((op.diagonal() - N.diagonal()).norm(), 1e-12 * scale);
+        EXPECT_LT((Dense(op.formed(view)) - N).norm(), 1e-12 * scale);
+    }
     for (std::size_t c = 0; c < view.cones.size(); ++c) {
         ASSERT_NE(op.block(c), nullptr);
         const Eigen::Map<const Eigen::Matrix3d> block(op.block(c));
@@ -90,6 +96,36 @@ TEST_P(OperatorOfStructure, AgreesWithDenseAlgebra) {
     EXPECT_LT((op.free_velocity(view) - r).norm(), 1e-12 * (1.0 + r.norm()));
     const sdk::Vector x = H.ldlt().solve(view.a + D.transpose() * lambda);
     EXPECT_LT((op.velocity(view, lambda) - x).norm(), 1e-12 * (1.0 + x.norm()));
+}
+
+TEST(DelassusOperator, KeepsTheAnalysisOfHWhateverBecomesOfD) {
+    std::mt19937_64 random(3);
+    Problem data = random_problem(random, 20, 3, 4);
+    sdk::DelassusOperator op;
+    for (int step = 0; step < 3; ++step) {
+        // A row fewer each time, and other values of H in the same places.
+        --data.D.rows;
+        data.D.row_start.pop_back();
+        data.D.column.resize(static_cast<std::size_t>(data.D.row_start.back()));
+        data.D.value.resize(data.D.column.size());
+        data.b.pop_back();
+        data.cones.assign(static_cast<std::size_t>(data.D.rows), Cone::nonnegative(1));
+        for (double& value : data.H.value) value *= 1.5;
+        const PreparedProblem prepared(data);
+        const sdk::ProblemView view(prepared.raw());
+        op.analyze(view);
+        op.factorize(view);
+        EXPECT_EQ(op.inverse().analyses(), 1);
+        EXPECT_EQ(op.inverse().factorizations(), step + 1);
+        const Dense H = view.H, D = view.D;
+        const Dense N = D * H.ldlt().solve(D.transpose());
+        EXPECT_LT((Dense(op.formed(view)) - N).norm(), 1e-12 * N.norm());
+    }
+    // Another pattern of H is analysed anew.
+    data = random_problem(random, 20, 3, 5);
+    const PreparedProblem prepared(data);
+    op.analyze(sdk::ProblemView(prepared.raw()));
+    EXPECT_EQ(op.inverse().analyses(), 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(Structures, OperatorOfStructure,

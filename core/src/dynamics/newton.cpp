@@ -31,7 +31,12 @@ namespace delassus {
 // index-3 problems).
 
 Newton::Newton(DynamicalSystem& system, NewtonSettings settings)
-    : system_(system), settings_(std::move(settings)), cones_(free_cones(system)), n_(system.n()), m_(system.m()) {}
+    : system_(system),
+      settings_(std::move(settings)),
+      exact_(settings_.exact),
+      cones_(free_cones(system)),
+      n_(system.n()),
+      m_(system.m()) {}
 
 const SparseMatrix& Newton::jacobian(const State& state) {
     D_.begin(m_, n_);
@@ -100,7 +105,7 @@ SparseMatrix symmetric_part(const SparseMatrix& A) {
 }  // namespace
 
 const SparseMatrix& Newton::matrix(const StepPoint& point, StepSlopes slopes) {
-    const Tangent tangent = settings_.exact ? Tangent::Exact : Tangent::Symmetric;
+    const Tangent tangent = exact_ ? Tangent::Exact : Tangent::Symmetric;
     const double s = 1.0 / slopes.beta;
     rates_.begin(n_, n_);
     system_.add_mass(point.state, 1.0, rates_);
@@ -116,7 +121,7 @@ const SparseMatrix& Newton::matrix(const StepPoint& point, StepSlopes slopes) {
 
 void Newton::assemble(const StepPoint& point, StepSlopes slopes) {
     const SparseMatrix& H = matrix(point, slopes);
-    kept_.H = settings_.exact ? H : symmetric_part(H);
+    kept_.H = exact_ ? H : symmetric_part(H);
     kept_.D = jacobian(point.state);
     kept_.slopes = slopes;
     kept_.valid = true;
@@ -167,6 +172,16 @@ double Newton::merit(const StepResidual& residual, double s) const {
 }
 
 // ---- The iteration ----
+//
+// The symmetric part of the matrix leads to the same solution, if it leads there: where reactions turn bodies strongly
+// (a heavy pull across a light link that is off its balance), the rest of it is not small, and the iteration creeps or
+// goes astray. A step in which it does is finished with the whole matrix, if there is a solver that takes one.
+
+namespace {
+
+constexpr int most_symmetric_iterations = 10;
+
+}  // namespace
 
 void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
                    StepSolver& solver, StepReport& report) {
@@ -179,6 +194,13 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
     bool renew = !(kept_.valid && settings_.reuse == Reuse::Adaptive && kept_.slopes.beta == slopes.beta &&
                    kept_.slopes.gamma == slopes.gamma);
     if (!renew) scale();
+    exact_ = settings_.exact;
+    bool may_become_exact = !exact_ && !settings_.linearized;
+    const auto become_exact = [&] {
+        exact_ = true;
+        may_become_exact = false;
+        renew = true;
+    };
     // What a solver says of an increment is settled by Newton's own convergence. Constraints that repeat each other,
     // for one, contradict each other in an increment by terms of second order, which a solver calls infeasible.
     const bool solved_before = report.solved;
@@ -187,6 +209,7 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
     StepResidual trial_residual;
     double rho = 0.0, threshold = 0.0;
     for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
+        if (may_become_exact && iteration >= most_symmetric_iterations) become_exact();
         if (renew) assemble(point, slopes);
         const bool fresh = renew;
         rho = merit(residual, s);
@@ -200,7 +223,15 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
         Eigen::Map<Vector>(problem.a.data(), n_) = -s * residual.balance;
         problem.b.assign(residual.constraint.begin(), residual.constraint.end());
         problem.cones = cones_;
-        const LinearSolution increment = solve_linear(std::move(problem), solver, report);
+        LinearSolution increment;
+        try {
+            increment = solve_linear(std::move(problem), solver, report);
+        } catch (const Unsupported&) {
+            if (exact_ == settings_.exact) throw;
+            exact_ = settings_.exact;
+            renew = true;
+            continue;
+        }
         const Vector &x = increment.x, &lambda = increment.lambda;
         if (!x.allFinite() || !lambda.allFinite()) fail("the increment is not finite");
         system_.inverse_tangent(point.delta.data(), blocks_);
@@ -245,6 +276,10 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
                 renew = true;
                 continue;
             }
+            if (may_become_exact) {
+                become_exact();
+                continue;
+            }
             part = 1.0;
             move();
             if (!std::isfinite(trial_rho)) fail("no part of Newton's increment leads to a finite residual");
@@ -259,12 +294,13 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
             report.message = message_before;
             return;
         }
-        renew = settings_.reuse == Reuse::Full || theta > (settings_.reuse == Reuse::Modified ? 0.5 : 0.1);
+        renew = settings_.reuse == Reuse::Full || exact_ != settings_.exact ||
+                theta > (settings_.reuse == Reuse::Modified ? 0.5 : 0.1);
     }
     fail(
         fmt::format("after {} iterations of Newton's method the scaled residual is {:.1e}, where {:.1e} is asked for; "
                     "a smaller step{} may help",
-                    settings_.max_iterations, rho, threshold, settings_.exact ? "" : " or jacobian: exact"));
+                    settings_.max_iterations, rho, threshold, exact_ ? "" : " or jacobian: exact"));
 }
 
 // ---- Memory ----
@@ -352,7 +388,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
          .doc = "residual and remaining increment, relative to the way that the step goes (docs/integrators.md)"},
         {.key = "max_newton_iterations",
          .type = DELASSUS_OPTION_INTEGER,
-         .default_value = "20",
+         .default_value = "50",
          .minimum = 1.0,
          .maximum = 1e6,
          .doc = "linear problems in a step before it fails"}};

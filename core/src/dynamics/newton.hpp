@@ -85,6 +85,7 @@ private:
 
     DynamicalSystem& system_;
     NewtonSettings settings_;
+    bool exact_;  // the matrix in use: the derivative, or its symmetric part
     std::vector<Cone> cones_;
     std::int32_t n_, m_;
     MatrixAssembler rates_, H_, D_;

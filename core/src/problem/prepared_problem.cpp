@@ -43,18 +43,7 @@ std::uint64_t need_of(Structure structure) {
 PreparedProblem::PreparedProblem() : implementation_(std::make_unique<Implementation>()) {}
 
 PreparedProblem::PreparedProblem(Problem problem) : PreparedProblem() {
-    auto& self = *implementation_;
-    self.problem = std::move(problem);
-    const auto n = self.problem.n();
-    const auto m = self.problem.m();
-    if (self.problem.H.rows == 0) self.problem.H = SparseMatrix::zero(n, n);
-    if (self.problem.D.rows == 0) self.problem.D = SparseMatrix::zero(m, n);
-    if (self.problem.E.rows == 0) self.problem.E = SparseMatrix::zero(m, m);
-    validate(self.problem);
-    self.lay_out();
-    self.detect_structure();
-    self.derive_needs();
-    self.identify();
+    implementation_->take(std::move(problem));
 }
 
 PreparedProblem::~PreparedProblem() = default;
@@ -122,7 +111,8 @@ const ErrorMeter& PreparedProblem::meter() const {
 void PreparedProblem::renew(const Problem& other) {
     auto& self = *implementation_;
     if (!self.same_places(other)) {
-        *this = PreparedProblem(other);
+        self.meter.reset();
+        self.take(other);
         return;
     }
     validate(other);
@@ -130,18 +120,36 @@ void PreparedProblem::renew(const Problem& other) {
     const bool same_rows = same_H && self.problem.D.value == other.D.value && self.problem.E.value == other.E.value;
     self.copy_values(other);
     if (!same_rows) {
-        const sdk::ProblemView view(self.raw);
-        if (same_H && self.operator_of_definite.use_count() == 1) {
-            self.operator_of_definite->refresh(view);
-        } else {
-            self.detect_structure();
-        }
-        self.derive_needs();
-        self.identify();
+        self.prepare_matrices(same_H);
     } else {
         self.set_law_needs();
     }
     if (self.meter) self.meter->renew();
+}
+
+void PreparedProblem::Implementation::take(Problem other) {
+    const auto n = other.n();
+    const auto m = other.m();
+    if (other.H.rows == 0) other.H = SparseMatrix::zero(n, n);
+    if (other.D.rows == 0) other.D = SparseMatrix::zero(m, n);
+    if (other.E.rows == 0) other.E = SparseMatrix::zero(m, m);
+    validate(other);
+    const bool same_H = operator_of_definite && problem.H.row_start == other.H.row_start &&
+                        problem.H.column == other.H.column && problem.H.value == other.H.value;
+    problem = std::move(other);
+    lay_out();
+    prepare_matrices(same_H);
+}
+
+void PreparedProblem::Implementation::prepare_matrices(bool same_H) {
+    if (same_H && operator_of_definite.use_count() == 1) {
+        raw.needs = need_of(structure);
+        operator_of_definite->refresh(sdk::ProblemView(raw));
+    } else {
+        detect_structure();
+    }
+    derive_needs();
+    identify();
 }
 
 bool PreparedProblem::Implementation::same_places(const Problem& other) const {
@@ -215,11 +223,10 @@ void PreparedProblem::Implementation::detect_structure() {
     raw.needs = need_of(structure);
     const sdk::ProblemView view(raw);
     try {
-        // One that was there has analysed the same pattern.
-        if (!candidate || before != structure || candidate.use_count() > 1) {
+        // One that was there keeps the analysis of a sparse H, if the pattern is still the same.
+        if (!candidate || before != structure || candidate.use_count() > 1)
             candidate = std::make_shared<sdk::DelassusOperator>();
-            candidate->analyze(view);
-        }
+        candidate->analyze(view);
         candidate->factorize(view);
         if (candidate->inverse().smallest_relative_pivot() > 1e-14) {
             operator_of_definite = std::move(candidate);

@@ -22,6 +22,10 @@ struct PreparedProblem::Implementation {
     mutable std::unique_ptr<ErrorMeter> meter;
     RedundancyCheck redundancy;
 
+    /// Takes the place of what was there; H⁻¹ is kept as far as H is the same.
+    void take(Problem other);
+    /// Structure of H, needs and identities, after new matrices; same_H: H is the one that was factored.
+    void prepare_matrices(bool same_H);
     void lay_out();
     /// raw's pointers to the arrays of the problem and the cones' numbers, which lay_out() placed.
     void point_to_arrays();

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "delassus/sdk/problem_view.hpp"
+#include "delassus/sdk/sparse_factor.hpp"
 
 namespace delassus::sdk {
 
@@ -28,6 +28,7 @@ public:
     enum class Kind { None, Diagonal, Blocks, Sparse };
 
     /// Reads the structure from the needs that the host derived. Throws std::invalid_argument unless H is definite.
+    /// Where the pattern of a sparse H is that of the last call, its analysis is kept, whatever became of D.
     void analyze(const ProblemView& problem) {
         n_ = problem.n;
         if (problem.needs_any(DELASSUS_CAN_REDUCED) || n_ == 0) {
@@ -38,9 +39,8 @@ public:
             kind_ = Kind::Blocks;
         } else if (problem.needs_any(DELASSUS_CAN_H_DEFINITE)) {
             kind_ = Kind::Sparse;
-            if (!sparse_) sparse_ = std::make_unique<Factor>();
-            sparse_->analyzePattern(columns_of(problem));
-            ++analyses_;
+            if (!sparse_) sparse_ = std::make_unique<SparseFactor>();
+            if (sparse_->analyze(columns_of(problem), n_)) ++analyses_;
         } else {
             throw std::invalid_argument("H must be symmetric positive definite for this method");
         }
@@ -67,8 +67,7 @@ public:
                 factorize_blocks(problem);
                 break;
             case Kind::Sparse:
-                sparse_->factorize(columns_of(problem));
-                if (sparse_->info() != Eigen::Success)
+                if (!sparse_->factorize(columns_of(problem)))
                     throw NumericalFailure("the Cholesky factorisation of H failed: H is not positive definite");
                 measure_sparse_pivots(problem);
                 break;
@@ -88,27 +87,37 @@ public:
                 apply_blocks(v);
                 return;
             case Kind::Sparse:
-                v = sparse_->solve(v).eval();
+                sparse_->solve(v);
                 return;
         }
     }
 
     /// Sparse columns of Z = L⁻¹ P Dᵀ (n × m, in the order of the factor's own rows): D H⁻¹ Dᵀ = Zᵀ Z.
-    /// The sparse case costs, per row of D, the entries of L in the columns that the row reaches in the elimination
-    /// tree.
     [[nodiscard]] SparseColumns half_solved(const SparseRowsView& D) const {
         SparseColumns Z(n_, D.rows());
         std::vector<Eigen::Triplet<double, std::int32_t>> entries;
-        for_each_half_solved_row(D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
-            for (const auto i : reach)
-                if (work[i] != 0.0) entries.emplace_back(i, static_cast<std::int32_t>(row), work[i]);
-        });
+        const auto put = [&](Eigen::Index i, Eigen::Index row, double value) {
+            if (value != 0.0) entries.emplace_back(static_cast<std::int32_t>(i), static_cast<std::int32_t>(row), value);
+        };
+        if (kind_ == Kind::Sparse) {
+            sparse_->half_solve(D, sparse_->reach(D),
+                                [&](Eigen::Index first, std::span<const std::int32_t> rows, const auto& panel) {
+                                    for (Eigen::Index j = 0; j < panel.cols(); ++j)
+                                        for (Eigen::Index i = 0; i < panel.rows(); ++i)
+                                            put(first + i, rows[static_cast<std::size_t>(j)], panel(i, j));
+                                });
+        } else {
+            for_each_half_solved_row(D,
+                                     [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
+                                         for (const auto i : reach) put(i, row, work[i]);
+                                     });
+        }
         Z.setFromTriplets(entries.begin(), entries.end());
         return Z;
     }
 
-    /// Visits L⁻¹ P Dᵀ row by row of D without storing it: visit(row, reach, work), where work (n) is zero but for the
-    /// indices in reach.
+    /// Visits L⁻¹ P Dᵀ row by row of D without storing it, where H is diagonal or of blocks: visit(row, reach, work),
+    /// where work (n) is zero but for the indices in reach.
     template <class Visitor>
     void for_each_half_solved_row(const SparseRowsView& D, Visitor&& visit) const {
         row_work_.setZero(n_);
@@ -120,6 +129,9 @@ public:
         }
     }
 
+    /// The factor of a sparse H.
+    [[nodiscard]] const SparseFactor& sparse() const { return *sparse_; }
+
     /// The smallest L_jj² / H_jj of the Cholesky factor, at most 1: how far each freedom keeps clear of depending on
     /// the others, whatever its units. At rounding level H is singular to working precision.
     [[nodiscard]] double smallest_relative_pivot() const { return smallest_relative_pivot_; }
@@ -127,7 +139,7 @@ public:
     [[nodiscard]] Kind kind() const { return kind_; }
     /// Entries of L in the sparse case, else 0; a product with H⁻¹ costs twice as many multiplications.
     [[nodiscard]] std::int64_t factor_entries() const {
-        return kind_ == Kind::Sparse ? sparse_->matrixL().nestedExpression().nonZeros() : 0;
+        return kind_ == Kind::Sparse ? static_cast<std::int64_t>(sparse_->entries()) : 0;
     }
     [[nodiscard]] std::int64_t analyses() const { return analyses_; }
     [[nodiscard]] std::int64_t factorizations() const { return factorizations_; }
@@ -136,7 +148,6 @@ private:
     /// Of the diagonal blocks that the host shows (DELASSUS_CAN_H_BLOCKS).
     static constexpr int largest_block = 16;
     using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, largest_block, largest_block>;
-    using Factor = Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>>;
 
     // H is symmetric, so its compressed rows are its compressed columns.
     static Eigen::Map<const SparseColumns> columns_of(const ProblemView& problem) {
@@ -191,14 +202,10 @@ private:
     }
 
     void measure_sparse_pivots(const ProblemView& problem) {
-        const auto& L = sparse_->matrixL().nestedExpression();
-        const auto& permutation = sparse_->permutationP().indices();
-        for (Eigen::Index i = 0; i < n_; ++i) {
-            const Eigen::Index j = permutation.size() > 0 ? permutation[i] : i;
-            const double root = L.valuePtr()[L.outerIndexPtr()[j]];
+        const Vector root = sparse_->diagonal();
+        for (Eigen::Index i = 0; i < n_; ++i)
             for (SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
-                if (entry.col() == i) record_pivot(root, entry.value());
-        }
+                if (entry.col() == i) record_pivot(root[i], entry.value());
     }
 
     void apply_blocks(Vector& v) const {
@@ -213,7 +220,7 @@ private:
         }
     }
 
-    // One row of D through L⁻¹ P: leaves the result in work and the touched indices, ascending, in reach.
+    // One row of D through L⁻¹: leaves the result in work and the touched indices in reach.
     void half_solve_row(const SparseRowsView& D, Eigen::Index row, Vector& work, std::vector<std::int32_t>& reach,
                         std::vector<std::int32_t>& mark) const {
         reach.clear();
@@ -246,35 +253,9 @@ private:
                     }
                 }
                 return;
-            case Kind::Sparse: {
-                const auto& L = sparse_->matrixL().nestedExpression();
-                const auto& permutation = sparse_->permutationP().indices();
-                const auto permuted = [&](Eigen::Index j) {
-                    return permutation.size() > 0 ? permutation[j] : static_cast<std::int32_t>(j);
-                };
-                // The elimination tree's parent of j is the first row below the diagonal of column j.
-                for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
-                    std::int32_t j = permuted(entry.col());
-                    work[j] += entry.value();
-                    while (j >= 0 && touch(j)) j = parent_in_tree(L, j);
-                }
-                std::sort(reach.begin(), reach.end());
-                for (const auto j : reach) {
-                    const auto begin = L.outerIndexPtr()[j];
-                    const auto end = L.outerIndexPtr()[j + 1];
-                    const double value = work[j] / L.valuePtr()[begin];
-                    work[j] = value;
-                    for (auto k = begin + 1; k < end; ++k) work[L.innerIndexPtr()[k]] -= L.valuePtr()[k] * value;
-                }
-                return;
-            }
+            case Kind::Sparse:
+                throw std::logic_error("a sparse factor solves for all rows of D together");
         }
-    }
-
-    template <class Matrix>
-    static std::int32_t parent_in_tree(const Matrix& L, std::int32_t j) {
-        const auto second = L.outerIndexPtr()[j] + 1;
-        return second < L.outerIndexPtr()[j + 1] ? L.innerIndexPtr()[second] : -1;
     }
 
     Kind kind_ = Kind::None;
@@ -283,7 +264,7 @@ private:
     Vector root_;     // diagonal: √H_ii; blocks: the inverses of the lower Cholesky factors
     std::vector<std::int32_t> start_, index_, position_, block_of_;
     std::vector<std::size_t> offset_;
-    std::unique_ptr<Factor> sparse_;
+    std::unique_ptr<SparseFactor> sparse_;
     double smallest_relative_pivot_ = 1.0;
     std::int64_t analyses_ = 0, factorizations_ = 0;
     mutable Vector row_work_;  // of for_each_half_solved_row

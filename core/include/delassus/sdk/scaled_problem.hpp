@@ -41,7 +41,7 @@ public:
 
     /// Factors H and builds N̂. Throws NumericalFailure if H is not positive definite.
     void factorize(const ProblemView& problem) {
-        operator_.factorize(problem);
+        operator_.factorize(problem, cheapest_form(problem) == Form::Formed);
         scale_rows(problem);
         build_operator(problem);
     }
@@ -164,27 +164,31 @@ private:
         }
     }
 
-    // Takes the cheapest form of N̂. With a diagonal or block-diagonal H, Ŵ has about as many entries as D. With a
-    // sparse H a row of Ŵ reaches up the elimination tree: then the alternatives are D̂ with two triangular solves a
-    // product, or for few rows N̂ itself. Costs are counted in multiplications.
+    enum class Form { Whitened, Solved, Formed };
+
+    // With a diagonal or block-diagonal H, Ŵ has about as many entries as D. With a sparse H a row of Ŵ reaches up the
+    // elimination tree: then the alternatives are D̂ with two triangular solves a product, or for few rows N̂ itself.
+    // Costs are counted in multiplications.
+    [[nodiscard]] Form cheapest_form(const ProblemView& problem) const {
+        const HInverse& inverse = operator_.inverse();
+        if (inverse.kind() != HInverse::Kind::Sparse) return Form::Whitened;
+        const double whitened = 2.0 * static_cast<double>(inverse.sparse().reach(problem.D).entries);
+        const double solved = 2.0 * static_cast<double>(problem.D.nonZeros() + inverse.factor_entries());
+        const double formed = static_cast<double>(problem.m) * static_cast<double>(problem.m);
+        if (formed <= std::min(whitened, solved)) return Form::Formed;
+        return whitened <= solved ? Form::Whitened : Form::Solved;
+    }
+
     void build_operator(const ProblemView& problem) {
         rows_ = {};
         square_ = {};
         work_.setZero(problem.n);
-        whitened_ = true;
+        const Form form = cheapest_form(problem);
+        whitened_ = form != Form::Solved;
         const HInverse& inverse = operator_.inverse();
-        if (inverse.kind() == HInverse::Kind::Sparse) {
-            double whitened = 0.0;
-            inverse.for_each_half_solved_row(problem.D, [&](Eigen::Index, const auto& reach, const Vector&) {
-                whitened += 2.0 * static_cast<double>(reach.size());
-            });
-            const double solved = 2.0 * static_cast<double>(problem.D.nonZeros() + inverse.factor_entries());
-            const double formed = static_cast<double>(problem.m) * static_cast<double>(problem.m);
-            if (formed <= std::min(whitened, solved)) {
-                square_ = BlockRows(operator_.formed(problem), groups_, p_.data(), p_.data());
-                return;
-            }
-            whitened_ = whitened <= solved;
+        if (form == Form::Formed) {
+            square_ = BlockRows(operator_.formed(problem), groups_, p_.data(), p_.data());
+            return;
         }
         if (problem.n > 0 && whitened_) {
             const SparseColumns Z = inverse.half_solved(problem.D);

@@ -1,34 +1,120 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sparse_factor.hpp"
+// L S Lᵀ of a symmetric sparse matrix with pivots of known signs S = diag(±1), without pivoting, by dense fronts.
+#pragma once
 
 #include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
 
-namespace delassus::ipm {
+#include "delassus/sdk/problem_view.hpp"
 
-namespace {
+namespace delassus::sdk {
 
-using Matrix = Eigen::MatrixXd;
-using Panel = Eigen::Map<Matrix>;
+/// The multifrontal method (Duff and Reid 1983; Liu 1992): columns of L with nearly the same pattern form a supernode,
+/// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
+/// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD.
+class SparseFactor {
+public:
+    /// The rows of a matrix by the supernodes that they reach in half solves.
+    struct Reach {
+        std::vector<std::vector<std::int32_t>> rows;  ///< of each supernode, ascending
+        std::int64_t entries = 0;                     ///< that the half-solved rows have altogether
+        std::int64_t coupled = 0;  ///< ordered pairs of rows that meet in a root, counted once for each root
+    };
+
+    /// matrix: its lower triangle is read, and only the pattern. The first `positive` pivots are positive, the others
+    /// negative (a quasi-definite matrix). False where the pattern is the one analysed last: then nothing is done.
+    bool analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive);
+
+    /// matrix: as analysed, with values. False if a pivot has the wrong sign, or is not finite.
+    [[nodiscard]] bool factorize(const Eigen::Ref<const SparseColumns>& matrix);
+
+    /// v ← A⁻¹ v.
+    void solve(Vector& v) const;
+
+    /// The absolute values of L's diagonal, in the order of the matrix's rows.
+    [[nodiscard]] Vector diagonal() const;
+
+    /// Entries of L, known after analyze.
+    [[nodiscard]] double entries() const { return entries_; }
+
+    /// Which half-solved rows D L⁻ᵀ have entries where; the pattern of D (any rows, as many columns as the matrix).
+    [[nodiscard]] Reach reach(const SparseRowsView& D) const;
+
+    /// Z = L⁻¹ P Dᵀ in dense panels, of a matrix whose pivots are all positive: visit(first, rows, panel) for each
+    /// supernode that a row of D reaches, where panel(i, k) is the entry first + i of Z's column rows[k].
+    template <class Visitor>
+    void half_solve(const SparseRowsView& D, const Reach& reach, Visitor&& visit) const;
+
+private:
+    struct Supernode {
+        std::int32_t first = 0, columns = 0;  // of L
+        std::int32_t height = 0;              // rows of the front: its columns, then those of the update
+        std::int32_t parent = -1;             // supernode
+        std::size_t row = 0;                  // into row_: height of them, ascending
+        std::size_t panel = 0;                // into value_: height × columns
+        std::size_t entry = 0;                // into entry_: up to that of the next supernode
+        bool definite = true;                 // all pivots positive
+    };
+    struct Entry {
+        std::int32_t source;  // into the values of the matrix
+        std::size_t target;   // into the panel
+    };
+
+    void find_supernodes(const SparseColumns& permuted, const std::vector<std::int32_t>& parent);
+    void find_places(const Eigen::Ref<const SparseColumns>& matrix);
+    void add_update(std::size_t child);
+    [[nodiscard]] bool eliminate(std::size_t node);
+
+    static std::vector<std::int32_t> elimination_tree(const SparseColumns& lower);
+    static std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent);
+    static SparseColumns permute(const Eigen::Ref<const SparseColumns>& matrix,
+                                 const std::vector<std::int32_t>& position);
+
+    using Matrix = Eigen::MatrixXd;
+    using Panel = Eigen::Map<Matrix>;
+    using ConstPanel = Eigen::Map<const Matrix>;
+
+    Eigen::Index size_ = 0, positive_ = 0;
+    std::vector<std::int32_t> analyzed_start_, analyzed_row_;  // the pattern of the last analysis
+    double entries_ = 0.0;
+    std::vector<std::int32_t> position_;  // of each row of the matrix, in L
+    std::vector<std::int32_t> node_of_;   // supernode of each column of L
+    std::vector<double> sign_;            // of each pivot, in the order of L
+    std::vector<Supernode> nodes_;        // children before parents
+    std::vector<std::int32_t> row_;
+    // Beside row_, for the rows of the update: their rows in the parent's front.
+    std::vector<std::int32_t> place_in_parent_;
+    std::vector<Entry> entry_;
+    std::vector<double> value_;
+    std::vector<Matrix> update_;  // one a supernode, while its parent waits for it; lower triangle
+    mutable Vector work_, gathered_;
+};
 
 /// The lower triangle of the matrix with its rows and columns at new positions, columns sorted.
-sdk::SparseColumns permute(const sdk::SparseColumns& lower, const std::vector<std::int32_t>& position) {
+inline SparseColumns SparseFactor::permute(const Eigen::Ref<const SparseColumns>& matrix,
+                                           const std::vector<std::int32_t>& position) {
     std::vector<std::int32_t> count(position.size(), 0);
     const auto visit = [&](auto&& take) {
-        for (Eigen::Index j = 0; j < lower.cols(); ++j)
-            for (sdk::SparseColumns::InnerIterator entry(lower, j); entry; ++entry) {
+        for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+            for (Eigen::Ref<const SparseColumns>::InnerIterator entry(matrix, j); entry; ++entry) {
+                if (entry.row() < j) continue;
                 const std::int32_t p = position[static_cast<std::size_t>(entry.row())];
                 const std::int32_t q = position[static_cast<std::size_t>(j)];
                 take(std::max(p, q), std::min(p, q));
             }
     };
     visit([&](std::int32_t, std::int32_t column) { ++count[static_cast<std::size_t>(column)]; });
-    sdk::SparseColumns result(lower.rows(), lower.cols());
-    result.resizeNonZeros(lower.nonZeros());
-    std::fill_n(result.valuePtr(), lower.nonZeros(), 1.0);
+    SparseColumns result(matrix.rows(), matrix.cols());
+    const std::int32_t entries = std::accumulate(count.begin(), count.end(), 0);
+    result.resizeNonZeros(entries);
+    std::fill_n(result.valuePtr(), entries, 1.0);
     std::int32_t* start = result.outerIndexPtr();
     start[0] = 0;
     for (std::size_t j = 0; j < count.size(); ++j) start[j + 1] = start[j] + count[j];
@@ -42,7 +128,7 @@ sdk::SparseColumns permute(const sdk::SparseColumns& lower, const std::vector<st
 }
 
 /// The elimination tree (Liu 1986): parent of each column, −1 at a root.
-std::vector<std::int32_t> elimination_tree(const sdk::SparseColumns& lower) {
+inline std::vector<std::int32_t> SparseFactor::elimination_tree(const SparseColumns& lower) {
     const auto n = static_cast<std::size_t>(lower.cols());
     std::vector<std::int32_t> parent(n, -1), ancestor(n, -1);
     const Eigen::SparseMatrix<double, Eigen::RowMajor, std::int32_t> rows = lower;
@@ -61,7 +147,7 @@ std::vector<std::int32_t> elimination_tree(const sdk::SparseColumns& lower) {
 }
 
 /// New positions in which children come right before their parents.
-std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent) {
+inline std::vector<std::int32_t> SparseFactor::postorder(const std::vector<std::int32_t>& parent) {
     const auto n = static_cast<std::int32_t>(parent.size());
     std::vector<std::int32_t> first_child(parent.size(), -1), sibling(parent.size(), -1), position(parent.size());
     for (std::int32_t j = n - 1; j >= 0; --j) {
@@ -89,21 +175,27 @@ std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent) {
     return position;
 }
 
-}  // namespace
-
-void SparseFactor::analyze(const sdk::SparseColumns& lower, Eigen::Index positive) {
-    size_ = lower.rows();
+inline bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
+    const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
+    if (size_ == matrix.rows() && positive_ == positive &&
+        std::equal(analyzed_start_.begin(), analyzed_start_.end(), start, start + matrix.cols() + 1) &&
+        std::equal(analyzed_row_.begin(), analyzed_row_.end(), row, row + matrix.nonZeros()))
+        return false;
+    analyzed_start_.assign(start, start + matrix.cols() + 1);
+    analyzed_row_.assign(row, row + matrix.nonZeros());
+    size_ = matrix.rows();
+    positive_ = positive;
     const auto n = static_cast<std::size_t>(size_);
     position_.resize(n);
     std::iota(position_.begin(), position_.end(), 0);
     if (size_ > 0) {
         Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, std::int32_t> order;
-        Eigen::AMDOrdering<std::int32_t>()(lower.selfadjointView<Eigen::Lower>(), order);
+        Eigen::AMDOrdering<std::int32_t>()(matrix.selfadjointView<Eigen::Lower>(), order);
         for (std::size_t k = 0; k < n; ++k)
             position_[static_cast<std::size_t>(order.indices()[static_cast<Eigen::Index>(k)])] =
                 static_cast<std::int32_t>(k);
     }
-    const std::vector<std::int32_t> parent = elimination_tree(permute(lower, position_));
+    const std::vector<std::int32_t> parent = elimination_tree(permute(matrix, position_));
     const std::vector<std::int32_t> post = postorder(parent);
     std::vector<std::int32_t> moved(n, -1);
     for (std::size_t j = 0; j < n; ++j)
@@ -112,11 +204,12 @@ void SparseFactor::analyze(const sdk::SparseColumns& lower, Eigen::Index positiv
     sign_.assign(n, 1.0);
     for (std::size_t i = 0; i < n; ++i)
         if (static_cast<Eigen::Index>(i) >= positive) sign_[static_cast<std::size_t>(position_[i])] = -1.0;
-    find_supernodes(permute(lower, position_), moved);
-    find_places(lower);
+    find_supernodes(permute(matrix, position_), moved);
+    find_places(matrix);
+    return true;
 }
 
-void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std::vector<std::int32_t>& parent) {
+inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const std::vector<std::int32_t>& parent) {
     const auto n = static_cast<std::size_t>(size_);
     // The pattern of each column of L: its own entries and those of its children below themselves.
     std::vector<std::vector<std::int32_t>> pattern(n), children(n);
@@ -138,7 +231,7 @@ void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std
             mark[static_cast<std::size_t>(i)] = column;
             rows.push_back(i);
         };
-        for (sdk::SparseColumns::InnerIterator entry(permuted, column); entry; ++entry)
+        for (SparseColumns::InnerIterator entry(permuted, column); entry; ++entry)
             take(static_cast<std::int32_t>(entry.row()));
         for (const auto child : children[j]) {
             for (const auto i : pattern[static_cast<std::size_t>(child)]) take(i);
@@ -165,7 +258,7 @@ void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std
     nodes_.clear();
     row_.clear();
     entries_ = 0.0;
-    std::vector<std::int32_t> node_of(n);
+    node_of_.resize(n);
     for (const Run& run : runs) {
         Supernode node;
         node.first = run.first;
@@ -175,7 +268,7 @@ void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std
         node.panel = static_cast<std::size_t>(entries_);
         for (std::int32_t c = 0; c < run.columns; ++c) {
             row_.push_back(run.first + c);
-            node_of[static_cast<std::size_t>(run.first + c)] = static_cast<std::int32_t>(nodes_.size());
+            node_of_[static_cast<std::size_t>(run.first + c)] = static_cast<std::int32_t>(nodes_.size());
             if (sign_[static_cast<std::size_t>(run.first + c)] < 0.0) node.definite = false;
         }
         row_.insert(row_.end(), run.below.begin(), run.below.end());
@@ -184,29 +277,26 @@ void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std
     }
     for (Supernode& node : nodes_)
         if (node.height > node.columns)
-            node.parent = node_of[static_cast<std::size_t>(row_[node.row + static_cast<std::size_t>(node.columns)])];
+            node.parent = node_of_[static_cast<std::size_t>(row_[node.row + static_cast<std::size_t>(node.columns)])];
 }
 
-void SparseFactor::find_places(const sdk::SparseColumns& lower) {
+inline void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& matrix) {
     const auto place = [this](const Supernode& node, std::int32_t row) {
         const auto begin = row_.begin() + static_cast<std::ptrdiff_t>(node.row);
         return static_cast<std::int32_t>(std::lower_bound(begin, begin + node.height, row) - begin);
     };
     place_in_parent_.assign(row_.size(), 0);
-    std::vector<std::size_t> node_of(static_cast<std::size_t>(size_));
-    for (std::size_t s = 0; s < nodes_.size(); ++s) {
-        const Supernode& node = nodes_[s];
-        for (std::int32_t c = 0; c < node.columns; ++c) node_of[static_cast<std::size_t>(node.first + c)] = s;
+    for (const Supernode& node : nodes_)
         for (std::int32_t i = node.columns; i < node.height; ++i)
             place_in_parent_[node.row + static_cast<std::size_t>(i)] =
                 place(nodes_[static_cast<std::size_t>(node.parent)], row_[node.row + static_cast<std::size_t>(i)]);
-    }
     std::vector<std::vector<Entry>> entries(nodes_.size());
-    for (Eigen::Index j = 0; j < lower.cols(); ++j) {
-        for (std::int32_t k = lower.outerIndexPtr()[j]; k < lower.outerIndexPtr()[j + 1]; ++k) {
-            const std::int32_t p = position_[static_cast<std::size_t>(lower.innerIndexPtr()[k])];
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+        for (std::int32_t k = matrix.outerIndexPtr()[j]; k < matrix.outerIndexPtr()[j + 1]; ++k) {
+            if (matrix.innerIndexPtr()[k] < j) continue;
+            const std::int32_t p = position_[static_cast<std::size_t>(matrix.innerIndexPtr()[k])];
             const std::int32_t q = position_[static_cast<std::size_t>(j)];
-            const std::size_t s = node_of[static_cast<std::size_t>(std::min(p, q))];
+            const auto s = static_cast<std::size_t>(node_of_[static_cast<std::size_t>(std::min(p, q))]);
             const Supernode& node = nodes_[s];
             const auto column = static_cast<std::size_t>(std::min(p, q) - node.first);
             entries[s].push_back({k, column * static_cast<std::size_t>(node.height) +
@@ -220,14 +310,14 @@ void SparseFactor::find_places(const sdk::SparseColumns& lower) {
     }
 }
 
-bool SparseFactor::factorize(const sdk::SparseColumns& lower) {
+inline bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
     value_.assign(static_cast<std::size_t>(entries_), 0.0);
     update_.resize(nodes_.size());
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
         const Supernode& node = nodes_[s];
         const std::size_t end = s + 1 < nodes_.size() ? nodes_[s + 1].entry : entry_.size();
         for (std::size_t k = node.entry; k < end; ++k)
-            value_[node.panel + entry_[k].target] += lower.valuePtr()[entry_[k].source];
+            value_[node.panel + entry_[k].target] += matrix.valuePtr()[entry_[k].source];
     }
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
         const Eigen::Index rest = nodes_[s].height - nodes_[s].columns;
@@ -242,7 +332,7 @@ bool SparseFactor::factorize(const sdk::SparseColumns& lower) {
 }
 
 // Factors the panel [A11; A21] into L11, L21 = A21 L11⁻ᵀ S, and takes L21 S L21ᵀ from the update.
-bool SparseFactor::eliminate(std::size_t s) {
+inline bool SparseFactor::eliminate(std::size_t s) {
     const Supernode& node = nodes_[s];
     const Eigen::Index k = node.columns, rest = node.height - k;
     Panel panel(value_.data() + node.panel, node.height, k);
@@ -261,7 +351,7 @@ bool SparseFactor::eliminate(std::size_t s) {
         if (rest > 0) update_[s].selfadjointView<Eigen::Lower>().rankUpdate(bottom, -1.0);
         return true;
     }
-    const Eigen::Map<const sdk::Vector> sign(sign_.data() + node.first, k);
+    const Eigen::Map<const Vector> sign(sign_.data() + node.first, k);
     for (Eigen::Index c = 0; c < k; ++c) {
         const double pivot = sign[c] * panel(c, c);
         if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
@@ -274,7 +364,7 @@ bool SparseFactor::eliminate(std::size_t s) {
 }
 
 // Adds the update of a supernode to its parent's front, and frees it.
-void SparseFactor::add_update(std::size_t child) {
+inline void SparseFactor::add_update(std::size_t child) {
     const Supernode& node = nodes_[child];
     const auto p = static_cast<std::size_t>(node.parent);
     const Supernode& parent = nodes_[p];
@@ -295,12 +385,12 @@ void SparseFactor::add_update(std::size_t child) {
     update.resize(0, 0);
 }
 
-void SparseFactor::solve(sdk::Vector& v) {
+inline void SparseFactor::solve(Vector& v) const {
     work_.resize(size_);
     for (Eigen::Index i = 0; i < size_; ++i) work_[position_[static_cast<std::size_t>(i)]] = v[i];
     for (const Supernode& node : nodes_) {
         const Eigen::Index k = node.columns, rest = node.height - k;
-        const Panel panel(value_.data() + node.panel, node.height, k);
+        const ConstPanel panel(value_.data() + node.panel, node.height, k);
         auto own = work_.segment(node.first, k);
         panel.topRows(k).triangularView<Eigen::Lower>().solveInPlace(own);
         if (rest == 0) continue;
@@ -308,10 +398,10 @@ void SparseFactor::solve(sdk::Vector& v) {
         const std::int32_t* row = row_.data() + node.row + k;
         for (Eigen::Index i = 0; i < rest; ++i) work_[row[i]] -= gathered_[i];
     }
-    work_.array() *= Eigen::Map<const sdk::Vector>(sign_.data(), size_).array();
+    work_.array() *= Eigen::Map<const Vector>(sign_.data(), size_).array();
     for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) {
         const Eigen::Index k = node->columns, rest = node->height - k;
-        const Panel panel(value_.data() + node->panel, node->height, k);
+        const ConstPanel panel(value_.data() + node->panel, node->height, k);
         auto own = work_.segment(node->first, k);
         if (rest > 0) {
             gathered_.resize(rest);
@@ -324,4 +414,89 @@ void SparseFactor::solve(sdk::Vector& v) {
     for (Eigen::Index i = 0; i < size_; ++i) v[i] = work_[position_[static_cast<std::size_t>(i)]];
 }
 
-}  // namespace delassus::ipm
+inline Vector SparseFactor::diagonal() const {
+    Vector ordered(size_), result(size_);
+    for (const Supernode& node : nodes_)
+        ordered.segment(node.first, node.columns) =
+            ConstPanel(value_.data() + node.panel, node.height, node.columns).diagonal().cwiseAbs();
+    for (Eigen::Index i = 0; i < size_; ++i) result[i] = ordered[position_[static_cast<std::size_t>(i)]];
+    return result;
+}
+
+// A row of D reaches the supernodes of its columns and all their ancestors.
+inline SparseFactor::Reach SparseFactor::reach(const SparseRowsView& D) const {
+    Reach result;
+    result.rows.resize(nodes_.size());
+    std::vector<Eigen::Index> mark(nodes_.size(), -1);
+    for (Eigen::Index row = 0; row < D.rows(); ++row)
+        for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
+            const std::int32_t column = position_[static_cast<std::size_t>(entry.col())];
+            for (auto s = node_of_[static_cast<std::size_t>(column)]; s >= 0;
+                 s = nodes_[static_cast<std::size_t>(s)].parent) {
+                const auto node = static_cast<std::size_t>(s);
+                if (mark[node] == row) break;
+                mark[node] = row;
+                result.rows[node].push_back(static_cast<std::int32_t>(row));
+                result.entries += nodes_[node].columns;
+            }
+        }
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        const auto rows = static_cast<std::int64_t>(result.rows[s].size());
+        if (nodes_[s].parent < 0) result.coupled += rows * rows;
+    }
+    return result;
+}
+
+// As in factorize, with the rows of D for further rows of each front: the panel of a supernode is what D and its
+// children leave in its own columns, solved with L11; L21 times it goes to the parent. All products are of matrices.
+template <class Visitor>
+void SparseFactor::half_solve(const SparseRowsView& D, const Reach& reach, Visitor&& visit) const {
+    struct Item {
+        std::int32_t row, column;
+        double value;
+    };
+    std::vector<std::vector<Item>> entries(nodes_.size());
+    std::vector<std::vector<std::size_t>> children(nodes_.size());
+    for (Eigen::Index row = 0; row < D.rows(); ++row)
+        for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
+            const std::int32_t column = position_[static_cast<std::size_t>(entry.col())];
+            entries[static_cast<std::size_t>(node_of_[static_cast<std::size_t>(column)])].push_back(
+                {static_cast<std::int32_t>(row), column, entry.value()});
+        }
+    std::vector<Matrix> passed(nodes_.size());  // to the parent: rows of the update × rows of D
+    std::vector<std::int32_t> place(static_cast<std::size_t>(D.rows()));
+    Matrix own;
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        const auto& rows = reach.rows[s];
+        if (rows.empty()) continue;
+        const Supernode& node = nodes_[s];
+        const Eigen::Index k = node.columns, rest = node.height - k, width = static_cast<Eigen::Index>(rows.size());
+        for (std::size_t j = 0; j < rows.size(); ++j)
+            place[static_cast<std::size_t>(rows[j])] = static_cast<std::int32_t>(j);
+        own.setZero(k, width);
+        passed[s].setZero(rest, width);
+        for (const Item& entry : entries[s])
+            own(entry.column - node.first, place[static_cast<std::size_t>(entry.row)]) += entry.value;
+        for (const std::size_t child : children[s]) {
+            const Supernode& from = nodes_[child];
+            const std::int32_t* target = place_in_parent_.data() + from.row + from.columns;
+            for (std::size_t j = 0; j < reach.rows[child].size(); ++j) {
+                const Eigen::Index column = place[static_cast<std::size_t>(reach.rows[child][j])];
+                for (Eigen::Index i = 0; i < passed[child].rows(); ++i) {
+                    const double value = passed[child](i, static_cast<Eigen::Index>(j));
+                    (target[i] < k ? own(target[i], column) : passed[s](target[i] - k, column)) += value;
+                }
+            }
+            passed[child].resize(0, 0);
+        }
+        const ConstPanel panel(value_.data() + node.panel, node.height, k);
+        panel.topRows(k).template triangularView<Eigen::Lower>().solveInPlace(own);
+        if (rest > 0) {
+            passed[s].noalias() -= panel.bottomRows(rest) * own;
+            children[static_cast<std::size_t>(node.parent)].push_back(s);
+        }
+        visit(static_cast<Eigen::Index>(node.first), std::span<const std::int32_t>(rows), std::as_const(own));
+    }
+}
+
+}  // namespace delassus::sdk
