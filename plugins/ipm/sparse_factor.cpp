@@ -5,7 +5,9 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
+
+#include "dissection.hpp"
 
 namespace delassus::ipm {
 
@@ -13,6 +15,8 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 using Panel = Eigen::Map<Matrix>;
+
+constexpr Eigen::Index smallest_to_dissect = 1000;
 
 /// The lower triangle of the matrix with its rows and columns at new positions, columns sorted.
 sdk::SparseColumns permute(const sdk::SparseColumns& lower, const std::vector<std::int32_t>& position) {
@@ -89,20 +93,32 @@ std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent) {
     return position;
 }
 
+/// New positions by approximate minimum degree.
+std::vector<std::int32_t> minimum_degree(const sdk::SparseColumns& lower) {
+    std::vector<std::int32_t> position(static_cast<std::size_t>(lower.rows()));
+    if (position.empty()) return position;
+    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, std::int32_t> order;
+    Eigen::AMDOrdering<std::int32_t>()(lower.selfadjointView<Eigen::Lower>(), order);
+    for (Eigen::Index k = 0; k < lower.rows(); ++k)
+        position[static_cast<std::size_t>(order.indices()[k])] = static_cast<std::int32_t>(k);
+    return position;
+}
+
 }  // namespace
 
 void SparseFactor::analyze(const sdk::SparseColumns& lower, Eigen::Index positive) {
+    analyze(lower, positive, minimum_degree(lower));
+    // Dissection is worth its time where the fill is large.
+    if (entries_ < 10.0 * static_cast<double>(lower.nonZeros()) || size_ < smallest_to_dissect) return;
+    SparseFactor other;
+    other.analyze(lower, positive, nested_dissection(lower));
+    if (other.flops_ < flops_) *this = std::move(other);
+}
+
+void SparseFactor::analyze(const sdk::SparseColumns& lower, Eigen::Index positive, std::vector<std::int32_t> position) {
     size_ = lower.rows();
     const auto n = static_cast<std::size_t>(size_);
-    position_.resize(n);
-    std::iota(position_.begin(), position_.end(), 0);
-    if (size_ > 0) {
-        Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, std::int32_t> order;
-        Eigen::AMDOrdering<std::int32_t>()(lower.selfadjointView<Eigen::Lower>(), order);
-        for (std::size_t k = 0; k < n; ++k)
-            position_[static_cast<std::size_t>(order.indices()[static_cast<Eigen::Index>(k)])] =
-                static_cast<std::int32_t>(k);
-    }
+    position_ = std::move(position);
     const std::vector<std::int32_t> parent = elimination_tree(permute(lower, position_));
     const std::vector<std::int32_t> post = postorder(parent);
     std::vector<std::int32_t> moved(n, -1);
@@ -164,7 +180,7 @@ void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std
 
     nodes_.clear();
     row_.clear();
-    entries_ = 0.0;
+    entries_ = flops_ = 0.0;
     std::vector<std::int32_t> node_of(n);
     for (const Run& run : runs) {
         Supernode node;
@@ -180,6 +196,7 @@ void SparseFactor::find_supernodes(const sdk::SparseColumns& permuted, const std
         }
         row_.insert(row_.end(), run.below.begin(), run.below.end());
         entries_ += static_cast<double>(node.height) * node.columns;
+        flops_ += static_cast<double>(node.height) * node.height * node.columns;
         nodes_.push_back(node);
     }
     for (Supernode& node : nodes_)

@@ -11,7 +11,8 @@ namespace delassus::ipm {
 
 /// The multifrontal method (Duff and Reid 1983; Liu 1992): columns of L with nearly the same pattern form a supernode,
 /// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
-/// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD.
+/// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD, or nested
+/// dissection where that takes fewer operations.
 class SparseFactor {
 public:
     /// lower: the lower triangle with all of the diagonal; only its pattern is read. The first `positive` pivots are
@@ -28,6 +29,8 @@ public:
     [[nodiscard]] double entries() const { return entries_; }
 
 private:
+    void analyze(const sdk::SparseColumns& lower, Eigen::Index positive, std::vector<std::int32_t> position);
+
     struct Supernode {
         std::int32_t first = 0, columns = 0;  // of L
         std::int32_t height = 0;              // rows of the front: its columns, then those of the update
@@ -48,7 +51,7 @@ private:
     [[nodiscard]] bool eliminate(std::size_t node);
 
     Eigen::Index size_ = 0;
-    double entries_ = 0.0;
+    double entries_ = 0.0, flops_ = 0.0;  // flops_: about, up to a factor
     std::vector<std::int32_t> position_;  // of each row of the matrix, in L
     std::vector<double> sign_;            // of each pivot, in the order of L
     std::vector<Supernode> nodes_;        // children before parents

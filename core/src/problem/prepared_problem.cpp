@@ -18,6 +18,8 @@ delassus_matrix raw_of(const SparseMatrix& matrix) {
             matrix.column.data(), matrix.value.data()};
 }
 
+}  // namespace
+
 std::uint64_t need_of(Structure structure) {
     switch (structure) {
         case Structure::Reduced:
@@ -38,7 +40,9 @@ std::uint64_t need_of(Structure structure) {
     return 0;
 }
 
-}  // namespace
+std::uint64_t need_of(Law law) {
+    return law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED;
+}
 
 PreparedProblem::PreparedProblem() : implementation_(std::make_unique<Implementation>()) {}
 
@@ -240,8 +244,7 @@ void PreparedProblem::Implementation::derive_needs() {
 
 void PreparedProblem::Implementation::set_law_needs() {
     raw.needs &= ~static_cast<std::uint64_t>(DELASSUS_CAN_COULOMB | DELASSUS_CAN_ASSOCIATED);
-    if (raw.needs & DELASSUS_CAN_FRICTION)
-        raw.needs |= problem.law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED;
+    if (raw.needs & DELASSUS_CAN_FRICTION) raw.needs |= need_of(problem.law);
 }
 
 void PreparedProblem::Implementation::identify() {

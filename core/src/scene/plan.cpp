@@ -251,21 +251,31 @@ private:
         if (needs_ & unilateral) {
             std::uint64_t all = needs_ | (sparse_ ? DELASSUS_CAN_H_DEFINITE : DELASSUS_CAN_H_BLOCKS);
             if (!touching_.pairs().empty()) all |= DELASSUS_CAN_REDUNDANT;
-            const std::string name = simulation_.solver().choice(all);
-            if (name.empty())
+            const auto choice = simulation_.solver().choice(all);
+            if (choice.first.empty())
                 throw Unsupported(fmt::format("system \"{}\": no installed solver can take all that it may need: {}",
                                               system_.name, fmt::join(capability_names(all), ", ")));
-            if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
-                plan_.solvers.push_back(name);
+            for (const auto& name : choice.first) add(plan_.solvers, name);
+            for (const auto& name : choice.later) add(plan_.later_solvers, name);
         } else {
             nothing_.push_back({"a solver for cones", "no contact, stop or limited motor: every row is bilateral"});
         }
+        std::erase_if(plan_.later_solvers, [&](const std::string& name) { return contains(plan_.solvers, name); });
+        if (!plan_.later_solvers.empty())
+            leave(fmt::format("{}", fmt::join(plan_.later_solvers, ", ")),
+                  "loaded only if those before do not reach the tolerance");
         for (const auto& name : plan_.solvers) {
             const bool chosen = name == system_.solver.name;
-            keep(fmt::format("solver {}", name),
-                 chosen ? "the scene names it" : "the first of the preference list that can take the problems");
+            keep(fmt::format("solver {}", name), chosen ? "the scene names it" : "auto starts with it");
             plan_.libraries.push_back(is_library_path(name) ? name : registry_.find(name).library.filename().string());
         }
+    }
+
+    static bool contains(const std::vector<std::string>& names, const std::string& name) {
+        return std::find(names.begin(), names.end(), name) != names.end();
+    }
+    static void add(std::vector<std::string>& names, const std::string& name) {
+        if (!contains(names, name)) names.push_back(name);
     }
 
     SceneSystem& system_;

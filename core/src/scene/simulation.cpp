@@ -27,7 +27,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
     try {
         // Checked here without loading the plugin, which may never be needed.
-        if (!system.solver.name.empty()) check_solver(registry, system.solver);
+        check_solver(registry, system.solver);
         timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
         if (system.control)
             control_ = std::make_unique<AdaptiveStepping>(*system.system, *timestepper_, *system.control);

@@ -4,6 +4,7 @@
 
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
+#include "solver/ranking.hpp"
 
 namespace delassus {
 
@@ -16,5 +17,13 @@ inline constexpr const char* ranking_file_name = "ranking.json";
 
 /// Throws InputError on a bad option or ranking. The registry must outlive the solver.
 [[nodiscard]] Solver make_auto(const Registry& registry, OptionTexts options);
+
+/// The plugins that `auto` may load for problems with these needs, of whatever size, for its option texts.
+struct AutoChoice {
+    std::vector<std::string> first;  ///< that start; more than one where it depends on m
+    std::vector<std::string> later;  ///< that are loaded where those before them do not get there
+};
+/// Throws as make_auto.
+[[nodiscard]] AutoChoice auto_choice(const Registry& registry, const OptionTexts& options, const RankedNeeds& asked);
 
 }  // namespace delassus

@@ -237,6 +237,8 @@ void PluginSolver::run(const PreparedProblem& problem, Solution& solution, const
     report.claimed_residual = outcome.residual;
     report.status = status_of(raw_status);
     if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
+    if (report.status == Status::Infeasible)
+        report.proven_size = problem.meter().proven_size(solution.x, solution.lambda);
     if (outcome.message) report.message = outcome.message;
     if (report.status == Status::Error || report.status == Status::NumericalFailure)
         report.message = fmt::format("{}: {}", info().name, last_error(solver));
