@@ -54,7 +54,7 @@ struct Config {
 [[nodiscard]] DELASSUS_API PluginInfo solver_info(const Registry& registry, const std::string& name);
 
 /// Throws InputError if there is no such solver, or an option is unknown or outside its domain (those of a library
-/// given by its path are checked when it is loaded). No name means `auto`. Nothing is loaded.
+/// given by its path are checked when it is loaded). Nothing is loaded.
 DELASSUS_API void check_solver(const Registry& registry, const SolverConfig& config);
 
 /// Loads the plugin that the configuration names and makes a solver with its options. The registry must outlive the

@@ -47,10 +47,6 @@ public:
     /// velocities without reactions, H⁻¹a, in the same norm), relative to those.
     [[nodiscard]] DELASSUS_API double velocity(std::span<const double> x, std::span<const double> reference) const;
 
-    /// A lower bound of the size of all solutions, ‖(R⁻¹x, S⁻¹λ)‖ / ‖S r‖ with R = |diag H|^(−½), that the answer of a
-    /// solver proves which says that there is none (docs/errors.md); 0 if it proves nothing. x: n, lambda: m.
-    [[nodiscard]] DELASSUS_API double proven_size(std::span<const double> x, std::span<const double> lambda) const;
-
     /// x ← H⁻¹(a + Dᵀλ), n; throws InputError where H is not definite.
     DELASSUS_API void velocity_of(std::span<const double> lambda, std::vector<double>& x) const;
 

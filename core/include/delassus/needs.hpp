@@ -27,10 +27,6 @@ enum class Structure {
 
 [[nodiscard]] DELASSUS_API std::string_view name_of(Structure structure);
 
-/// The DELASSUS_CAN_* bit that a problem of this structure, or with friction under this law, needs.
-[[nodiscard]] std::uint64_t need_of(Structure structure);
-[[nodiscard]] std::uint64_t need_of(Law law);
-
 /// The names of the DELASSUS_CAN_* bits that are set, as used in sidecars and by `delassus plugins info`.
 [[nodiscard]] DELASSUS_API std::vector<std::string> capability_names(std::uint64_t bits);
 /// The inverse; throws InputError on an unknown name.

@@ -23,11 +23,11 @@ enum class Status {
     IterationLimit,
     TimeLimit,
     Stalled,
-    Infeasible,  ///< there is no solution, or it is beyond all sizes: the solver said so, and the core found it proven
+    Infeasible,
     NumericalFailure,
     Cancelled,
     Error,
-    FalseClaim  ///< the solver claimed convergence, or that there is no solution; the core's measurement disagrees
+    FalseClaim  ///< the solver claimed convergence; the measured error is above the tolerance
 };
 
 [[nodiscard]] DELASSUS_API std::string_view name_of(Status status);
@@ -45,7 +45,6 @@ struct SolveSettings {
     std::int64_t max_iterations = 1000000;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
-    bool simulation = false;  ///< the problem is a step of a simulation, near to the one before: `auto` chooses by it
 
     /// Measure the natural error along the way and keep the curve in the report. Samples are spaced by 2 % in time.
     bool record_curve = false;
@@ -88,7 +87,6 @@ struct SolveReport {
     double seconds_solve = 0.0;
     std::int64_t analyses = 0, factorizations = 0;  ///< by the solver's own count, since it was made
     double claimed_residual = std::numeric_limits<double>::quiet_NaN();
-    double proven_size = 0.0;  ///< with infeasible: see ErrorMeter::proven_size
     Errors error;
     std::vector<CurveSample> curve;
     std::vector<StageReport> stages;  ///< empty if one solver did it all
@@ -113,8 +111,6 @@ public:
     DELASSUS_API Solver& operator=(Solver&&) noexcept;
 
     [[nodiscard]] DELASSUS_API const PluginInfo& info() const;
-    /// The names of the plugins that it has loaded so far.
-    [[nodiscard]] DELASSUS_API std::vector<std::string> loaded() const;
 
     /// Empty if the solver can take the problem with these settings; else the sentence of the refusal.
     [[nodiscard]] DELASSUS_API std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) const;

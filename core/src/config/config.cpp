@@ -133,7 +133,7 @@ void check_solver(const Registry& registry, const SolverConfig& config) {
             throw InputError(fmt::format("there is no plugin {}", config.name));
         return;
     }
-    const PluginInfo info = solver_info(registry, config.name.empty() ? auto_name : config.name);
+    const PluginInfo info = solver_info(registry, config.name);
     static_cast<void>(resolve_options(info.name, info.options, options));
 }
 

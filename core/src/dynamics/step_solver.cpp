@@ -13,7 +13,6 @@
 #include "delassus/sdk/problem_view.hpp"
 #include "dynamics/islands.hpp"
 #include "solver/auto_solver.hpp"
-#include "solver/finished_solver.hpp"
 
 namespace delassus {
 
@@ -41,7 +40,7 @@ struct StepSolver::Implementation {
     Implementation(const Registry& known, SolverConfig chosen)
         : registry(known), config(std::move(chosen)), settings(config.settings()) {
         if (config.name.empty()) config.name = auto_name;
-        settings.simulation = true;
+        if (config.name == auto_name) config.options.try_emplace("simulation", "true");
     }
 
     Solver& solver(std::size_t instance) {
@@ -58,6 +57,7 @@ struct StepSolver::Implementation {
     SolverConfig config;
     SolveSettings settings;
     std::vector<Solver> solvers;  // instances by the number of the part
+    std::set<std::string> loaded;
     Islands islands;
     std::deque<KeptPart> parts;  // by the number of the part
     Solution start;
@@ -134,6 +134,8 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
     SolveSettings part_settings = settings;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const auto report = solver.solve(prepared, solution, part_settings);
+    if (report.stages.empty()) loaded.insert(config.name);
+    for (const auto& stage : report.stages) loaded.insert(stage.solver);
     ++effort.plugin_solves;
     effort.iterations += report.iterations;
     effort.seconds += report.seconds_setup + report.seconds_solve;
@@ -164,18 +166,12 @@ std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
     return result;
 }
 
-StepSolver::Choice StepSolver::choice(std::uint64_t needs) const {
+std::string StepSolver::choice(std::uint64_t needs) const {
     const auto& config = implementation_->config;
-    OptionTexts options = config.options;
-    const FinishOptions finish = take_finish(options);
-    Choice choice{{config.name}, {}};
-    if (config.name == auto_name) {
-        auto [first, later] =
-            auto_choice(implementation_->registry, options, {needs, implementation_->settings.tolerance, true});
-        choice = {std::move(first), std::move(later)};
-    }
-    if (!finish.solver.empty()) choice.later.push_back(parse_solver(finish.solver).name);
-    return choice;
+    if (config.name != auto_name) return config.name;
+    const auto choice =
+        auto_choice(implementation_->registry, config.options, needs, implementation_->settings.tolerance);
+    return choice.first.empty() ? std::string() : choice.first.front();
 }
 
 const SolverEffort& StepSolver::effort() const {
@@ -185,10 +181,7 @@ void StepSolver::reset_effort() {
     implementation_->effort = {};
 }
 std::vector<std::string> StepSolver::loaded() const {
-    std::set<std::string> names;
-    for (const auto& solver : implementation_->solvers)
-        for (auto& name : solver.loaded()) names.insert(std::move(name));
-    return {names.begin(), names.end()};
+    return {implementation_->loaded.begin(), implementation_->loaded.end()};
 }
 
 }  // namespace delassus

@@ -122,9 +122,6 @@ struct ErrorMeter::Implementation {
         return 0.5 * std::numeric_limits<double>::epsilon() * magnitude.norm() / residual.reference();
     }
 
-    /// The bound of ErrorMeter::proven_size by these directions; n, m.
-    [[nodiscard]] double size_by(const Vector& y, const Vector& direction_of_lambda) const;
-
     const PreparedProblem::Implementation& prepared;
     sdk::ProblemView view;
     Mobility mobility;
@@ -221,64 +218,6 @@ double ErrorMeter::velocity(std::span<const double> x_values, std::span<const do
         if (scale <= vanishing_velocity * free) scale = free;
     }
     return ratio(energy_norm(difference), scale);
-}
-
-// Let d lie in the recession cone of Υ. A solution has ⟨u, d⟩ ≥ 0 with u = D x + E λ + b, hence
-//     −bᵀd ≤ xᵀDᵀd + λᵀE d ≤ ‖(R⁻¹x, S⁻¹λ)‖ ‖(R Dᵀd, S E d)‖.
-// With Coulomb's law only u_n ≥ 0 holds for a friction block, so that d has no tangential part there. Likewise for y
-// with D y in Υ*, where H is singular:
-//     aᵀy = xᵀH y − λᵀD y ≤ ‖(R⁻¹x, S⁻¹λ)‖ ‖(R H y, S (D y − P* D y))‖;
-// the λ of a box may have any sign, so that P* is zero there. Both left sides count only if they are no rounding.
-double ErrorMeter::Implementation::size_by(const Vector& y, const Vector& direction_of_lambda) const {
-    const sdk::ProblemView& problem = view;
-    constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    const auto bound = [&](const auto& data, const Vector& direction, double cost, double length) {
-        const double gain = data.dot(direction);
-        if (!(gain > 64.0 * epsilon * data.cwiseAbs().dot(direction.cwiseAbs()))) return 0.0;
-        return gain / ((cost + epsilon * length) * residual.reference());
-    };
-    Vector S(problem.m);
-    for (std::size_t c = 0; c < problem.cones.size(); ++c)
-        S.segment(problem.cones[c].first_row, problem.cones[c].rows).setConstant(residual.scaling()[c]);
-    const Vector R = sdk::magnitude_of_diagonal(problem).cwiseSqrt().cwiseInverse();
-
-    Vector opposite = -direction_of_lambda;  // −d = P*(−λ) − λ (Moreau)
-    Vector minus_d = opposite;
-    for (const auto& cone : problem.cones) {
-        auto block = minus_d.segment(cone.first_row, cone.rows);
-        sdk::operations_of(cone).project_dual(cone, opposite.data() + cone.first_row);
-        block -= opposite.segment(cone.first_row, cone.rows);
-        if (problem.coulomb && cone.kind == DELASSUS_CONE_FRICTION) block.tail(cone.rows - 1).setZero();
-    }
-    const double impulse_norm = problem.n > 0 ? Vector(problem.D.transpose() * minus_d).cwiseProduct(R).norm() : 0.0;
-    const double compliance = Vector(problem.E * minus_d).cwiseProduct(S).norm();
-    const double size =
-        bound(problem.b, minus_d, std::hypot(impulse_norm, compliance), minus_d.cwiseQuotient(S).norm());
-    if (prepared.operator_of_definite) return size;
-
-    Vector outside = problem.D * y;
-    for (const auto& cone : problem.cones) {
-        if (cone.kind == DELASSUS_CONE_BOX) continue;
-        Vector inside = outside.segment(cone.first_row, cone.rows);
-        sdk::operations_of(cone).project_dual(cone, inside.data());
-        outside.segment(cone.first_row, cone.rows) -= inside;
-    }
-    const double force = Vector(problem.H.transpose() * y).cwiseProduct(R).norm();
-    return std::max(size,
-                    bound(problem.a, y, std::hypot(force, outside.cwiseProduct(S).norm()), y.cwiseQuotient(R).norm()));
-}
-
-// What diverges is a direction itself; of a least-squares answer the residuals −S²u and a + Dᵀλ − H x are.
-double ErrorMeter::proven_size(std::span<const double> x_values, std::span<const double> lambda_values) const {
-    const auto& self = *implementation_;
-    const sdk::ProblemView& problem = self.view;
-    const Vector x = VectorView(x_values.data(), problem.n), lambda = VectorView(lambda_values.data(), problem.m);
-    Vector d = -self.constraint_velocity(VectorView(x.data(), problem.n), VectorView(lambda.data(), problem.m));
-    for (std::size_t c = 0; c < problem.cones.size(); ++c)
-        d.segment(problem.cones[c].first_row, problem.cones[c].rows) *= std::pow(self.residual.scaling()[c], 2);
-    Vector y = problem.a;
-    if (problem.n > 0) y += problem.D.transpose() * lambda - problem.H * x;
-    return std::max(self.size_by(x, lambda), self.size_by(y, d));
 }
 
 void ErrorMeter::velocity_of(std::span<const double> lambda_values, std::vector<double>& x) const {

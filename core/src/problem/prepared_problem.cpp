@@ -8,6 +8,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
+#include "problem/need_of.hpp"
 
 namespace delassus {
 

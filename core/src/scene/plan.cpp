@@ -11,6 +11,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/simulation.hpp"
+#include "solver/auto_solver.hpp"
 
 namespace delassus {
 namespace {
@@ -251,19 +252,19 @@ private:
         if (needs_ & unilateral) {
             std::uint64_t all = needs_ | (sparse_ ? DELASSUS_CAN_H_DEFINITE : DELASSUS_CAN_H_BLOCKS);
             if (!touching_.pairs().empty()) all |= DELASSUS_CAN_REDUNDANT;
-            const auto choice = simulation_.solver().choice(all);
-            if (choice.first.empty())
+            const std::string name = simulation_.solver().choice(all);
+            if (name.empty())
                 throw Unsupported(fmt::format("system \"{}\": no installed solver can take all that it may need: {}",
                                               system_.name, fmt::join(capability_names(all), ", ")));
-            for (const auto& name : choice.first) add(plan_.solvers, name);
-            for (const auto& name : choice.later) add(plan_.later_solvers, name);
+            if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
+                plan_.solvers.push_back(name);
+            find_later_solvers(all);
         } else {
             nothing_.push_back({"a solver for cones", "no contact, stop or limited motor: every row is bilateral"});
         }
-        std::erase_if(plan_.later_solvers, [&](const std::string& name) { return contains(plan_.solvers, name); });
         if (!plan_.later_solvers.empty())
-            leave(fmt::format("{}", fmt::join(plan_.later_solvers, ", ")),
-                  "loaded only if those before do not reach the tolerance");
+            leave(fmt::format("the solvers {}", fmt::join(plan_.later_solvers, ", ")),
+                  fmt::format("loaded only if {} does not reach the tolerance", fmt::join(plan_.solvers, " or ")));
         for (const auto& name : plan_.solvers) {
             const bool chosen = name == system_.solver.name;
             keep(fmt::format("solver {}", name), chosen ? "the scene names it" : "auto starts with it");
@@ -271,11 +272,15 @@ private:
         }
     }
 
-    static bool contains(const std::vector<std::string>& names, const std::string& name) {
-        return std::find(names.begin(), names.end(), name) != names.end();
-    }
-    static void add(std::vector<std::string>& names, const std::string& name) {
-        if (!contains(names, name)) names.push_back(name);
+    /// Those that `auto` turns to where the first fails.
+    void find_later_solvers(std::uint64_t needs) {
+        const SolverConfig& solver = system_.solver;
+        if (!solver.name.empty() && solver.name != auto_name) return;
+        OptionTexts options = solver.options;
+        options.try_emplace("simulation", "true");
+        for (auto& name : auto_choice(registry_, options, needs, solver.settings().tolerance).later)
+            if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
+                plan_.later_solvers.push_back(std::move(name));
     }
 
     SceneSystem& system_;

@@ -9,6 +9,9 @@
 #include "delassus/config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
+#include "problem/need_of.hpp"
+#include "solver/finished_solver.hpp"
+#include "solver/ranking.hpp"
 #include "solver/solver_implementation.hpp"
 
 namespace delassus {
@@ -26,9 +29,15 @@ fs::path ranking_file(const Registry& registry) {
                     registry.folders().back().string()));
 }
 
-Ranking read_ranking(const Registry& registry, const std::vector<OptionInfo>& table, const OptionTexts& options) {
-    const auto values = resolve_options(auto_name, table, options);
-    return Ranking(values[0].text.empty() ? ranking_file(registry) : fs::path(values[0].text));
+struct AutoOptions {
+    Ranking ranking;
+    bool simulation;
+};
+
+AutoOptions read_options(const Registry& registry, const OptionTexts& options) {
+    const auto values = resolve_options(auto_name, auto_info(registry).options, options);
+    return {Ranking(values[0].text.empty() ? ranking_file(registry) : fs::path(values[0].text)),
+            values[1].integer != 0};
 }
 
 /// Whether this plugin is installed and has all these capabilities.
@@ -44,17 +53,10 @@ public:
         : registry_(registry),
           info_(auto_info(registry)),
           options_(std::move(options)),
-          ranking_(read_ranking(registry, info_.options, options_)) {}
+          chosen_(read_options(registry, options_)) {}
 
     [[nodiscard]] const PluginInfo& info() const override { return info_; }
     [[nodiscard]] const OptionTexts& options() const override { return options_; }
-
-    [[nodiscard]] std::vector<std::string> loaded() const override {
-        std::vector<std::string> names;
-        for (const auto& [key, solver] : solvers_)
-            if (names.empty() || names.back() != key.first) names.push_back(key.first);
-        return names;
-    }
 
     [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings&) override {
         if (!registry_.capable(needs_of(problem, {})).empty()) return {};
@@ -65,7 +67,8 @@ public:
     void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
              SolveReport& report) override {
         const std::uint64_t needs = needs_of(problem, {});
-        const RankingRule& rule = ranking_.rule({needs, settings.tolerance, settings.simulation}, problem.raw().m);
+        const RankingRule& rule =
+            chosen_.ranking.rule({needs, settings.tolerance, chosen_.simulation}, problem.raw().m);
         StageRunner runner(problem, solution, settings, report);
         bool done = false;
         for (const auto& ranked : rule.stages) {
@@ -102,7 +105,7 @@ private:
     const Registry& registry_;
     PluginInfo info_;
     OptionTexts options_;
-    Ranking ranking_;
+    AutoOptions chosen_;
     std::map<std::pair<std::string, OptionTexts>, Solver> solvers_;
 };
 
@@ -121,7 +124,15 @@ PluginInfo auto_info(const Registry& registry) {
                      0.0,
                      {},
                      "",
-                     "File that says who solves what; empty: ranking.json of the plugin folders"}};
+                     "File that says who solves what; empty: ranking.json of the plugin folders"},
+                    {"simulation",
+                     DELASSUS_OPTION_BOOLEAN,
+                     "false",
+                     0.0,
+                     0.0,
+                     {},
+                     "",
+                     "The problems are steps of a simulation, each near to the one before"}};
     for (const auto& plugin : registry.plugins()) info.capabilities |= plugin.capabilities;
     return info;
 }
@@ -130,20 +141,21 @@ Solver make_auto(const Registry& registry, OptionTexts options) {
     return Solver(std::make_unique<AutoSolver>(registry, std::move(options)));
 }
 
-AutoChoice auto_choice(const Registry& registry, const OptionTexts& options, const RankedNeeds& asked) {
+AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs, double tolerance) {
+    static_cast<void>(take_finish(options));
     AutoChoice choice;
     const auto add = [&](std::vector<std::string>& names, const std::string& name) {
         for (const auto* list : {&choice.first, &choice.later})
             if (std::find(list->begin(), list->end(), name) != list->end()) return;
         names.push_back(name);
     };
-    const Ranking ranking = read_ranking(registry, auto_info(registry).options, options);
-    const auto rules = ranking.rules(asked);
+    const AutoOptions chosen = read_options(registry, options);
+    const auto rules = chosen.ranking.rules({needs, tolerance, chosen.simulation});
     const auto able = [&](const RankedStage& ranked) {
-        std::uint64_t needs = asked.needs;
+        std::uint64_t own = needs;
         if (const auto law = ranked.stage.law; law && (needs & DELASSUS_CAN_FRICTION))
-            needs = (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
-        return can(registry, ranked.solver, needs);
+            own = (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
+        return can(registry, ranked.solver, own);
     };
     for (const auto* rule : rules) {
         const auto start = std::find_if(rule->stages.begin(), rule->stages.end(), able);
@@ -160,8 +172,7 @@ AutoChoice auto_choice(const Registry& registry, const OptionTexts& options, con
         others = others || !ends;
     }
     if (others)
-        for (const auto& name : registry.capable(asked.needs))
-            add(choice.first.empty() ? choice.first : choice.later, name);
+        for (const auto& name : registry.capable(needs)) add(choice.first.empty() ? choice.first : choice.later, name);
     return choice;
 }
 

@@ -2,9 +2,12 @@
 // `auto`: the solver that chooses solvers.
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
-#include "solver/ranking.hpp"
 
 namespace delassus {
 
@@ -18,12 +21,13 @@ inline constexpr const char* ranking_file_name = "ranking.json";
 /// Throws InputError on a bad option or ranking. The registry must outlive the solver.
 [[nodiscard]] Solver make_auto(const Registry& registry, OptionTexts options);
 
-/// The plugins that `auto` may load for problems with these needs, of whatever size, for its option texts.
+/// The plugins that `auto` may load for problems with these needs (DELASSUS_CAN_* bits), of whatever size.
 struct AutoChoice {
     std::vector<std::string> first;  ///< that start; more than one where it depends on m
     std::vector<std::string> later;  ///< that are loaded where those before them do not get there
 };
-/// Throws as make_auto.
-[[nodiscard]] AutoChoice auto_choice(const Registry& registry, const OptionTexts& options, const RankedNeeds& asked);
+/// options: as configured. Throws as make_auto.
+[[nodiscard]] DELASSUS_API AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs,
+                                                  double tolerance);
 
 }  // namespace delassus

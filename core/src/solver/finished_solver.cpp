@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "delassus/error.hpp"
 #include "solver/solver_implementation.hpp"
 #include "solver/stages.hpp"
@@ -28,13 +26,6 @@ public:
 
     [[nodiscard]] const PluginInfo& info() const override { return main_.info(); }
     [[nodiscard]] const OptionTexts& options() const override { return chosen_; }
-
-    [[nodiscard]] std::vector<std::string> loaded() const override {
-        std::vector<std::string> names = main_.loaded();
-        for (auto& name : finish_.loaded())
-            if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
-        return names;
-    }
 
     [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) override {
         if (std::string sentence = main_.refusal(problem, settings); !sentence.empty()) return sentence;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delassus/error.hpp"
+#include "problem/need_of.hpp"
 #include "support/nearest_name.hpp"
 #include "support/text_file.hpp"
 

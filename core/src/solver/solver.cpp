@@ -24,10 +24,6 @@ constexpr double balance_floor = 1e-12;
 constexpr double rounding_slack = 32.0;
 constexpr double rounding_limit = 1e-10;
 
-/// There is no solution for practical purposes if it is proven to be larger than this in units of the data. Rounding
-/// leaves no proof of more than about 1/ε times the size of the contradiction.
-constexpr double least_proven_size = 1e8;
-
 bool all_finite(const std::vector<double>& values) {
     return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
@@ -93,10 +89,6 @@ const PluginInfo& Solver::info() const {
     return implementation_->info();
 }
 
-std::vector<std::string> Solver::loaded() const {
-    return implementation_->loaded();
-}
-
 std::string Solver::refusal(const PreparedProblem& problem, const SolveSettings& settings) const {
     return implementation_->refusal(problem, settings);
 }
@@ -145,13 +137,6 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
             "{} claimed convergence; the natural error is {:.2e} and the balance error {:.2e}, the "
             "tolerance {:.2e}",
             info().name, report.error.natural, report.error.balance, settings.tolerance);
-    }
-    if (report.status == Status::Infeasible && !(report.proven_size >= least_proven_size)) {
-        report.status = Status::FalseClaim;
-        report.message = fmt::format(
-            "{} claimed that there is no solution; all that its answer proves is that one has a "
-            "size of {:.1e} or more",
-            info().name, report.proven_size);
     }
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
     return report;

@@ -17,8 +17,6 @@ public:
     [[nodiscard]] virtual const PluginInfo& info() const = 0;
     /// The options that were chosen.
     [[nodiscard]] virtual const OptionTexts& options() const = 0;
-    /// See Solver::loaded.
-    [[nodiscard]] virtual std::vector<std::string> loaded() const { return {info().name}; }
     /// See Solver::refusal.
     [[nodiscard]] virtual std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) = 0;
     /// Solves; fills the report's status, message, counts, times, curve and stages.

@@ -140,7 +140,6 @@ void StageRunner::add(const StageReport& stage, const SolveReport& result) {
     report_.analyses += result.analyses;
     report_.factorizations += result.factorizations;
     report_.claimed_residual = result.claimed_residual;
-    report_.proven_size = result.proven_size;
     report_.stages.push_back(stage);
 }
 
