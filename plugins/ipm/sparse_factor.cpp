@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "dissection.hpp"
-#include "rank_update.hpp"
 
 namespace delassus::ipm {
 
@@ -276,7 +275,7 @@ bool SparseFactor::eliminate(std::size_t s) {
             if (factor.info() != Eigen::Success || !std::isfinite(top.diagonal().sum())) return false;
             if (rest > 0) top.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(bottom);
         }
-        if (rest > 0) subtract_square(update_[s], bottom);
+        if (rest > 0) update_[s].selfadjointView<Eigen::Lower>().rankUpdate(bottom, -1.0);
         return true;
     }
     const Eigen::Map<const sdk::Vector> sign(sign_.data() + node.first, k);
