@@ -42,6 +42,7 @@ int plan(const SceneArguments& arguments, bool as_json) {
                                        {"kept", json_of(one.kept)},
                                        {"left_out", json_of(one.left_out)},
                                        {"solvers", one.solvers},
+                                       {"later_solvers", one.later_solvers},
                                        {"libraries", one.libraries}});
         fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
         return exit_solved;

@@ -58,8 +58,13 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
         }
         iterate(problem, monitor);
     }
-    if (monitor.best().size() == problem.m) lambda = monitor.best();
-    x = best_x_;
+    const bool proof = monitor.outcome().status == DELASSUS_INFEASIBLE;  // the directions along which they diverge
+    if (proof) {
+        lambda = true_lambda_;
+    } else if (monitor.best().size() == problem.m) {
+        lambda = monitor.best();
+    }
+    x = proof ? true_x_ : best_x_;
     std::string& message = monitor.outcome().message;
     message += (message.empty() ? "" : "; ") + kkt_.description();
     return monitor.outcome();

@@ -82,6 +82,12 @@ TEST_F(BenchTest, AFalseClaim) {
     EXPECT_GT(row.error->natural, 0.1);
 }
 
+TEST_F(BenchTest, AnUnprovenImpossibilityIsAFalseClaim) {
+    const auto row = measure("despair");
+    EXPECT_EQ(row.status, "false_claim");
+    EXPECT_TRUE(contains(row.message, "claimed that there is no solution")) << row.message;
+}
+
 TEST_F(BenchTest, NotANumber) {
     const auto row = measure("nan");
     EXPECT_EQ(row.status, "numerical_failure");

@@ -158,8 +158,9 @@ TEST(Run, BadUseIsExplained) {
 std::set<std::string> mapped(const std::string& arguments) {
     const std::string log = loader_log(arguments);
     std::set<std::string> found;
-    for (const char* library : {"apgd.so", "cholmod.so", "minres.so", "mumps.so", "petsc.so", "pgs.so", "spg.so",
-                                "delassus_collision.so", "delassus_trajectory.so", "libhdf5", "libfcl"})
+    for (const char* library :
+         {"admm.so", "apgd.so", "cholmod.so", "ipm.so", "minres.so", "mumps.so", "petsc.so", "pgs.so", "spg.so",
+          "ssn.so", "delassus_collision.so", "delassus_trajectory.so", "libhdf5", "libfcl"})
         if (log.find(std::string("/") + library) != std::string::npos) found.insert(library);
     return found;
 }
@@ -190,6 +191,20 @@ TEST(Plan, SaysWhatIsLeftOutAndWhy) {
     EXPECT_NE(ball.out.find("2 of 3 rows of each contact, rubber on rubber: friction is zero"), std::string::npos);
     EXPECT_NE(ball.out.find("1 fixed body: no unknowns, no columns: ground"), std::string::npos);
     EXPECT_NE(ball.out.find("friction cones: no pair of materials has friction"), std::string::npos);
+}
+
+TEST(Plan, SaysWhoComesLater) {
+    const auto plan = Json::parse(run_command("plan --json " + scene("brick_wall")).out).at("systems")[0];
+    ASSERT_EQ(plan.at("solvers").size(), 1U) << plan;
+    const auto later = plan.at("later_solvers").get<std::set<std::string>>();
+    EXPECT_FALSE(later.empty());
+    EXPECT_FALSE(later.contains(plan.at("solvers")[0].get<std::string>()));
+    const auto run = mapped("run " + scene("brick_wall") + " --end 0.02");
+    EXPECT_TRUE(run.contains(plan.at("solvers")[0].get<std::string>() + ".so"));
+    for (const auto& name : later) EXPECT_FALSE(run.contains(name + ".so")) << name;
+    // Whoever is named is alone.
+    const auto named = Json::parse(run_command("plan --json " + scene("brick_wall") + " --solver pgs").out);
+    EXPECT_EQ(named.at("systems")[0].at("later_solvers"), Json::array());
 }
 
 TEST(Plan, DoesNotDependOnTheEnd) {

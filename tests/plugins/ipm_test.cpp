@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
 #include "support/shared_problems.hpp"
@@ -122,6 +123,16 @@ TEST(Ipm, TellsInfeasibleFromStalled) {
     EXPECT_EQ(solve(floating, 1e-8).report.status, Status::Infeasible);  // nothing balances the total force of 4
     floating.a = {4.0, -4.0};
     EXPECT_EQ(solve(floating, 1e-8).report.status, Status::Solved);
+}
+
+TEST(Ipm, DissectsWhatMinimumDegreeFills) {
+    SpherePileParameters parameters;
+    parameters.contacts = 3000;
+    const auto report = solve(generate_sphere_pile(parameters), 1e-8).report;
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    const auto at = report.message.find("normal form, ");
+    ASSERT_NE(at, std::string::npos) << report.message;
+    EXPECT_LT(std::stod(report.message.substr(at + 13)), 1.5e6) << "1.8e6 by minimum degree alone";
 }
 
 TEST(Ipm, AnalysesOnceWhileThePatternStays) {

@@ -184,6 +184,78 @@ TEST(Auto, AStartThatDoesNotBalanceIsNoSolution) {
     for (const double x : solution.x) EXPECT_NEAR(x, 0.0, 1e-7);
 }
 
+/// A body between two walls that are nearer to each other than nothing: x ≥ 1 and −x ≥ 1.
+Problem squeezed() {
+    Problem problem;
+    problem.H = SparseMatrix::from_triplets(1, 1, {{0, 0, 1.0}});
+    problem.D = SparseMatrix::from_triplets(2, 1, {{0, 0, 1.0}, {1, 0, -1.0}});
+    problem.a = {0.0};
+    problem.b = {-1.0, -1.0};
+    problem.cones = {Cone::nonnegative(2)};
+    return problem;
+}
+
+// A proof that there is no solution ends the search; the best answer stays the one that comes nearest.
+TEST(Auto, EndsWhereThereIsNoSolution) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "apgd", "max_iterations": 50, "watched": true, "reason": "cheap"},
+        {"solver": "ipm", "reason": "it can prove it"},
+        {"solver": "ssn", "reason": "never reached"}]}])");
+    const PreparedProblem problem(squeezed());
+    Solution solution;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    EXPECT_EQ(report.status, Status::Infeasible) << report.message;
+    ASSERT_EQ(report.stages.size(), 2U) << report.message;
+    EXPECT_EQ(report.stages[1].solver, "ipm");
+    EXPECT_LE(report.error.natural, report.stages[0].natural);
+    EXPECT_EQ(solve(parse_solver("auto"), problem, solution).status, Status::Infeasible);
+}
+
+TEST(Auto, ALastStageIsTheLast) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "minres", "last": true, "reason": "it cannot, and so is not the last"},
+        {"solver": "pgs", "max_iterations": 1, "last": true, "reason": "hopeless"},
+        {"solver": "apgd", "reason": "never reached"}]}])");
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solution solution;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    EXPECT_EQ(report.status, Status::IterationLimit) << report.message;
+    ASSERT_EQ(report.stages.size(), 1U);
+    EXPECT_EQ(report.stages[0].solver, "pgs");
+}
+
+TEST(Auto, RulesLookAtTheProblemAndItsUse) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([
+        {"name": "steps", "when": {"simulation": true}, "stages": [{"solver": "pgs", "reason": "r"}]},
+        {"name": "joints", "when": {"linear": true}, "stages": [{"solver": "cholmod", "reason": "r"}]},
+        {"name": "coulomb", "when": {"law": "coulomb"}, "stages": [{"solver": "admm", "reason": "r"}]},
+        {"name": "rough", "when": {"tolerance": [1e-3, null]}, "stages": [{"solver": "spg", "reason": "r"}]},
+        {"name": "small", "when": {"m": [0, 5], "structure": ["diagonal"]}, "stages": [{"solver": "ssn", "reason": "r"}]},
+        {"name": "all", "when": {}, "stages": [{"solver": "apgd", "reason": "r"}]}])");
+    const auto first = [&](const Problem& problem, const std::string& more = "", double tolerance = 1e-6) {
+        SolveSettings settings;
+        settings.tolerance = tolerance;
+        Solution solution;
+        const auto solver = parse_solver("auto(ranking=" + file + more + ")");
+        return solve(solver, PreparedProblem(problem), solution, settings).stages.front().solver;
+    };
+    const Problem contact = point_on_plane(2.0, 10.0, 3.0, 0.5, Law::Associated);
+    EXPECT_EQ(first(contact), "ssn");
+    EXPECT_EQ(first(contact, "", 1e-2), "spg");
+    EXPECT_EQ(first(contact, ",simulation=true"), "pgs");
+    EXPECT_EQ(first(point_on_plane(2.0, 10.0, 3.0, 0.5, Law::Coulomb)), "admm");
+    EXPECT_EQ(first(tied_masses()), "cholmod");
+    EXPECT_EQ(first(read_problem(example("box_stack"))), "apgd");
+    // The law of a problem without friction says nothing.
+    Problem frictionless = squeezed();
+    frictionless.law = Law::Coulomb;
+    frictionless.b = {-1.0, 1.0};
+    EXPECT_EQ(first(frictionless), "ssn");
+}
+
 TEST(Auto, BadRankingsAreRefused) {
     const ScratchFolder scratch;
     const auto sentence = [&](const std::string& rules) {

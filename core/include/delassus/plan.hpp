@@ -25,6 +25,8 @@ struct SystemPlan {
     std::vector<PlanLine> kept, left_out;
     /// Plugins: those that the first step loaded, then those that contacts which are not there yet will load.
     std::vector<std::string> solvers;
+    /// Plugins that the run loads only in a step where those do not reach the tolerance.
+    std::vector<std::string> later_solvers;
     /// Files that the run maps beyond libdelassus, its own parts and the C++ library; -o adds delassus_trajectory.so.
     std::vector<std::string> libraries;
 };

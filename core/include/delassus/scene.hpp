@@ -43,7 +43,7 @@ struct SceneSystem {
 
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
-    SolverConfig solver;                 ///< an empty name: by need
+    SolverConfig solver;                 ///< an empty name: `auto`
     double step = 0.0;                   ///< s, > 0; with `control` the first that is tried
     std::optional<StepControl> control;  ///< steps follow from a tolerance; none: all are `step` long
     double end = 0.0;                    ///< s, ≥ 0: the time at which the simulation ends; it starts at 0

@@ -32,8 +32,8 @@ struct SolverEffort {
 /// in the same places and H is block-diagonal, a step allocates nothing here.
 class StepSolver {
 public:
-    /// An empty config.name means: by need, the first of a preference list that is installed and can
-    /// (docs/dynamics.md). The registry must outlive the solver.
+    /// An empty config.name means `auto` by its rules for simulations (docs/solvers/auto.md).
+    /// The registry must outlive the solver.
     DELASSUS_API StepSolver(const Registry& registry, SolverConfig config);
     DELASSUS_API ~StepSolver();
     StepSolver(const StepSolver&) = delete;
@@ -59,8 +59,8 @@ public:
     /// The parts that solve() would make of the problem, in its order; nothing is loaded and nothing solved. Parts
     /// with m = 0 go to no plugin.
     [[nodiscard]] DELASSUS_API std::vector<Part> parts(const Problem& problem) const;
-    /// The name of the plugin that takes problems with these needs: the configured one, whatever it can, or the first
-    /// of the preference list that is installed and can; empty if there is none.
+    /// The name of the plugin that takes problems with these needs: the configured one, whatever it can, or the one
+    /// that `auto` starts with; empty if there is none.
     [[nodiscard]] DELASSUS_API std::string choice(std::uint64_t needs) const;
 
     /// The names of the plugins loaded so far.

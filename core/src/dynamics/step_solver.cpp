@@ -6,28 +6,17 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <deque>
-#include <fstream>
-#include <map>
 #include <optional>
+#include <set>
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/problem_view.hpp"
 #include "dynamics/islands.hpp"
+#include "solver/auto_solver.hpp"
 
 namespace delassus {
 
 namespace {
-
-/// The names in the files preference.txt of the plugin folders, in order; lines with # are comments.
-std::vector<std::string> preferences(const Registry& registry) {
-    std::vector<std::string> names;
-    for (const auto& folder : registry.folders()) {
-        std::ifstream file(folder / "preference.txt");
-        for (std::string line; std::getline(file, line);)
-            if (!line.empty() && line[0] != '#') names.push_back(line);
-    }
-    return names;
-}
 
 /// x = H⁻¹ a for an H that is not definite: LU with partial pivoting. Throws StepSolver's sentence if H is singular.
 std::vector<double> solve_by_lu(const PreparedProblem& problem) {
@@ -49,36 +38,14 @@ struct KeptPart {
 
 struct StepSolver::Implementation {
     Implementation(const Registry& known, SolverConfig chosen)
-        : registry(known), config(std::move(chosen)), settings(config.settings()), preferred(preferences(known)) {}
-
-    Solver& named(const std::string& name, std::size_t instance) {
-        auto& instances = solvers[name];
-        while (instances.size() <= instance) {
-            SolverConfig one = config;
-            one.name = name;
-            instances.push_back(make_solver(registry, one));
-        }
-        return instances[instance];
+        : registry(known), config(std::move(chosen)), settings(config.settings()) {
+        if (config.name.empty()) config.name = auto_name;
+        if (config.name == auto_name) config.options.try_emplace("simulation", "true");
     }
 
-    /// Empty if there is none.
-    [[nodiscard]] const std::string& choice(std::uint64_t needs) const {
-        if (!config.name.empty()) return config.name;
-        const auto& plugins = registry.plugins();
-        for (const auto& name : preferred)
-            for (const auto& plugin : plugins)
-                if (plugin.name == name && plugin.missing(needs) == 0) return name;
-        const auto able = std::find_if(plugins.begin(), plugins.end(),
-                                       [&](const PluginInfo& plugin) { return plugin.missing(needs) == 0; });
-        static const std::string none;
-        return able == plugins.end() ? none : able->name;
-    }
-
-    Solver& choose(const PreparedProblem& problem, std::size_t instance) {
-        const std::string& name = choice(problem.needs());
-        if (!name.empty()) return named(name, instance);
-        throw Unsupported(
-            fmt::format("no installed solver can take the step's problem: {}", problem.describe(problem.needs())));
+    Solver& solver(std::size_t instance) {
+        while (solvers.size() <= instance) solvers.push_back(make_solver(registry, config));
+        return solvers[instance];
     }
 
     bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number);
@@ -89,8 +56,8 @@ struct StepSolver::Implementation {
     const Registry& registry;
     SolverConfig config;
     SolveSettings settings;
-    std::vector<std::string> preferred;
-    std::map<std::string, std::vector<Solver>> solvers;  // instances by the number of the part
+    std::vector<Solver> solvers;  // instances by the number of the part
+    std::set<std::string> loaded;
     Islands islands;
     std::deque<KeptPart> parts;  // by the number of the part
     Solution start;
@@ -163,10 +130,12 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
         solution.lambda.clear();
         return true;
     }
-    Solver& solver = choose(prepared, number % most_instances);
+    Solver& solver = this->solver(number % most_instances);
     SolveSettings part_settings = settings;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const auto report = solver.solve(prepared, solution, part_settings);
+    if (report.stages.empty()) loaded.insert(config.name);
+    for (const auto& stage : report.stages) loaded.insert(stage.solver);
     ++effort.plugin_solves;
     effort.iterations += report.iterations;
     effort.seconds += report.seconds_setup + report.seconds_solve;
@@ -196,8 +165,13 @@ std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
     }
     return result;
 }
+
 std::string StepSolver::choice(std::uint64_t needs) const {
-    return implementation_->choice(needs);
+    const auto& config = implementation_->config;
+    if (config.name != auto_name) return config.name;
+    const auto choice =
+        auto_choice(implementation_->registry, config.options, needs, implementation_->settings.tolerance);
+    return choice.first.empty() ? std::string() : choice.first.front();
 }
 
 const SolverEffort& StepSolver::effort() const {
@@ -207,9 +181,7 @@ void StepSolver::reset_effort() {
     implementation_->effort = {};
 }
 std::vector<std::string> StepSolver::loaded() const {
-    std::vector<std::string> names;
-    for (const auto& [name, instances] : implementation_->solvers) names.push_back(name);
-    return names;
+    return {implementation_->loaded.begin(), implementation_->loaded.end()};
 }
 
 }  // namespace delassus

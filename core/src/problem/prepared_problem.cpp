@@ -8,6 +8,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
+#include "problem/need_of.hpp"
 
 namespace delassus {
 
@@ -17,6 +18,8 @@ delassus_matrix raw_of(const SparseMatrix& matrix) {
     return {matrix.rows,          matrix.columns,     matrix.entries(), matrix.row_start.data(),
             matrix.column.data(), matrix.value.data()};
 }
+
+}  // namespace
 
 std::uint64_t need_of(Structure structure) {
     switch (structure) {
@@ -38,7 +41,9 @@ std::uint64_t need_of(Structure structure) {
     return 0;
 }
 
-}  // namespace
+std::uint64_t need_of(Law law) {
+    return law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED;
+}
 
 PreparedProblem::PreparedProblem() : implementation_(std::make_unique<Implementation>()) {}
 
@@ -247,8 +252,7 @@ void PreparedProblem::Implementation::derive_needs() {
 
 void PreparedProblem::Implementation::set_law_needs() {
     raw.needs &= ~static_cast<std::uint64_t>(DELASSUS_CAN_COULOMB | DELASSUS_CAN_ASSOCIATED);
-    if (raw.needs & DELASSUS_CAN_FRICTION)
-        raw.needs |= problem.law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED;
+    if (raw.needs & DELASSUS_CAN_FRICTION) raw.needs |= need_of(problem.law);
 }
 
 void PreparedProblem::Implementation::identify() {

@@ -11,6 +11,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/simulation.hpp"
+#include "solver/auto_solver.hpp"
 
 namespace delassus {
 namespace {
@@ -257,15 +258,29 @@ private:
                                               system_.name, fmt::join(capability_names(all), ", ")));
             if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
                 plan_.solvers.push_back(name);
+            find_later_solvers(all);
         } else {
             nothing_.push_back({"a solver for cones", "no contact, stop or limited motor: every row is bilateral"});
         }
+        if (!plan_.later_solvers.empty())
+            leave(fmt::format("the solvers {}", fmt::join(plan_.later_solvers, ", ")),
+                  fmt::format("loaded only if {} does not reach the tolerance", fmt::join(plan_.solvers, " or ")));
         for (const auto& name : plan_.solvers) {
             const bool chosen = name == system_.solver.name;
-            keep(fmt::format("solver {}", name),
-                 chosen ? "the scene names it" : "the first of the preference list that can take the problems");
+            keep(fmt::format("solver {}", name), chosen ? "the scene names it" : "auto starts with it");
             plan_.libraries.push_back(is_library_path(name) ? name : registry_.find(name).library.filename().string());
         }
+    }
+
+    /// Those that `auto` turns to where the first fails.
+    void find_later_solvers(std::uint64_t needs) {
+        const SolverConfig& solver = system_.solver;
+        if (!solver.name.empty() && solver.name != auto_name) return;
+        OptionTexts options = solver.options;
+        options.try_emplace("simulation", "true");
+        for (auto& name : auto_choice(registry_, options, needs, solver.settings().tolerance).later)
+            if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
+                plan_.later_solvers.push_back(std::move(name));
     }
 
     SceneSystem& system_;

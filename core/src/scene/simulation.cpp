@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "solver/auto_solver.hpp"
 
 namespace delassus {
 namespace {
@@ -27,7 +28,9 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
     try {
         // Checked here without loading the plugin, which may never be needed.
-        if (!system.solver.name.empty()) check_solver(registry, system.solver);
+        SolverConfig solver = system.solver;
+        if (solver.name.empty()) solver.name = auto_name;
+        check_solver(registry, solver);
         timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
         if (system.control)
             control_ = std::make_unique<AdaptiveStepping>(*system.system, *timestepper_, *system.control);

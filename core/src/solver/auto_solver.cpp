@@ -9,6 +9,8 @@
 #include "delassus/config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
+#include "problem/need_of.hpp"
+#include "solver/finished_solver.hpp"
 #include "solver/ranking.hpp"
 #include "solver/solver_implementation.hpp"
 
@@ -27,10 +29,31 @@ fs::path ranking_file(const Registry& registry) {
                     registry.folders().back().string()));
 }
 
+struct AutoOptions {
+    Ranking ranking;
+    bool simulation;
+};
+
+AutoOptions read_options(const Registry& registry, const OptionTexts& options) {
+    const auto values = resolve_options(auto_name, auto_info(registry).options, options);
+    return {Ranking(values[0].text.empty() ? ranking_file(registry) : fs::path(values[0].text)),
+            values[1].integer != 0};
+}
+
+/// Whether this plugin is installed and has all these capabilities.
+bool can(const Registry& registry, const std::string& name, std::uint64_t needs) {
+    const auto& plugins = registry.plugins();
+    return std::any_of(plugins.begin(), plugins.end(),
+                       [&](const PluginInfo& plugin) { return plugin.name == name && plugin.missing(needs) == 0; });
+}
+
 class AutoSolver : public Solver::Implementation {
 public:
     AutoSolver(const Registry& registry, OptionTexts options)
-        : registry_(registry), info_(auto_info(registry)), options_(std::move(options)), ranking_(file()) {}
+        : registry_(registry),
+          info_(auto_info(registry)),
+          options_(std::move(options)),
+          chosen_(read_options(registry, options_)) {}
 
     [[nodiscard]] const PluginInfo& info() const override { return info_; }
     [[nodiscard]] const OptionTexts& options() const override { return options_; }
@@ -43,17 +66,20 @@ public:
 
     void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
              SolveReport& report) override {
-        const RankingRule& rule = ranking_.rule(problem, settings.tolerance);
+        const std::uint64_t needs = needs_of(problem, {});
+        const RankingRule& rule =
+            chosen_.ranking.rule({needs, settings.tolerance, chosen_.simulation}, problem.raw().m);
         StageRunner runner(problem, solution, settings, report);
         bool done = false;
         for (const auto& ranked : rule.stages) {
             Solver* solver = usable(ranked, runner.problem_of(ranked.stage));
-            if (solver) done = runner.run(*solver, ranked.stage);
+            if (!solver) continue;
+            done = runner.run(*solver, ranked.stage) || ranked.last;
             if (done) break;
         }
         // Nothing of the rule is installed, or none got there: everyone else who can, from the best so far.
         if (!done)
-            for (const auto& name : registry_.capable(needs_of(problem, {}))) {
+            for (const auto& name : registry_.capable(needs)) {
                 const RankedStage ranked{name, {}, {.reason = "those before it did not get there", .watched = true}};
                 const bool tried =
                     std::any_of(report.stages.begin(), report.stages.end(), [&](const StageReport& stage) {
@@ -66,19 +92,9 @@ public:
     }
 
 private:
-    [[nodiscard]] fs::path file() const {
-        const auto values = resolve_options(auto_name, info_.options, options_);
-        return values[0].text.empty() ? ranking_file(registry_) : fs::path(values[0].text);
-    }
-
     /// The solver of a stage, kept from problem to problem; null if it is not installed or cannot take the problem.
     Solver* usable(const RankedStage& ranked, const PreparedProblem& problem) {
-        const std::uint64_t needs = needs_of(problem, {});
-        const auto& plugins = registry_.plugins();
-        if (std::none_of(plugins.begin(), plugins.end(), [&](const PluginInfo& plugin) {
-                return plugin.name == ranked.solver && plugin.missing(needs) == 0;
-            }))
-            return nullptr;
+        if (!can(registry_, ranked.solver, needs_of(problem, {}))) return nullptr;
         const auto key = std::make_pair(ranked.solver, ranked.options);
         auto place = solvers_.find(key);
         if (place == solvers_.end())
@@ -89,7 +105,7 @@ private:
     const Registry& registry_;
     PluginInfo info_;
     OptionTexts options_;
-    Ranking ranking_;
+    AutoOptions chosen_;
     std::map<std::pair<std::string, OptionTexts>, Solver> solvers_;
 };
 
@@ -108,13 +124,56 @@ PluginInfo auto_info(const Registry& registry) {
                      0.0,
                      {},
                      "",
-                     "File that says who solves what; empty: ranking.json of the plugin folders"}};
+                     "File that says who solves what; empty: ranking.json of the plugin folders"},
+                    {"simulation",
+                     DELASSUS_OPTION_BOOLEAN,
+                     "false",
+                     0.0,
+                     0.0,
+                     {},
+                     "",
+                     "The problems are steps of a simulation, each near to the one before"}};
     for (const auto& plugin : registry.plugins()) info.capabilities |= plugin.capabilities;
     return info;
 }
 
 Solver make_auto(const Registry& registry, OptionTexts options) {
     return Solver(std::make_unique<AutoSolver>(registry, std::move(options)));
+}
+
+AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs, double tolerance) {
+    static_cast<void>(take_finish(options));
+    AutoChoice choice;
+    const auto add = [&](std::vector<std::string>& names, const std::string& name) {
+        for (const auto* list : {&choice.first, &choice.later})
+            if (std::find(list->begin(), list->end(), name) != list->end()) return;
+        names.push_back(name);
+    };
+    const AutoOptions chosen = read_options(registry, options);
+    const auto rules = chosen.ranking.rules({needs, tolerance, chosen.simulation});
+    const auto able = [&](const RankedStage& ranked) {
+        std::uint64_t own = needs;
+        if (const auto law = ranked.stage.law; law && (needs & DELASSUS_CAN_FRICTION))
+            own = (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
+        return can(registry, ranked.solver, own);
+    };
+    for (const auto* rule : rules) {
+        const auto start = std::find_if(rule->stages.begin(), rule->stages.end(), able);
+        if (start != rule->stages.end()) add(choice.first, start->solver);
+    }
+    bool others = false;
+    for (const auto* rule : rules) {
+        bool ends = false;
+        for (const auto& ranked : rule->stages) {
+            if (ends || !able(ranked)) continue;
+            add(choice.later, ranked.solver);
+            ends = ranked.last;
+        }
+        others = others || !ends;
+    }
+    if (others)
+        for (const auto& name : registry.capable(needs)) add(choice.first.empty() ? choice.first : choice.later, name);
+    return choice;
 }
 
 }  // namespace delassus

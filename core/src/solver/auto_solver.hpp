@@ -2,6 +2,10 @@
 // `auto`: the solver that chooses solvers.
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
 
@@ -16,5 +20,14 @@ inline constexpr const char* ranking_file_name = "ranking.json";
 
 /// Throws InputError on a bad option or ranking. The registry must outlive the solver.
 [[nodiscard]] Solver make_auto(const Registry& registry, OptionTexts options);
+
+/// The plugins that `auto` may load for problems with these needs (DELASSUS_CAN_* bits), of whatever size.
+struct AutoChoice {
+    std::vector<std::string> first;  ///< that start; more than one where it depends on m
+    std::vector<std::string> later;  ///< that are loaded where those before them do not get there
+};
+/// options: as configured. Throws as make_auto.
+[[nodiscard]] DELASSUS_API AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs,
+                                                  double tolerance);
 
 }  // namespace delassus

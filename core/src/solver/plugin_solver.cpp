@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "problem/infeasibility.hpp"
 #include "solver/solver_implementation.hpp"
 
 namespace delassus {
@@ -108,6 +109,17 @@ Status status_of(std::int32_t raw) {
         default:
             return Status::Error;
     }
+}
+
+/// That there is no solution is a claim like others.
+void check_proof(const PreparedProblem& problem, const Solution& answer, SolveReport& report) {
+    const double size = proven_size(problem, answer.x, answer.lambda);
+    if (size >= beyond_all_sizes) return;
+    report.status = Status::FalseClaim;
+    report.message = fmt::format(
+        "{} claimed that there is no solution; its answer proves only that none is smaller than {:.1e} in units of the "
+        "data",
+        report.solver, size);
 }
 
 class PluginSolver : public Solver::Implementation {
@@ -238,6 +250,7 @@ void PluginSolver::run(const PreparedProblem& problem, Solution& solution, const
     report.status = status_of(raw_status);
     if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
     if (outcome.message) report.message = outcome.message;
+    if (report.status == Status::Infeasible) check_proof(problem, solution, report);
     if (report.status == Status::Error || report.status == Status::NumericalFailure)
         report.message = fmt::format("{}: {}", info().name, last_error(solver));
     if (settings.record_curve)

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delassus/error.hpp"
+#include "problem/need_of.hpp"
 #include "support/nearest_name.hpp"
 #include "support/text_file.hpp"
 
@@ -31,7 +32,8 @@ Structure structure_of(const std::string& name) {
 }
 
 RankedStage read_stage(const Json& json) {
-    check_keys(json, {"solver", "options", "tolerance", "max_iterations", "watched", "law", "reason"}, "a stage");
+    check_keys(json, {"solver", "options", "tolerance", "max_iterations", "watched", "last", "law", "reason"},
+               "a stage");
     RankedStage ranked;
     ranked.solver = json.at("solver").get<std::string>();
     if (json.contains("options")) ranked.options = json.at("options").get<OptionTexts>();
@@ -39,6 +41,7 @@ RankedStage read_stage(const Json& json) {
     ranked.stage.tolerance = json.value("tolerance", 0.0);
     ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
     ranked.stage.watched = json.value("watched", false);
+    ranked.last = json.value("last", false);
     if (json.contains("law")) ranked.stage.law = law_of(json.at("law").get<std::string>());
     return ranked;
 }
@@ -48,12 +51,11 @@ RankingRule read_rule(const Json& json) {
     RankingRule rule;
     rule.name = json.at("name").get<std::string>();
     const Json& when = json.at("when");
-    check_keys(when, {"linear", "law", "structure", "m", "tolerance"}, fmt::format("\"when\" of \"{}\"", rule.name));
-    if (when.contains("linear")) {
-        rule.any_cones = false;
-        rule.linear = when.at("linear").get<bool>();
-    }
-    if (when.contains("law")) rule.laws = {law_of(when.at("law").get<std::string>())};
+    check_keys(when, {"linear", "simulation", "law", "structure", "m", "tolerance"},
+               fmt::format("\"when\" of \"{}\"", rule.name));
+    if (when.contains("linear")) rule.linear = when.at("linear").get<bool>();
+    if (when.contains("simulation")) rule.simulation = when.at("simulation").get<bool>();
+    if (when.contains("law")) rule.law = law_of(when.at("law").get<std::string>());
     if (when.contains("structure"))
         for (const auto& name : when.at("structure")) rule.structures.push_back(structure_of(name));
     if (when.contains("m")) {
@@ -70,16 +72,16 @@ RankingRule read_rule(const Json& json) {
 
 }  // namespace
 
-bool RankingRule::matches(const PreparedProblem& problem, double tolerance) const {
-    const auto& data = problem.problem();
-    const auto among = [](const auto& list, auto value) {
-        return list.empty() || std::find(list.begin(), list.end(), value) != list.end();
-    };
-    const bool is_linear =
-        std::all_of(data.cones.begin(), data.cones.end(), [](const Cone& cone) { return cone.kind == ConeKind::Free; });
-    return (any_cones || linear == is_linear) && among(laws, data.law) && among(structures, problem.structure()) &&
-           data.m() >= smallest_m && data.m() <= largest_m && tolerance >= smallest_tolerance &&
-           tolerance <= largest_tolerance;
+bool RankingRule::matches(const RankedNeeds& asked) const {
+    constexpr std::uint64_t cones = DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
+    if (linear && *linear != ((asked.needs & cones) == 0)) return false;
+    if (simulation && *simulation != asked.simulation) return false;
+    if (law && (asked.needs & need_of(*law)) == 0) return false;
+    if (!structures.empty() && std::none_of(structures.begin(), structures.end(), [&](Structure structure) {
+            return (asked.needs & need_of(structure)) != 0;
+        }))
+        return false;
+    return asked.tolerance >= smallest_tolerance && asked.tolerance <= largest_tolerance;
 }
 
 Ranking::Ranking(const std::filesystem::path& file) {
@@ -97,9 +99,19 @@ Ranking::Ranking(const std::filesystem::path& file) {
     }
 }
 
-const RankingRule& Ranking::rule(const PreparedProblem& problem, double tolerance) const {
+const RankingRule& Ranking::rule(const RankedNeeds& asked, std::int32_t m) const {
     return *std::find_if(rules_.begin(), rules_.end(),
-                         [&](const RankingRule& rule) { return rule.matches(problem, tolerance); });
+                         [&](const RankingRule& rule) { return rule.matches(asked) && rule.takes(m); });
+}
+
+std::vector<const RankingRule*> Ranking::rules(const RankedNeeds& asked) const {
+    std::vector<const RankingRule*> found;
+    for (const auto& rule : rules_) {
+        if (!rule.matches(asked)) continue;
+        found.push_back(&rule);
+        if (rule.smallest_m == 0 && rule.largest_m == RankingRule{}.largest_m) break;  // none comes after it
+    }
+    return found;
 }
 
 }  // namespace delassus

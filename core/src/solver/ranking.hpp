@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,19 +18,30 @@ struct RankedStage {
     std::string solver;
     OptionTexts options;
     Stage stage;
+    bool last = false;  ///< where this one does not get there, neither would any other: nobody comes after it
+};
+
+/// What a rule looks at, apart from m.
+struct RankedNeeds {
+    std::uint64_t needs = 0;  ///< DELASSUS_CAN_* bits of the problem
+    double tolerance = 0.0;
+    bool simulation = false;  ///< a step of a simulation
 };
 
 /// Stages for the problems that it matches.
 struct RankingRule {
     std::string name;
-    bool any_cones = true, linear = false;  ///< linear: free rows only
-    std::vector<Law> laws;                  ///< none: any
-    std::vector<Structure> structures;      ///< none: any
+    std::optional<bool> linear;         ///< free rows only, or others too
+    std::optional<bool> simulation;     ///< a step of a simulation, or a problem by itself
+    std::optional<Law> law;             ///< of problems with friction
+    std::vector<Structure> structures;  ///< none: any
     std::int32_t smallest_m = 0, largest_m = std::numeric_limits<std::int32_t>::max();
     double smallest_tolerance = 0.0, largest_tolerance = std::numeric_limits<double>::infinity();
     std::vector<RankedStage> stages;
 
-    [[nodiscard]] bool matches(const PreparedProblem& problem, double tolerance) const;
+    /// For some m.
+    [[nodiscard]] bool matches(const RankedNeeds& asked) const;
+    [[nodiscard]] bool takes(std::int32_t m) const { return m >= smallest_m && m <= largest_m; }
 };
 
 class Ranking {
@@ -38,7 +50,9 @@ public:
     explicit Ranking(const std::filesystem::path& file);
 
     /// The first rule that matches. The last rule of a ranking matches everything (checked when it is read).
-    [[nodiscard]] const RankingRule& rule(const PreparedProblem& problem, double tolerance) const;
+    [[nodiscard]] const RankingRule& rule(const RankedNeeds& asked, std::int32_t m) const;
+    /// The rules that some m leads to.
+    [[nodiscard]] std::vector<const RankingRule*> rules(const RankedNeeds& asked) const;
 
 private:
     std::vector<RankingRule> rules_;

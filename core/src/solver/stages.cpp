@@ -80,7 +80,7 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
     add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, result.status, result.message,
          result.iterations, result.seconds_setup + result.seconds_solve, error.natural},
         result);
-    if (result.status == Status::Cancelled) return true;
+    if (result.status == Status::Cancelled || (result.status == Status::Infeasible && !other)) return true;
     if (worst_of(error) <= settings_.tolerance ||
         (result.status == Status::Solved && tolerance == settings_.tolerance && !other)) {
         report_.status = Status::Solved;

@@ -57,7 +57,8 @@ public:
     /// The problem as the stage's solver sees it: the own one, or a copy under the other law, which is made once.
     [[nodiscard]] const PreparedProblem& problem_of(const Stage& stage);
 
-    /// Runs one stage. True if nothing is left to do: solved, cancelled, or a limit of the whole solve reached.
+    /// Runs one stage. True if nothing is left to do: solved, proven infeasible, cancelled, or a limit of the whole
+    /// solve reached.
     bool run(Solver& solver, const Stage& stage);
 
     /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".

@@ -20,7 +20,7 @@ struct RecordedSeries {
 };
 
 struct RecordedSystem {
-    std::string name, integrator, solver;  ///< solver: empty if it was chosen by need
+    std::string name, integrator, solver;  ///< solver: empty if none was named
     double step = 0.0;                     ///< s
     TrajectoryModel model;
     std::int64_t steps = 0;   ///< taken

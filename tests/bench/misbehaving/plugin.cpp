@@ -15,8 +15,8 @@ namespace {
 
 using namespace delassus::sdk;
 
-constexpr const char* behaviours[] = {"solve", "slow", "crash", "crash_late", "hang", "deaf",
-                                      "lie",   "nan",  "print", "exit",       "throw"};
+constexpr const char* behaviours[] = {"solve", "slow", "crash", "crash_late", "hang",  "deaf",
+                                      "lie",   "nan",  "print", "exit",       "throw", "despair"};
 
 class Misbehaving : public Solver {
 public:
@@ -32,6 +32,7 @@ public:
         if (behaviour_ == "throw") throw std::runtime_error("the matrix is on fire");
         if (behaviour_ == "print") std::puts("{\"event\":\"done\"}");
         if (behaviour_ == "lie") return {DELASSUS_SOLVED, 1, 0.0, ""};
+        if (behaviour_ == "despair") return {DELASSUS_INFEASIBLE, 1, 0.0, "there is no solution"};
         if (behaviour_ == "nan") {
             lambda.setConstant(std::nan(""));
             return {DELASSUS_SOLVED, 1, 0.0, ""};

@@ -7,18 +7,19 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "delassus/sdk/dissection.hpp"
 #include "delassus/sdk/problem_view.hpp"
 
 namespace delassus::sdk {
 
 /// The multifrontal method (Duff and Reid 1983; Liu 1992): columns of L with nearly the same pattern form a supernode,
 /// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
-/// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD.
+/// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD, or nested
+/// dissection where that takes fewer operations.
 class SparseFactor {
 public:
     /// The rows of a matrix by the supernodes that they reach in half solves.
@@ -53,6 +54,9 @@ public:
     void half_solve(const SparseRowsView& D, const Reach& reach, Visitor&& visit) const;
 
 private:
+    void analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive,
+                 std::vector<std::int32_t> position);
+
     struct Supernode {
         std::int32_t first = 0, columns = 0;  // of L
         std::int32_t height = 0;              // rows of the front: its columns, then those of the update
@@ -72,6 +76,7 @@ private:
     void add_update(std::size_t child);
     [[nodiscard]] bool eliminate(std::size_t node);
 
+    static std::vector<std::int32_t> minimum_degree(const Eigen::Ref<const SparseColumns>& matrix);
     static std::vector<std::int32_t> elimination_tree(const SparseColumns& lower);
     static std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent);
     static SparseColumns permute(const Eigen::Ref<const SparseColumns>& matrix,
@@ -83,11 +88,11 @@ private:
 
     Eigen::Index size_ = 0, positive_ = 0;
     std::vector<std::int32_t> analyzed_start_, analyzed_row_;  // the pattern of the last analysis
-    double entries_ = 0.0;
-    std::vector<std::int32_t> position_;  // of each row of the matrix, in L
-    std::vector<std::int32_t> node_of_;   // supernode of each column of L
-    std::vector<double> sign_;            // of each pivot, in the order of L
-    std::vector<Supernode> nodes_;        // children before parents
+    double entries_ = 0.0, flops_ = 0.0;                       // flops_: about, up to a factor
+    std::vector<std::int32_t> position_;                       // of each row of the matrix, in L
+    std::vector<std::int32_t> node_of_;                        // supernode of each column of L
+    std::vector<double> sign_;                                 // of each pivot, in the order of L
+    std::vector<Supernode> nodes_;                             // children before parents
     std::vector<std::int32_t> row_;
     // Beside row_, for the rows of the update: their rows in the parent's front.
     std::vector<std::int32_t> place_in_parent_;
@@ -175,26 +180,42 @@ inline std::vector<std::int32_t> SparseFactor::postorder(const std::vector<std::
     return position;
 }
 
+/// New positions by approximate minimum degree.
+inline std::vector<std::int32_t> SparseFactor::minimum_degree(const Eigen::Ref<const SparseColumns>& matrix) {
+    std::vector<std::int32_t> position(static_cast<std::size_t>(matrix.rows()));
+    if (position.empty()) return position;
+    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, std::int32_t> order;
+    Eigen::AMDOrdering<std::int32_t>()(matrix.selfadjointView<Eigen::Lower>(), order);
+    for (Eigen::Index k = 0; k < matrix.rows(); ++k)
+        position[static_cast<std::size_t>(order.indices()[k])] = static_cast<std::int32_t>(k);
+    return position;
+}
+
 inline bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
+    constexpr Eigen::Index smallest_to_dissect = 1000;
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     if (size_ == matrix.rows() && positive_ == positive &&
         std::equal(analyzed_start_.begin(), analyzed_start_.end(), start, start + matrix.cols() + 1) &&
         std::equal(analyzed_row_.begin(), analyzed_row_.end(), row, row + matrix.nonZeros()))
         return false;
+    analyze(matrix, positive, minimum_degree(matrix));
+    // Dissection is worth its time where the fill is large.
+    if (entries_ >= 10.0 * static_cast<double>(matrix.nonZeros()) && size_ >= smallest_to_dissect) {
+        SparseFactor other;
+        other.analyze(matrix, positive, nested_dissection(matrix));
+        if (other.flops_ < flops_) *this = std::move(other);
+    }
     analyzed_start_.assign(start, start + matrix.cols() + 1);
     analyzed_row_.assign(row, row + matrix.nonZeros());
+    return true;
+}
+
+inline void SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive,
+                                  std::vector<std::int32_t> position) {
     size_ = matrix.rows();
     positive_ = positive;
     const auto n = static_cast<std::size_t>(size_);
-    position_.resize(n);
-    std::iota(position_.begin(), position_.end(), 0);
-    if (size_ > 0) {
-        Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, std::int32_t> order;
-        Eigen::AMDOrdering<std::int32_t>()(matrix.selfadjointView<Eigen::Lower>(), order);
-        for (std::size_t k = 0; k < n; ++k)
-            position_[static_cast<std::size_t>(order.indices()[static_cast<Eigen::Index>(k)])] =
-                static_cast<std::int32_t>(k);
-    }
+    position_ = std::move(position);
     const std::vector<std::int32_t> parent = elimination_tree(permute(matrix, position_));
     const std::vector<std::int32_t> post = postorder(parent);
     std::vector<std::int32_t> moved(n, -1);
@@ -257,7 +278,7 @@ inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const s
 
     nodes_.clear();
     row_.clear();
-    entries_ = 0.0;
+    entries_ = flops_ = 0.0;
     node_of_.resize(n);
     for (const Run& run : runs) {
         Supernode node;
@@ -273,6 +294,7 @@ inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const s
         }
         row_.insert(row_.end(), run.below.begin(), run.below.end());
         entries_ += static_cast<double>(node.height) * node.columns;
+        flops_ += static_cast<double>(node.height) * node.height * node.columns;
         nodes_.push_back(node);
     }
     for (Supernode& node : nodes_)
