@@ -17,9 +17,9 @@ namespace delassus::bench {
 struct WorkerSettings {
     std::filesystem::path command;  ///< the delassus command, absolute
     std::vector<std::filesystem::path> plugin_path;
-    std::uint64_t memory_limit = 0;    ///< bytes of address space for each; 0 for none
-    std::uint64_t resident_limit = 0;  ///< bytes resident in each; 0 for none
+    std::uint64_t memory_limit = 0;   ///< bytes of address space for each; 0 for none
     std::function<bool()> cancelled;  ///< true: end the one that runs with what it has reached. May be empty.
+    std::uint64_t resident_limit = 0;  ///< bytes resident in each; 0 for none
 };
 
 /// Where a worker takes a problem from: a file, or a generator with its parameters (delassus/generate.hpp).
@@ -40,7 +40,7 @@ struct MeasureRequest {
     SolverConfig solver;  ///< name and options; the rest is in settings
     ComparisonSettings settings;
     std::filesystem::path solution;   ///< folder for x and λ, which must not exist; may be empty
-    std::filesystem::path reference;  ///< solution folder that velocities are compared with; may be empty
+    std::filesystem::path reference = {};  ///< solution folder that velocities are compared with; may be empty
 };
 
 /// Seconds beyond the time limit after which a solver that gives no sign counts as hung.
