@@ -5,9 +5,10 @@ const results = JSON.parse(document.getElementById("results").textContent);
 const solverLabels = [...new Set(results.solves.map((row) => row.label))];
 const steppers = [...new Set(results.simulations.map((row) => row.timestepper))];
 const seriesNames = [...solverLabels, ...steppers];
-const colourOf = (name) => colours[seriesNames.indexOf(name) % colours.length];
+const placeOf = (name) => Math.max(solverLabels.indexOf(name), steppers.indexOf(name));
+const colourOf = (name) => colours[placeOf(name) % colours.length];
 // Beyond the colours, lines of the same colour differ by their dashes.
-const dashOf = (name) => ["solid", "dashed", "dotted"][Math.floor(seriesNames.indexOf(name) / colours.length) % 3];
+const dashOf = (name) => ["solid", "dashed", "dotted"][Math.floor(placeOf(name) / colours.length) % 3];
 const problemOf = Object.fromEntries(results.problems.map((problem) => [problem.problem, problem]));
 const sceneOf = Object.fromEntries(results.scenes.map((scene) => [scene.scene, scene]));
 const solvedRow = (row) => row.cause === "";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Over all problems: performance profiles, means, growth with size, failures, references, libraries.
 "use strict";
-const classTitles = { linear: "Linear problems", associated: "Contacts, associated law", coulomb: "Contacts, exact Coulomb law", all: "All problems" };
+const classTitles = { linear: "Linear problems", unsymmetric: "Linear problems, H unsymmetric", indefinite: "Linear problems, H indefinite", associated: "Contacts, associated law", coulomb: "Contacts, exact Coulomb law", all: "All problems" };
 
 // ρ(τ) as a staircase: it jumps by 1/problems at each ratio, and goes on to the right edge.
 function staircase(ratios, problems, right) {

@@ -36,12 +36,15 @@ std::string problem_of(const Json& row) {
     return row.at("problem").get<std::string>() + row.at("law").get<std::string>();
 }
 
-/// "linear" where all rows are free, else the law: problems that the same solvers can take.
+/// "linear" (or "unsymmetric", "indefinite" by H) where all rows are free, else the law: problems that the same solvers
+/// can take.
 std::string class_of(const Json& row, const std::map<std::string, const Json*>& problems) {
     const auto problem = problems.find(row.at("problem"));
     if (problem != problems.end()) {
         const Json& cones = problem->second->at("cones");
-        if (cones.size() == (cones.contains("free") ? 1U : 0U)) return "linear";
+        const std::string structure = problem->second->at("structure");
+        if (cones.size() == (cones.contains("free") ? 1U : 0U))
+            return structure == "unsymmetric" || structure == "indefinite" ? structure : "linear";
     }
     return row.at("law");
 }
@@ -143,8 +146,15 @@ Json analyse_scaling(const Rows& rows, const std::map<std::string, const Json*>&
     return list;
 }
 
+/// Below this multiple of the reference's own error, an error says more of the reference.
+constexpr double above_reference = 3.0;
+
 /// Error of a trajectory's end against the step, for each scene, timestepper and solver.
-Json analyse_orders(const std::vector<Json>& simulations) {
+Json analyse_orders(const std::vector<Json>& simulations, const std::vector<Json>& references) {
+    std::map<std::string, double> own_errors;
+    for (const Json& reference : references)
+        if (reference.contains("step") && reference.contains("second"))
+            own_errors[reference.at("of")] = number_of(reference.at("second").at("position"));
     std::map<std::string, std::pair<Json, std::map<double, const Json*>>> groups;
     std::vector<std::string> order;
     for (const Json& row : simulations) {
@@ -162,7 +172,8 @@ Json analyse_orders(const std::vector<Json>& simulations) {
         std::vector<double> steps, errors;
         for (const auto& [step, row] : by_step) {
             const double error = number_of(row->at("error").at("position"));
-            if (!(error > 0.0)) continue;
+            const auto own = own_errors.find(row->at("scene"));
+            if (!(error > 0.0) || (own != own_errors.end() && !(error > above_reference * own->second))) continue;
             steps.push_back(step);
             errors.push_back(error);
         }
@@ -221,7 +232,7 @@ Json analyse(const ResultSet& results) {
     if (names.size() > 1) classes.push_back(analyse_class("all", rows, settings));
     return {{"classes", classes},
             {"scaling", analyse_scaling(rows, problems)},
-            {"orders", analyse_orders(results.simulations)},
+            {"orders", analyse_orders(results.simulations, results.references)},
             {"failures", count_failures(rows)},
             {"recording", recording_ratio(rows)}};
 }

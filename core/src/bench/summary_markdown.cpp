@@ -65,6 +65,8 @@ std::string name_of_hash(const std::vector<Json>& rows, const char* key, const J
 const std::map<std::string, std::string>& class_titles() {
     static const std::map<std::string, std::string> titles = {
         {"linear", "Linear problems (free rows only)"},
+        {"unsymmetric", "Linear problems, H unsymmetric"},
+        {"indefinite", "Linear problems, H indefinite"},
         {"associated", "Contact problems, associated law"},
         {"coulomb", "Contact problems, exact Coulomb law"},
         {"all", "All problems"}};
