@@ -48,9 +48,10 @@ int run_bench(const BenchArguments& arguments) {
     const Registry registry(folders);
     bench::RunPlan plan;
     plan.suite = bench::read_suite(bench::find_suite(arguments.suite), registry);
-    plan.output = !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
-    plan.cache = fs::absolute(!arguments.cache.empty() ? arguments.cache
-                                                       : bench::cache_folder(plan.output / "references"));
+    plan.output =
+        !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
+    plan.cache =
+        fs::absolute(!arguments.cache.empty() ? arguments.cache : bench::cache_folder(plan.output / "references"));
     plan.worker.command = own_program();
     plan.worker.plugin_path = folders;
     plan.worker.cancelled = interrupted;
@@ -83,8 +84,8 @@ int compare_results(const BenchArguments& arguments) {
     if (arguments.json) {
         fmt::print("{}\n", bench::text_of(comparison, 1));
     } else {
-        fmt::print("A is {}, B is {}; ratios of setup and solve, below 1 where B is faster\n\n{}", arguments.before.string(),
-                   arguments.after.string(), bench::compare_text(comparison));
+        fmt::print("A is {}, B is {}; ratios of setup and solve, below 1 where B is faster\n\n{}",
+                   arguments.before.string(), arguments.after.string(), bench::compare_text(comparison));
     }
     return exit_solved;
 }

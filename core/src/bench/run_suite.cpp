@@ -102,7 +102,8 @@ private:
         const Measurement row = measure(plan_.worker, request, listener_.on_sample);
         if (stopped()) return;  // what was interrupted is run again
         if (libraries_.insert(solver.name).second && !row.libraries.empty())
-            file_.add({{"kind", "libraries"}, {"solver", solver.name}, {"version", row.version}, {"files", row.libraries}});
+            file_.add(
+                {{"kind", "libraries"}, {"solver", solver.name}, {"version", row.version}, {"files", row.libraries}});
         file_.add(solve_row(task.key, problem.facts.hash, task.law, task.tolerance, row));
         ++counts_.done;
     }
@@ -178,7 +179,8 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
                                      plan.suite.left_out.empty() ? "it names no solver" : plan.suite.left_out.front()));
 
     file.add(session_row(plan, tasks, code));
-    for (const auto& problem : tasks.problems) file.add(problem_row(problem.facts, {problem.source, problem.name, problem.family}));
+    for (const auto& problem : tasks.problems)
+        file.add(problem_row(problem.facts, {problem.source, problem.name, problem.family}));
     for (const auto& scene : tasks.scenes)
         file.add({{"kind", "scene"},
                   {"scene", scene.facts.hash},

@@ -41,15 +41,15 @@ struct SimulateRequest {
 };
 
 struct SimulationMeasurement {
-    /// finished, unsolved (steps missed the solver's tolerance), failed (a step could not be taken), diverged, time_limit,
-    /// unsupported, crashed, hung, memory, cancelled, error.
+    /// finished, unsolved (steps missed the solver's tolerance), failed (a step could not be taken), diverged,
+    /// time_limit, unsupported, crashed, hung, memory, cancelled, error.
     std::string status;
     std::string message;
-    double setup = unknown, seconds = unknown;  ///< s, the least of the repeats
-    std::vector<double> repeats;                ///< s of stepping of each
+    double setup = unknown, seconds = unknown;      ///< s, the least of the repeats
+    std::vector<double> repeats;                    ///< s of stepping of each
     double position = unknown, velocity = unknown;  ///< distance of the end from the reference's, relative (docs)
-    Json totals = Json::object();                   ///< steps, Newton and solver iterations, energy, drift, penetration, …
-    std::int64_t peak_memory = 0;                   ///< bytes resident
+    Json totals = Json::object();  ///< steps, Newton and solver iterations, energy, drift, penetration, …
+    std::int64_t peak_memory = 0;  ///< bytes resident
     std::vector<std::string> libraries;
 };
 

@@ -32,8 +32,8 @@ struct SuiteTimestepper {
 
 struct SuiteScene {
     SceneSource source;
-    std::string name;           ///< the file's, without its ending, if none is given
-    std::vector<double> steps;  ///< s, in place of the timesteppers' and the suite's; may be empty
+    std::string name;                            ///< the file's, without its ending, if none is given
+    std::vector<double> steps;                   ///< s, in place of the timesteppers' and the suite's; may be empty
     std::vector<SuiteTimestepper> timesteppers;  ///< in place of the suite's; may be empty
     // What the end is measured against.
     std::string reference_timestepper;  ///< empty: the suite's
@@ -58,9 +58,9 @@ struct Suite {
     std::vector<std::string> laws = {""};  ///< "" is each problem's own
     std::vector<double> tolerances = {1e-3, 1e-6, 1e-9};
     std::vector<SuiteScene> scenes;
-    std::vector<SuiteTimestepper> timesteppers;     ///< empty: the scene's own
-    std::vector<double> steps;                      ///< s; empty: the scene's own
-    std::vector<std::string> step_solvers = {""};   ///< of scenes; "" is the scene's own, or by need
+    std::vector<SuiteTimestepper> timesteppers;    ///< empty: the scene's own
+    std::vector<double> steps;                     ///< s; empty: the scene's own
+    std::vector<std::string> step_solvers = {""};  ///< of scenes; "" is the scene's own, or by need
     SuiteReferences references;
     int repeats = 3;
     double time_limit = 10.0;   ///< s of the solver's own time, or of stepping, for each run
@@ -69,8 +69,8 @@ struct Suite {
     std::vector<std::string> left_out;  ///< sentences: optional files that are not there, solvers that were not built
 };
 
-/// Reads the suite; folders are listed and sweeps expanded, nothing is loaded or run. Throws InputError with file, line,
-/// key and the nearest valid key.
+/// Reads the suite; folders are listed and sweeps expanded, nothing is loaded or run. Throws InputError with file,
+/// line, key and the nearest valid key.
 [[nodiscard]] Suite read_suite(const std::filesystem::path& file, const Registry& registry);
 
 struct ShippedSuite {

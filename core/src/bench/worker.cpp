@@ -134,8 +134,8 @@ void measure(const Channel& channel, const Json& request) {
         write_solution(solution, {}, folder);
     double velocity = std::numeric_limits<double>::quiet_NaN();
     if (const auto folder = request.at("reference").get<std::string>(); !folder.empty())
-        velocity = problem.meter().velocity(
-            solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
+        velocity =
+            problem.meter().velocity(solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
     Json stages = Json::array();
     for (const StageReport& stage : report.stages) stages.push_back(stage.solver);
     const CurveSample last = report.curve.empty() ? CurveSample{} : report.curve.back();
@@ -188,7 +188,8 @@ std::set<std::string> mapped_libraries() {
     std::set<std::string> names;
     std::ifstream maps("/proc/self/maps");
     for (std::string line; std::getline(maps, line);)
-        if (const auto slash = line.rfind('/'); slash != std::string::npos && line.find(".so", slash) != std::string::npos)
+        if (const auto slash = line.rfind('/');
+            slash != std::string::npos && line.find(".so", slash) != std::string::npos)
             names.insert(line.substr(slash + 1));
     return names;
 }
