@@ -19,6 +19,9 @@ install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp"
 install(EXPORT delassusSdkTargets NAMESPACE delassus:: DESTINATION ${package_directory})
 install(EXPORT delassusCoreTargets NAMESPACE delassus:: DESTINATION ${package_directory})
 install(FILES "${DELASSUS_PLUGIN_DIRECTORY}/not-built.list" DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/plugins)
+# The suites of `delassus bench`, with what they name; they are found beside libdelassus, in the build tree too.
+file(CREATE_LINK "${PROJECT_SOURCE_DIR}/examples" "${DELASSUS_MODULE_DIRECTORY}/examples" SYMBOLIC)
+install(DIRECTORY examples/suites examples/problems examples/scenes DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/examples COMPONENT command)
 install(FILES "${PROJECT_SOURCE_DIR}/docs/scene.schema.json" DESTINATION ${CMAKE_INSTALL_DATADIR}/delassus)
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

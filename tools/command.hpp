@@ -25,6 +25,7 @@ void add_run(CLI::App& program, Action& action);
 void add_view(CLI::App& program, Action& action);
 void add_plan(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);
+void add_bench(CLI::App& program, Action& action);
 void add_plugins(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
 void add_inspect(CLI::App& program, Action& action);

@@ -3,16 +3,12 @@
 #include "bench/compare.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
-#include <chrono>
 #include <cmath>
-#include <fstream>
-#include <optional>
 
 #include "bench/writers.hpp"
 #include "command.hpp"
 #include "delassus/error.hpp"
+#include "measuring.hpp"
 #include "process/child_process.hpp"
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"
@@ -55,51 +51,11 @@ void check(const CompareArguments& arguments) {
     if (!arguments.law.empty()) static_cast<void>(law_of(arguments.law));
 }
 
-/// The one line on a terminal that says where the comparison is.
-class Progress {
-public:
-    explicit Progress(bool shown) : shown_(shown) {}
-    ~Progress() { clear(); }
-    Progress(const Progress&) = delete;
-    Progress& operator=(const Progress&) = delete;
-
-    void begin(const std::string& what) {
-        what_ = what;
-        show("");
-    }
-    void sample(const CurveSample& sample) {
-        const auto now = std::chrono::steady_clock::now();
-        if (now < next_) return;
-        next_ = now + std::chrono::milliseconds(100);
-        show(fmt::format("iteration {}  {:.1f} s  natural {:.2e}", sample.iteration, sample.seconds, sample.natural));
-    }
-    void clear() const {
-        if (shown_) fmt::print(stderr, "\r\033[K");
-    }
-
-private:
-    void show(const std::string& figures) const {
-        if (shown_) fmt::print(stderr, "\r\033[K{}  {}", what_, figures);
-    }
-    bool shown_;
-    std::string what_;
-    std::chrono::steady_clock::time_point next_;
-};
-
 /// Writes the three files; the sentence why there is no page, or nothing.
 std::string write_files(const bench::Comparison& comparison, const fs::path& folder) {
     write_file_atomically(folder / "results.json", bench::json_text(comparison));
     write_file_atomically(folder / "results.csv", bench::csv_text(comparison));
-    std::string page;
-    try {
-        page = bench::html_text(comparison);
-    } catch (const InputError& error) {
-        std::error_code ignored;
-        fs::remove(folder / "report.html", ignored);  // one of an earlier comparison would mislead
-        return fmt::format("no report.html was written, for a part of the page is missing: {}", error.what());
-    }
-    write_file_atomically(folder / "report.html", page);
-    return {};
+    return write_page(folder / "report.html", [&] { return bench::html_text(comparison); });
 }
 
 int compare(const CompareArguments& arguments) {
@@ -127,7 +83,7 @@ int compare(const CompareArguments& arguments) {
     };
     bench::Comparison result;
     {
-        Progress progress(isatty(STDERR_FILENO) != 0);
+        MeasuringProgress progress;
         bench::CompareListener listener;
         listener.on_begin = [&](const bench::ProblemFacts& facts, const std::string& label, std::size_t number,
                                 std::size_t total) {
@@ -153,14 +109,6 @@ int compare(const CompareArguments& arguments) {
     if (!no_page.empty()) fmt::print(stderr, "delassus: {}\n", no_page);
     if (result.interrupted) fmt::print(stderr, "delassus: interrupted; the files hold what was reached\n");
     return result.all_solved() ? exit_solved : exit_not_converged;
-}
-
-/// The command line of this process, as it was given.
-std::vector<std::string> own_command_line() {
-    std::ifstream stream("/proc/self/cmdline", std::ios::binary);
-    std::vector<std::string> arguments;
-    for (std::string argument; std::getline(stream, argument, '\0');) arguments.push_back(argument);
-    return arguments;
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
     add_view(program, action);
     add_plan(program, action);
     add_compare(program, action);
+    add_bench(program, action);
     add_plugins(program, action);
     add_inspect(program, action);
     add_convert(program, action);

@@ -2,24 +2,15 @@
 // delassus plan: what a scene needs and what it does without.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "command.hpp"
 #include "delassus/plan.hpp"
 #include "process/stdout_guard.hpp"
+#include "scene/plan_json.hpp"
 #include "scene_arguments.hpp"
 
 namespace delassus::command {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-Json json_of(const std::vector<PlanLine>& lines) {
-    Json json = Json::array();
-    for (const auto& line : lines) json.push_back({{"what", line.what}, {"reason", line.reason}});
-    return json;
-}
 
 void print_lines(std::string_view title, const std::vector<PlanLine>& lines) {
     fmt::print("  {}\n", title);
@@ -33,18 +24,7 @@ int plan(const SceneArguments& arguments, bool as_json) {
     const auto plans = make_plan(scene, registry);
     guard.release();
     if (as_json) {
-        Json json = {{"scene", arguments.file.filename().string()}, {"systems", Json::array()}};
-        for (const auto& one : plans)
-            json["systems"].push_back({{"name", one.name},
-                                       {"velocities", one.velocities},
-                                       {"constraints", one.constraints},
-                                       {"parts", one.parts},
-                                       {"kept", json_of(one.kept)},
-                                       {"left_out", json_of(one.left_out)},
-                                       {"solvers", one.solvers},
-                                       {"later_solvers", one.later_solvers},
-                                       {"libraries", one.libraries}});
-        fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+        fmt::print("{}\n", plan_json(arguments.file.filename().string(), plans));
         return exit_solved;
     }
     for (const auto& one : plans) {

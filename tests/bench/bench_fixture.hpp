@@ -70,6 +70,26 @@ protected:
         return run_child(child);
     }
 
+    /// Writes the text as a suite, and returns its file.
+    [[nodiscard]] fs::path suite(const std::string& text) const {
+        std::ofstream(folder / "suite.yaml") << text;
+        return folder / "suite.yaml";
+    }
+
+    /// Runs `delassus bench` on arguments, with references in the test's own folder.
+    [[nodiscard]] ChildResult bench(std::vector<std::string> arguments) const {
+        ChildSettings child;
+        child.program = DELASSUS_COMMAND;
+        child.arguments = {"bench"};
+        child.arguments.insert(child.arguments.end(), arguments.begin(), arguments.end());
+        child.environment = {{"XDG_CACHE_HOME", (folder / "cache").string()}};
+        child.timeout = 120.0;
+        return run_child(child);
+    }
+    [[nodiscard]] ChildResult run_suite(const fs::path& file, const std::string& output = "out") const {
+        return bench({"run", file.string(), "-o", (folder / output).string(), "--plugin-path", DELASSUS_TEST_PLUGINS});
+    }
+
     fs::path folder;
 };
 

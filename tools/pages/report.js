@@ -3,44 +3,20 @@
 "use strict";
 (() => {
   const results = JSON.parse(document.getElementById("results").textContent);
-  const least = { seconds: 1e-6, error: 1e-17 }; // what logarithmic axes make of zeros
-  // Okabe and Ito's colours, which stay apart for colour-blind readers, and three more.
-  const colours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#4d4d4d", "#a6761d", "#8a8a00"];
   const labels = [...new Set(results.problems.flatMap((problem) => problem.results.map((row) => row.label)))];
   const colourOf = (label) => colours[labels.indexOf(label) % colours.length];
-  const spoken = (status) => status.replaceAll("_", " ");
-
-  const element = (tag, properties = {}, ...children) => {
-    const made = Object.assign(document.createElement(tag), properties);
-    made.append(...children);
-    return made;
-  };
-
-  const missing = "—";
-  const error = (value) => (value === null || value === undefined ? missing : value === 0 ? "0" : value.toExponential(2));
-  const seconds = (value) =>
-    value === null ? missing : value === 0 ? "0" : value < 1e-4 ? value.toExponential(1) : value.toPrecision(3);
-  const whole = (value) => (value === null ? missing : value.toLocaleString("en").replaceAll(",", "\u202f"));
-  const mebibytes = (value) => (value > 0 ? (value / 1048576).toFixed(1) : missing);
-  const power = (value) => {
-    const exponent = Math.round(Math.log10(value));
-    const raised = String(exponent).replace(/[-0-9]/g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
-    return Math.abs(value / 10 ** exponent - 1) < 1e-6 ? "10" + raised : value.toPrecision(2);
-  };
-
   function writeHead() {
     const { settings, machine, build } = results;
     const rows = results.problems.flatMap((problem) => problem.results);
     const solved = results.problems.filter((problem) => problem.results.some((row) => row.status === "solved"));
-    const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
     document.getElementById("summary").textContent =
       `${plural(labels.length, "solver")} on ${plural(results.problems.length, "problem")}, ` +
       `to a natural error of ${settings.tolerance.toExponential(0)} within ${settings.time_limit} s: ` +
       `${solved.length} of ${results.problems.length} solved by at least one, ` +
       `${rows.filter((row) => row.status === "solved").length} of ${rows.length} runs solved.`;
     const facts = {
-      Machine: `${machine.processor}, ${plural(machine.cores, "core")}, ${(machine.memory / 2 ** 30).toFixed(1)} GiB; ${machine.system}`,
-      Delassus: `${results.delassus}, ${build.type || "no"} build, ${build.compiler}${build.flags ? ", " + build.flags : ""}`,
+      Machine: machineText(machine),
+      Delassus: buildText(results.delassus, build),
       Date: results.created.replace("T", " ").replace("Z", " UTC"),
       Folder: results.folder,
       Command: results.command,
@@ -131,11 +107,8 @@
     const low = Math.min(tolerance, ...all.map((point) => point[1]));
     const high = Math.max(tolerance, ...all.map((point) => point[1]));
     const first = Math.min(...all.map((point) => point[0])), last = Math.max(...all.map((point) => point[0]));
-    const decade = (value, round) => 10 ** round(Math.log10(value));
     const left = logarithmic ? decade(first, Math.floor) : 0;
     const right = logarithmic ? decade(last * 1.02, Math.ceil) : last * 1.02;
-    const axis = { nameLocation: "middle", nameTextStyle: { color: "#5c6670" }, axisLine: { show: true, lineStyle: { color: "#1d2329" } },
-                   splitLine: { lineStyle: { color: "#e8ebee" } }, minorSplitLine: { show: false } };
     const xAxis = logarithmic
       ? { type: "log", min: left, max: right, axisLabel: { formatter: power }, minorTick: { show: true } }
       : { type: "value", min: left, max: right, axisLabel: { showMaxLabel: false, formatter: (value) => String(+value.toPrecision(6)) } };
@@ -152,8 +125,8 @@
       aria: { enabled: true, label: { description: `Natural error against time on ${problem.name}` } },
       grid: { left: 68, right: Math.min(260, 20 + 6.4 * longest), top: 44, bottom: 52 },
       legend: { top: 4, left: 0, right: 150, type: "scroll", icon: "roundRect", itemHeight: 4, itemGap: 18, data: rows.map((row) => row.label) },
-      xAxis: { ...axis, ...xAxis, name: "solver’s own time [s]", nameGap: 32 },
-      yAxis: { ...axis, type: "log", name: "natural error", nameGap: 50, min: decade(low, Math.floor), max: decade(high * 1.5, Math.ceil),
+      xAxis: { ...axisStyle, ...xAxis, name: "solver’s own time [s]", nameGap: 32 },
+      yAxis: { ...axisStyle, type: "log", name: "natural error", nameGap: 50, min: decade(low, Math.floor), max: decade(high * 1.5, Math.ceil),
                axisLabel: { formatter: power } },
       series,
     };

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/compare.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <ctime>
 #include <set>
 
+#include "bench/scratch_folder.hpp"
 #include "delassus/error.hpp"
 
 namespace delassus::bench {
@@ -20,27 +17,6 @@ namespace fs = std::filesystem;
 
 /// A result must be as accurate as this (natural error) to serve as the reference of the velocity error.
 constexpr double reference_accuracy = 1e-9;
-
-/// A folder for solutions, gone with this object.
-class ScratchFolder {
-public:
-    ScratchFolder() {
-        std::string name = (fs::temp_directory_path() / "delassus-compare-XXXXXX").string();
-        if (!mkdtemp(name.data()))
-            throw Error("no temporary folder can be made in " + fs::temp_directory_path().string());
-        path_ = name;
-    }
-    ScratchFolder(const ScratchFolder&) = delete;
-    ScratchFolder& operator=(const ScratchFolder&) = delete;
-    ~ScratchFolder() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    [[nodiscard]] const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-};
 
 /// Splits at commas that stand outside parentheses.
 std::vector<std::string> split(const std::string& text) {
@@ -70,11 +46,6 @@ void compare_velocities(const ComparePlan& plan, ProblemResults& problem, const 
     problem.velocity_reference = best->label;
     const auto errors = velocity_errors(plan.worker, problem.path, solutions[index], solutions);
     for (std::size_t k = 0; k < problem.results.size(); ++k) problem.results[k].velocity = errors[k];
-}
-
-std::string now() {
-    const std::time_t seconds = std::time(nullptr);
-    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(seconds));
 }
 
 }  // namespace
@@ -130,8 +101,8 @@ Comparison compare(const ComparePlan& plan, const CompareListener& listener) {
             ++number;
             if (listener.on_begin) listener.on_begin(facts[p], label_of(solver), number, total);
             solutions.push_back(scratch.path() / std::to_string(number));
-            problem.results.push_back(
-                measure(plan.worker, {plan.problems[p], solver, plan.settings, solutions.back()}, listener.on_sample));
+            problem.results.push_back(measure(
+                plan.worker, {plan.problems[p], solver, plan.settings, solutions.back(), {}}, listener.on_sample));
         }
         if (!cancelled()) compare_velocities(plan, problem, solutions);
         comparison.problems.push_back(std::move(problem));

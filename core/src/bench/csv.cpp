@@ -1,27 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
-
-#include <cmath>
-
+#include "bench/csv_text.hpp"
 #include "bench/writers.hpp"
 
 namespace delassus::bench {
-
-namespace {
-
-std::string quoted(const std::string& text) {
-    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-    std::string field = "\"";
-    for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return field + '"';
-}
-
-/// The shortest digits that read back as the same number.
-std::string number_text(double value) {
-    return std::isfinite(value) ? fmt::format("{}", value) : "";
-}
-
-}  // namespace
 
 std::string csv_text(const Comparison& comparison) {
     std::string text =
@@ -33,13 +14,13 @@ std::string csv_text(const Comparison& comparison) {
             for (const auto& repeat : row.repeats) slowest = std::max(slowest, repeat.solve);
             const Errors none{unknown, unknown, unknown, unknown, unknown, unknown};
             const Errors& error = row.error ? *row.error : none;
-            text += fmt::format("{},{},{},{},{},{},{},{}", quoted(problem.facts.name), problem.facts.n, problem.facts.m,
-                                problem.facts.law, problem.facts.structure, quoted(row.label), row.status,
-                                row.iterations ? std::to_string(*row.iterations) : "");
+            text += fmt::format("{},{},{},{},{},{},{},{}", csv_field(problem.facts.name), problem.facts.n,
+                                problem.facts.m, problem.facts.law, problem.facts.structure, csv_field(row.label),
+                                row.status, row.iterations ? std::to_string(*row.iterations) : "");
             for (const double value : {row.setup, row.solve, slowest, error.natural, error.balance, error.cone,
                                        error.dual, error.gap, error.siconos, row.velocity})
-                (text += ',') += number_text(value);
-            text += fmt::format(",{},{}\r\n", row.peak_memory, quoted(row.message));
+                (text += ',') += csv_number(value);
+            text += fmt::format(",{},{}\r\n", row.peak_memory, csv_field(row.message));
         }
     return text;
 }

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/chrono.h>
+#include <fmt/format.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 
 #include "bench/results.hpp"
@@ -50,6 +53,11 @@ Build this_build() {
     const std::string compiler = "GCC " __VERSION__;
 #endif
     return {DELASSUS_VERSION, compiler, DELASSUS_BUILD_TYPE, DELASSUS_BUILD_FLAGS};
+}
+
+std::string now() {
+    const std::time_t seconds = std::time(nullptr);
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(seconds));
 }
 
 }  // namespace delassus::bench

@@ -5,72 +5,18 @@
 
 #include <algorithm>
 
-#include "bench/json_text.hpp"
+#include "bench/ask.hpp"
 #include "delassus/error.hpp"
-#include "process/child_process.hpp"
 
 namespace delassus::bench {
 
 namespace {
 
-/// Seconds for reading a problem, and for everything else that is not a solver's run.
-constexpr double loading_limit = 600.0;
-/// Seconds for the process to end after its last word.
-constexpr double exit_limit = 10.0;
-
-/// Cuts the output into lines of JSON.
-class Lines {
-public:
-    explicit Lines(std::function<void(const Json&)> on_line) : on_line_(std::move(on_line)) {}
-
-    void add(std::string_view piece) {
-        rest_ += piece;
-        std::size_t begin = 0;
-        for (std::size_t end; (end = rest_.find('\n', begin)) != std::string::npos; begin = end + 1) {
-            const Json line = Json::parse(rest_.substr(begin, end - begin), nullptr, false);
-            // Anything else comes from a plugin that found our channel: the row must not depend on it.
-            if (line.is_object() && line.contains("event")) on_line_(line);
-        }
-        rest_.erase(0, begin);
-    }
-
-private:
-    std::function<void(const Json&)> on_line_;
-    std::string rest_;
-};
-
-/// hear: takes a line, and returns the seconds until the next one must have come.
-ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear) {
-    double allowed = loading_limit;
-    Lines lines([&](const Json& line) { allowed = hear(line); });
-    ChildSettings child;
-    child.program = worker.command;
-    child.arguments = {"worker"};
-    child.input = text_of(request);
-    // One core, one thread: the libraries behind some plugins would otherwise start threads that share that core.
-    child.environment = {{"OMP_NUM_THREADS", "1"}, {"OPENBLAS_NUM_THREADS", "1"}, {"MKL_NUM_THREADS", "1"}};
-    const auto cores = allowed_cores();
-    if (!cores.empty()) child.core = cores.back();
-    child.timeout = allowed;
-    child.memory_limit = worker.memory_limit;
-    child.cancelled = worker.cancelled;
-    child.on_output = [&](std::string_view piece) {
-        lines.add(piece);
-        return allowed;
-    };
-    return run_child(child);
-}
-
-Json problem_fields(const char* task, const std::filesystem::path& problem, const std::string& law) {
-    return {{"do", task}, {"problem", std::filesystem::absolute(problem).string()}, {"law", law}};
-}
-
-/// The last line of what was written to standard error: often the cause.
-std::string last_line(std::string text) {
-    while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
-    const auto begin = text.find_last_of('\n');
-    std::string line = begin == std::string::npos ? text : text.substr(begin + 1);
-    return line.size() > 300 ? line.substr(0, 300) : line;
+Json problem_fields(const char* task, const ProblemSource& problem, const std::string& law) {
+    const Json source = problem.generator.empty()
+                            ? Json(std::filesystem::absolute(problem.path).string())
+                            : Json{{"generate", problem.generator}, {"parameters", problem.parameters}};
+    return {{"do", task}, {"problem", source}, {"law", law}};
 }
 
 std::string reached(const Measurement& row) {
@@ -80,17 +26,15 @@ std::string reached(const Measurement& row) {
                        last.seconds);
 }
 
-void append(std::string& message, const std::string& sentence) {
-    if (!message.empty()) message += "; ";
-    message += sentence;
-}
-
 /// How the process ended, where that tells more than what it said.
-void judge_end(Measurement& row, const ChildResult& child, double time_limit, bool done) {
+void judge_end(Measurement& row, const ChildResult& child, double time_limit, std::uint64_t resident_limit, bool done) {
     const bool has_result = !row.status.empty();
     std::string sentence;
     std::string status;
-    if (child.timed_out) {
+    if (child.over_memory) {
+        status = "memory";
+        sentence = fmt::format("took more than its {} MiB {}; killed", resident_limit >> 20, reached(row));
+    } else if (child.timed_out) {
         status = "hung";
         sentence = has_result && done ? "did not end after its last run and was killed"
                                       : fmt::format("gave no sign for {:.3g} s (time limit and grace) {}; killed",
@@ -110,10 +54,17 @@ void judge_end(Measurement& row, const ChildResult& child, double time_limit, bo
     if (const auto line = last_line(child.errors); !line.empty() && status == "crashed") sentence += ": " + line;
     append(row.message, sentence);
     // A result that was complete stays one, and says what happened afterwards.
-    if (!has_result || !done) row.status = status;
+    if (!has_result || !done || child.over_memory) row.status = status;
 }
 
 }  // namespace
+
+std::string ProblemSource::text() const {
+    if (generator.empty()) return path.string();
+    std::string command = "delassus generate " + generator;
+    for (const auto& [key, value] : parameters) command += fmt::format(" --set {}={}", key, value);
+    return command;
+}
 
 double grace_of(double time_limit) {
     return 2.0 + 0.2 * time_limit;
@@ -145,6 +96,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
     question["time_limit"] = settings.time_limit;
     question["repeats"] = settings.repeats;
     question["solution"] = request.solution.string();
+    question["reference"] = request.reference.string();
     question["plugin_path"] = Json::array();
     for (const auto& folder : worker.plugin_path) question["plugin_path"].push_back(folder.string());
 
@@ -173,6 +125,9 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
             row.solve = number_of(line.at("solve"));
             row.analyses = line.at("analyses");
             row.factorizations = line.at("factorizations");
+            row.recorded = {row.setup, row.solve};
+            row.stages = line.at("stages").get<std::vector<std::string>>();
+            row.velocity = number_of(line.at("velocity"));
             row.error = errors_of(line.at("error"));
             const Json& last = line.at("last");
             row.curve.push_back({last[0].get<std::int64_t>(), number_of(last[1]), number_of(last[2])});
@@ -181,12 +136,13 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
                 append(row.message, fmt::format("a repeat ended with {}", line.at("status").get<std::string>()));
             row.repeats.push_back({number_of(line.at("setup")), number_of(line.at("solve"))});
         } else if (event == "failed") {
-            if (row.status.empty()) row.status = "error";
+            if (row.status.empty()) row.status = line.at("kind") == "memory" ? "memory" : "error";
             append(row.message, line.at("message").get<std::string>());
             done = true;
             return exit_limit;
         } else if (event == "done") {
             done = true;
+            row.libraries = line.at("libraries").get<std::vector<std::string>>();
             if (const auto printed = line.at("printed").get<std::int64_t>(); printed > 0)
                 append(row.message, fmt::format("wrote {} bytes to standard output; they were dropped", printed));
             return exit_limit;
@@ -194,7 +150,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
         return loading_limit;
     };
     const ChildResult child = ask(worker, question, hear);
-    judge_end(row, child, settings.time_limit, done);
+    judge_end(row, child, settings.time_limit, worker.resident_limit, done);
     row.peak_memory = child.peak_memory;
     for (const Repeat& repeat : row.repeats) {
         const bool first = &repeat == &row.repeats.front();
@@ -204,14 +160,15 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
     return row;
 }
 
-ProblemFacts describe(const WorkerSettings& worker, const std::filesystem::path& problem, const std::string& law) {
+ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem, const std::string& law) {
     ProblemFacts facts;
     std::string failure;
     bool done = false;
     const auto child = ask(worker, problem_fields("describe", problem, law), [&](const Json& line) {
         const std::string event = line.at("event");
         if (event == "problem") {
-            facts = {line.at("name"), line.at("law"), line.at("structure"), line.at("n"), line.at("m"), {}};
+            facts = {line.at("name"), line.at("law"),   line.at("structure"), line.at("n"), line.at("m"), {},
+                     line.at("hash"), line.at("source")};
             for (const auto& [kind, count] : line.at("cones").items()) facts.cones.emplace_back(kind, count);
         }
         if (event == "failed") failure = line.at("message");
@@ -219,12 +176,12 @@ ProblemFacts describe(const WorkerSettings& worker, const std::filesystem::path&
         return loading_limit;
     });
     if (!failure.empty()) throw InputError(failure);
-    if (child.cancelled) throw Error("interrupted while reading " + problem.string());
-    if (!done) throw InputError(fmt::format("{} could not be read: the process that read it ended", problem.string()));
+    if (child.cancelled) throw Error("interrupted while reading " + problem.text());
+    if (!done) throw InputError(fmt::format("{} could not be read: the process that read it ended", problem.text()));
     return facts;
 }
 
-std::vector<double> velocity_errors(const WorkerSettings& worker, const std::filesystem::path& problem,
+std::vector<double> velocity_errors(const WorkerSettings& worker, const ProblemSource& problem,
                                     const std::filesystem::path& reference,
                                     const std::vector<std::filesystem::path>& solutions) {
     std::vector<double> errors(solutions.size(), unknown);

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,16 +17,30 @@ namespace delassus::bench {
 struct WorkerSettings {
     std::filesystem::path command;  ///< the delassus command, absolute
     std::vector<std::filesystem::path> plugin_path;
-    std::uint64_t memory_limit = 0;   ///< bytes of address space for each; 0 for none
-    std::function<bool()> cancelled;  ///< true: end the one that runs with what it has reached. May be empty.
+    std::uint64_t memory_limit = 0;    ///< bytes of address space for each; 0 for none
+    std::function<bool()> cancelled;   ///< true: end the one that runs with what it has reached. May be empty.
+    std::uint64_t resident_limit = 0;  ///< bytes resident in each; 0 for none
+};
+
+/// Where a worker takes a problem from: a file, or a generator with its parameters (delassus/generate.hpp).
+struct ProblemSource {
+    std::filesystem::path path;  ///< problem folder or FCLib file; empty for a generator
+    std::string generator;
+    std::map<std::string, double> parameters;
+
+    ProblemSource() = default;
+    ProblemSource(std::filesystem::path file) : path(std::move(file)) {}  // NOLINT: a path is a source
+    /// The path, or the command that makes the problem.
+    [[nodiscard]] std::string text() const;
 };
 
 /// One solver on one problem.
 struct MeasureRequest {
-    std::filesystem::path problem;
+    ProblemSource problem;
     SolverConfig solver;  ///< name and options; the rest is in settings
     ComparisonSettings settings;
-    std::filesystem::path solution;  ///< folder for x and λ, which must not exist; may be empty
+    std::filesystem::path solution;        ///< folder for x and λ, which must not exist; may be empty
+    std::filesystem::path reference = {};  ///< solution folder that velocities are compared with; may be empty
 };
 
 /// Seconds beyond the time limit after which a solver that gives no sign counts as hung.
@@ -40,12 +55,11 @@ struct MeasureRequest {
                                   const std::function<void(const CurveSample&)>& on_sample = {});
 
 /// Reads the problem in a process of its own. Throws InputError with its sentence if it cannot be read.
-[[nodiscard]] ProblemFacts describe(const WorkerSettings& worker, const std::filesystem::path& problem,
-                                    const std::string& law);
+[[nodiscard]] ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem, const std::string& law);
 
 /// ‖x − x*‖_H / ‖x*‖_H of each solution folder against the reference; unknown where there is no such folder, or if
 /// the worker fails.
-[[nodiscard]] std::vector<double> velocity_errors(const WorkerSettings& worker, const std::filesystem::path& problem,
+[[nodiscard]] std::vector<double> velocity_errors(const WorkerSettings& worker, const ProblemSource& problem,
                                                   const std::filesystem::path& reference,
                                                   const std::vector<std::filesystem::path>& solutions);
 

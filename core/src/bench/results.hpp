@@ -23,6 +23,8 @@ struct ProblemFacts {
     std::string name, law, structure;
     std::int32_t n = 0, m = 0;
     std::vector<std::pair<std::string, std::int64_t>> cones;  ///< blocks of each kind that occurs
+    std::string hash = {};                                    ///< of everything but names and law, 16 digits
+    std::string source = {};                                  ///< where it came from, as the problem says
 };
 
 /// The solver's own seconds in one run that recorded no curve.
@@ -35,13 +37,17 @@ struct Measurement {
     std::string label;  ///< "pgs" or "pgs(omega=1.2)"
     std::string solver, version;
     OptionTexts options;  ///< those that were chosen
-    /// The name of a Status, or unsupported (message: the refusal), crashed, hung (killed).
+    /// The name of a Status, or unsupported (message: the refusal), crashed, hung (killed), memory (killed at its
+    /// limit, or out of memory).
     std::string status;
     std::string message;  ///< what a person should know; may be empty
 
     std::optional<std::int64_t> iterations;
     double setup = unknown, solve = unknown;  ///< seconds, the least of the repeats
     std::vector<Repeat> repeats;              ///< empty where the recorded run stands for itself
+    Repeat recorded{unknown, unknown};        ///< of the run with the curve, which is the warm-up
+    std::vector<std::string> stages;          ///< solvers that worked one after another; empty if one did it all
+    std::vector<std::string> libraries;       ///< files of shared libraries in its process, versions in their names
     std::optional<Errors> error;              ///< of the recorded run's result; empty if it gave none
     double velocity = unknown;                ///< ‖x − x*‖_H / ‖x*‖_H; unknown without a reference
     std::int64_t peak_memory = 0;             ///< bytes resident in its process, the problem included
@@ -70,6 +76,9 @@ struct Build {
 /// The machine and the build that this process runs on and is.
 [[nodiscard]] Machine this_machine();
 [[nodiscard]] Build this_build();
+
+/// ISO 8601, UTC.
+[[nodiscard]] std::string now();
 
 /// What all solvers were given.
 struct ComparisonSettings {

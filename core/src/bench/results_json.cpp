@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bench/json_text.hpp"
+#include "bench/rows.hpp"
 #include "bench/writers.hpp"
 
 namespace delassus::bench {
-
-namespace {
 
 Json json_of(const Measurement& row) {
     Json repeats = Json::array();
@@ -32,12 +30,26 @@ Json json_of(const Measurement& row) {
             {"curve", {{"columns", {"iteration", "seconds", "natural"}}, {"samples", curve}}}};
 }
 
+Json json_of(const Machine& machine) {
+    return {{"processor", machine.processor},
+            {"cores", machine.cores},
+            {"memory", machine.memory},
+            {"load", json_number(machine.load)},
+            {"system", machine.system}};
+}
+
+Json json_of(const Build& build) {
+    return {{"compiler", build.compiler}, {"type", build.type}, {"flags", build.flags}};
+}
+
+namespace {
+
 Json json_of(const ProblemResults& problem) {
     const ProblemFacts& facts = problem.facts;
     Json cones = Json::object();
     for (const auto& [kind, count] : facts.cones) cones[kind] = count;
     Json results = Json::array();
-    for (const auto& row : problem.results) results.push_back(json_of(row));
+    for (const auto& row : problem.results) results.push_back(bench::json_of(row));
     return {
         {"name", facts.name},
         {"path", problem.path.string()},
@@ -56,29 +68,22 @@ std::string json_text(const Comparison& comparison) {
     const auto& settings = comparison.settings;
     Json problems = Json::array();
     for (const auto& problem : comparison.problems) problems.push_back(json_of(problem));
-    const Json json = {
-        {"format", "delassus-comparison"},
-        {"version", 1},
-        {"created", comparison.created},
-        {"command", comparison.command},
-        {"folder", comparison.folder},
-        {"delassus", comparison.build.version},
-        {"build",
-         {{"compiler", comparison.build.compiler}, {"type", comparison.build.type}, {"flags", comparison.build.flags}}},
-        {"machine",
-         {{"processor", comparison.machine.processor},
-          {"cores", comparison.machine.cores},
-          {"memory", comparison.machine.memory},
-          {"load", json_number(comparison.machine.load)},
-          {"system", comparison.machine.system}}},
-        {"settings",
-         {{"tolerance", settings.tolerance},
-          {"time_limit", settings.time_limit},
-          {"max_iterations", settings.max_iterations},
-          {"repeats", settings.repeats},
-          {"law", settings.law.empty() ? Json(nullptr) : Json(settings.law)}}},
-        {"interrupted", comparison.interrupted},
-        {"problems", problems}};
+    const Json json = {{"format", "delassus-comparison"},
+                       {"version", 1},
+                       {"created", comparison.created},
+                       {"command", comparison.command},
+                       {"folder", comparison.folder},
+                       {"delassus", comparison.build.version},
+                       {"build", bench::json_of(comparison.build)},
+                       {"machine", bench::json_of(comparison.machine)},
+                       {"settings",
+                        {{"tolerance", settings.tolerance},
+                         {"time_limit", settings.time_limit},
+                         {"max_iterations", settings.max_iterations},
+                         {"repeats", settings.repeats},
+                         {"law", settings.law.empty() ? Json(nullptr) : Json(settings.law)}}},
+                       {"interrupted", comparison.interrupted},
+                       {"problems", problems}};
     return text_of(json, 1) + "\n";
 }
 

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/worker.hpp"
 
-#include <unistd.h>
+#include <fmt/format.h>
 
-#include <cerrno>
+#include <fstream>
+#include <limits>
 #include <map>
+#include <set>
 
+#include "bench/channel.hpp"
 #include "bench/json_text.hpp"
+#include "bench/scene_worker.hpp"
 #include "delassus/config.hpp"
 #include "delassus/error.hpp"
+#include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
+#include "problem/structure.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 
@@ -22,29 +28,28 @@ namespace fs = std::filesystem;
 /// Runs longer than this are repeated once only.
 constexpr double long_run = 5.0;
 
-class Channel {
-public:
-    explicit Channel(int descriptor) : descriptor_(descriptor) {}
-
-    void send(const char* event, Json fields = Json::object()) const {
-        Json line = {{"event", event}};
-        line.update(fields);
-        const std::string text = text_of(line) + "\n";
-        for (std::size_t sent = 0; sent < text.size();) {
-            const ssize_t written = write(descriptor_, text.data() + sent, text.size() - sent);
-            if (written < 0 && errno != EINTR) throw Error("nobody listens to the worker any more");
-            if (written > 0) sent += static_cast<std::size_t>(written);
-        }
-    }
-
-private:
-    int descriptor_;
-};
-
 PreparedProblem read(const Json& request) {
-    Problem problem = read_problem(request.at("problem").get<std::string>());
+    const Json& source = request.at("problem");
+    Problem problem = source.is_string() ? read_problem(source.get<std::string>())
+                                         : generate(source.at("generate").get<std::string>(),
+                                                    source.at("parameters").get<std::map<std::string, double>>());
     if (const auto law = request.value("law", std::string()); !law.empty()) problem.law = law_of(law);
     return PreparedProblem(std::move(problem));
+}
+
+/// Of everything that a solver sees, names and the friction law apart: 16 hexadecimal digits.
+std::string content_hash(const PreparedProblem& prepared) {
+    const Problem& problem = prepared.problem();
+    Hash hash;
+    hash.add_size(prepared.raw().values_id);
+    hash.add(problem.a);
+    hash.add(problem.b);
+    for (const Cone& cone : problem.cones) {
+        hash.add(&cone.mu, sizeof cone.mu);
+        hash.add(cone.lo);
+        hash.add(cone.hi);
+    }
+    return fmt::format("{:016x}", hash.value());
 }
 
 void send_facts(const Channel& channel, const PreparedProblem& prepared) {
@@ -56,7 +61,9 @@ void send_facts(const Channel& channel, const PreparedProblem& prepared) {
                              {"structure", name_of(prepared.structure())},
                              {"n", problem.n()},
                              {"m", problem.m()},
-                             {"cones", blocks}});
+                             {"cones", blocks},
+                             {"hash", content_hash(prepared)},
+                             {"source", problem.source}});
 }
 
 SolverConfig solver_of(const Json& request) {
@@ -125,6 +132,12 @@ void measure(const Channel& channel, const Json& request) {
     }
     if (const auto folder = request.at("solution").get<std::string>(); !folder.empty())
         write_solution(solution, {}, folder);
+    double velocity = std::numeric_limits<double>::quiet_NaN();
+    if (const auto folder = request.at("reference").get<std::string>(); !folder.empty())
+        velocity =
+            problem.meter().velocity(solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
+    Json stages = Json::array();
+    for (const StageReport& stage : report.stages) stages.push_back(stage.solver);
     const CurveSample last = report.curve.empty() ? CurveSample{} : report.curve.back();
     channel.send("recorded", {{"solver", report.solver},
                               {"version", report.version},
@@ -136,6 +149,8 @@ void measure(const Channel& channel, const Json& request) {
                               {"analyses", report.analyses},
                               {"factorizations", report.factorizations},
                               {"error", json_of(report.error)},
+                              {"velocity", json_number(velocity)},
+                              {"stages", stages},
                               {"last", {last.iteration, json_number(last.seconds), json_number(last.natural)}}});
 
     settings.record_curve = false;
@@ -168,6 +183,17 @@ void compare_velocities(const Channel& channel, const Json& request) {
     channel.send("velocity", {{"errors", errors}});
 }
 
+/// The file names of the shared libraries in this process, links resolved, so that versions stand in them.
+std::set<std::string> mapped_libraries() {
+    std::set<std::string> names;
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);)
+        if (const auto slash = line.rfind('/');
+            slash != std::string::npos && line.find(".so", slash) != std::string::npos)
+            names.insert(line.substr(slash + 1));
+    return names;
+}
+
 }  // namespace
 
 int run_worker(const std::string& request_text, int descriptor) {
@@ -185,15 +211,20 @@ int run_worker(const std::string& request_text, int descriptor) {
             measure(channel, request);
         } else if (task == "velocity") {
             compare_velocities(channel, request);
+        } else if (task == "plan") {
+            send_plan(channel, request);
+        } else if (task == "simulate") {
+            simulate(channel, request);
         } else {
             throw InputError("a worker cannot do \"" + task + "\"");
         }
-        channel.send("done", {{"printed", guard.release()}});
+        channel.send("done", {{"printed", guard.release()}, {"libraries", mapped_libraries()}});
         return 0;
     } catch (const InputError& error) {
         kind = "input";
         message = error.what();
     } catch (const std::bad_alloc&) {
+        kind = "memory";
         message = "out of memory";
     } catch (const std::exception& error) {
         message = error.what();

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "delassus/export.hpp"
 #include "delassus/needs.hpp"
 
 namespace delassus {
@@ -46,8 +47,8 @@ private:
     std::vector<Direction> directions_;
 };
 
-/// Hash of numbers, for the identities of patterns and values.
-class Hash {
+/// Hash of numbers, for the identities of patterns and values, and of content.
+class DELASSUS_API Hash {
 public:
     void add(const void* data, std::size_t bytes);
     template <class Number>

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <map>
 
@@ -154,6 +155,8 @@ public:
         }
         result_.seconds = seconds_since(begin_);
         result_.peak_memory = static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
+        if (settings_.resident_limit > 0 && static_cast<std::uint64_t>(result_.peak_memory) > settings_.resident_limit)
+            result_.over_memory = true;
         if (WIFEXITED(status)) result_.exit_code = WEXITSTATUS(status);
         if (WIFSIGNALED(status)) result_.signal = WTERMSIG(status);
         return std::move(result_);
@@ -194,6 +197,13 @@ private:
 
     [[nodiscard]] bool overdue() const { return seconds_since(allowed_from_) > allowed_; }
 
+    /// Bytes resident in the child now; 0 if that cannot be read.
+    [[nodiscard]] std::uint64_t resident() const {
+        std::ifstream file("/proc/" + std::to_string(pid_) + "/statm");
+        std::uint64_t size = 0, pages = 0;
+        return file >> size >> pages ? pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) : 0;
+    }
+
     void enforce() {
         if (!result_.cancelled && settings_.cancelled && settings_.cancelled()) {
             result_.cancelled = true;
@@ -201,8 +211,10 @@ private:
             kill(-pid_, SIGINT);
         }
         const bool patience_gone = result_.cancelled && seconds_since(cancelled_at_) > settings_.cancel_grace;
-        if (killed_ || !(patience_gone || overdue())) return;
-        result_.timed_out = !result_.cancelled;
+        const bool too_large = settings_.resident_limit > 0 && resident() > settings_.resident_limit;
+        if (killed_ || !(patience_gone || too_large || overdue())) return;
+        result_.over_memory = too_large;
+        result_.timed_out = !result_.cancelled && !too_large;
         killed_ = true;
         kill(-pid_, SIGKILL);
     }

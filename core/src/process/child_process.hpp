@@ -22,7 +22,10 @@ struct ChildSettings {
 
     double timeout = 0.0;            ///< wall seconds until it is killed; infinity for never
     std::uint64_t memory_limit = 0;  ///< bytes of address space (RLIMIT_AS); 0 for none
-    std::optional<int> core;         ///< the only core that it may run on, as far as the system grants that
+    /// Bytes resident (of it alone) beyond which it is killed; looked at about twenty times a second, and once more at
+    /// the end. 0 for none.
+    std::uint64_t resident_limit = 0;
+    std::optional<int> core;  ///< the only core that it may run on, as far as the system grants that
 
     /// Called with each piece of standard output as it comes; answers the seconds that the child has from now on, in
     /// place of what was left. May be empty: the output is then collected in ChildResult.
@@ -37,6 +40,7 @@ struct ChildResult {
     std::optional<int> exit_code;  ///< if it ended by itself
     int signal = 0;                ///< the signal that ended it, or 0
     bool timed_out = false;        ///< killed after its time
+    bool over_memory = false;      ///< killed above, or ended after it had been above, resident_limit
     bool cancelled = false;        ///< asked to stop by `cancelled`
     double seconds = 0.0;          ///< wall time
     std::int64_t peak_memory = 0;  ///< bytes resident at most (of it alone)

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "delassus/sdk/solver.hpp"
 
@@ -15,8 +16,8 @@ namespace {
 
 using namespace delassus::sdk;
 
-constexpr const char* behaviours[] = {"solve", "slow", "crash", "crash_late", "hang",  "deaf",
-                                      "lie",   "nan",  "print", "exit",       "throw", "despair"};
+constexpr const char* behaviours[] = {"solve", "slow",  "crash", "crash_late", "hang",    "deaf", "lie",
+                                      "nan",   "print", "exit",  "throw",      "despair", "eat"};
 
 class Misbehaving : public Solver {
 public:
@@ -36,6 +37,11 @@ public:
         if (behaviour_ == "nan") {
             lambda.setConstant(std::nan(""));
             return {DELASSUS_SOLVED, 1, 0.0, ""};
+        }
+        std::vector<std::vector<char>> eaten;
+        while (behaviour_ == "eat" && eaten.size() < 1024) {  // 4 GiB in all, with time to be seen
+            eaten.emplace_back(4U << 20U, 'x');
+            usleep(1000);
         }
         Vector diagonal(problem.m);
         for (Eigen::Index i = 0; i < problem.m; ++i) diagonal[i] = problem.E.coeff(i, i);

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a report says of a set of results as a whole (docs/benchmarks.md).
+#pragma once
+
+#include "bench/results_file.hpp"
+
+namespace delassus::bench {
+
+/// Shift of the geometric means of times, s.
+inline constexpr double mean_shift = 1e-3;
+/// Times below this count as this in performance profiles, s.
+inline constexpr double least_time = 1e-5;
+
+/// Setup and solve together of a row with seconds, s; NaN where one is missing.
+[[nodiscard]] double total_seconds(const Json& solve);
+
+/// {"classes": [{"name", "problems", "tolerances": [{"tolerance", "problems", "solved_by_any", "solvers": [{"solver",
+/// "ratios", "mean", "solved", "supported", "false_claims", "memory"}]}]}], "scaling": […], "orders": […],
+/// "failures": [{"solver", "cause", "count"}], "recording": {"ratio", "runs"}}
+[[nodiscard]] Json analyse(const ResultSet& results);
+
+}  // namespace delassus::bench

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A question to a worker process (bench/worker.hpp), and what to make of the way in which it ended.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "bench/json_text.hpp"
+#include "bench/measurement.hpp"
+#include "process/child_process.hpp"
+
+namespace delassus::bench {
+
+/// Seconds for reading a problem, and for everything else that is not a solver's run.
+inline constexpr double loading_limit = 600.0;
+/// Seconds for the process to end after its last word.
+inline constexpr double exit_limit = 10.0;
+
+/// Starts a worker with the request. hear: takes a line of its answer, and returns the seconds until the next one must
+/// have come. Throws Error if no process can be started.
+ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear);
+
+/// The last line of what was written to standard error: often the cause.
+[[nodiscard]] std::string last_line(std::string text);
+
+/// Adds the sentence to the message, after a semicolon.
+void append(std::string& message, const std::string& sentence);
+
+}  // namespace delassus::bench

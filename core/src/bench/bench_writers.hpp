@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Results of a benchmark as people and other programs read them.
+#pragma once
+
+#include <string>
+
+#include "bench/results_file.hpp"
+
+namespace delassus::bench {
+
+/// summary.md: GitHub's tables, also readable on a terminal. analysis: of the same results.
+[[nodiscard]] std::string summary_markdown(const ResultSet& results, const Json& analysis);
+
+/// results.csv: one line for each run of a solver, RFC 4180; what is not known is empty.
+[[nodiscard]] std::string solves_csv(const ResultSet& results);
+/// simulations.csv: likewise for each run of a scene.
+[[nodiscard]] std::string simulations_csv(const ResultSet& results);
+
+/// report.html, whole in one file. Throws InputError if a part of the page is missing (support/html_page.hpp).
+[[nodiscard]] std::string bench_page(const ResultSet& results, const Json& analysis);
+
+}  // namespace delassus::bench

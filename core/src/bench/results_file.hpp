@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// results.jsonl: one line of JSON for each thing that was found out, written as it is found out.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bench/json_text.hpp"
+
+namespace delassus::bench {
+
+/// What a results file holds, as of its last session: rows that this session did not ask for are left out, and of rows
+/// with the same key the last counts.
+struct ResultSet {
+    Json session;                                       ///< the last; null if the file holds none
+    std::vector<Json> problems, references, libraries;  ///< of all sessions, the last of the same name
+    std::vector<Json> scenes;                           ///< with their plans
+    std::vector<Json> solves, simulations;              ///< in the order of the session's keys
+    std::size_t missing = 0;                            ///< keys without a row: the session was interrupted
+};
+
+/// Throws InputError if the folder has no results.jsonl, or one of another format or version. A last line that is
+/// incomplete is dropped.
+[[nodiscard]] ResultSet read_results(const std::filesystem::path& folder);
+
+/// Appends rows; a row is in the file when add() returns.
+class ResultsFile {
+public:
+    /// Opens or creates the file, cuts an incomplete last line off, and notes what is there. Throws InputError on a
+    /// file of another format or version.
+    explicit ResultsFile(const std::filesystem::path& folder);
+
+    [[nodiscard]] bool has(const std::string& key) const { return keys_.contains(key); }
+    void add(const Json& row);
+
+private:
+    std::filesystem::path file_;
+    std::map<std::string, bool> keys_;
+};
+
+}  // namespace delassus::bench

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/rows.hpp"
+
+#include <cmath>
+
+namespace delassus::bench {
+
+namespace {
+
+/// The natural error is relative to what the reactions have to correct: λ = 0 has about 1. Beyond this an iterate has
+/// gone away from the solution, not towards it.
+constexpr double diverged_error = 1e3;
+
+/// Blocks that can open, slide or reach a bound; the rows where there are none.
+std::int64_t size_of(const ProblemFacts& facts) {
+    std::int64_t size = 0;
+    for (const auto& [kind, count] : facts.cones)
+        if (kind != name_of(ConeKind::Free)) size += count;
+    return size > 0 ? size : facts.m;
+}
+
+}  // namespace
+
+std::string cause_of(const Measurement& row) {
+    const std::string& status = row.status;
+    if (status == "solved") return {};
+    if (status == "hung") return "time_limit";
+    const bool limit =
+        status == "iteration_limit" || status == "time_limit" || status == "stalled" || status == "numerical_failure";
+    if (limit && row.error && !(row.error->natural <= diverged_error)) return "diverged";
+    return status;
+}
+
+std::string cause_of(const SimulationMeasurement& row) {
+    if (row.status == "finished") return {};
+    if (row.status == "failed") return "step_failure";
+    if (row.status == "hung") return "time_limit";
+    return row.status;
+}
+
+Json problem_row(const ProblemFacts& facts, const SuiteProblem& problem) {
+    Json cones = Json::object();
+    for (const auto& [kind, count] : facts.cones) cones[kind] = count;
+    return {{"kind", "problem"},
+            {"problem", facts.hash},
+            {"name", problem.name.empty() ? facts.name : problem.name},
+            {"from", problem.source.text()},
+            {"source", facts.source},
+            {"n", facts.n},
+            {"m", facts.m},
+            {"law", facts.law},
+            {"structure", facts.structure},
+            {"cones", cones},
+            {"size", size_of(facts)},
+            {"family", problem.family.empty() ? Json(nullptr) : Json(problem.family)}};
+}
+
+Json solve_row(const std::string& key, const std::string& problem, const std::string& law, double tolerance,
+               const Measurement& row) {
+    Json json = {{"kind", "solve"},       {"key", key}, {"problem", problem}, {"law", law}, {"tolerance", tolerance},
+                 {"cause", cause_of(row)}};
+    json.update(json_of(row));
+    json["seconds"]["recorded"] = {json_number(row.recorded.setup), json_number(row.recorded.solve)};
+    json["stages"] = row.stages;
+    return json;
+}
+
+Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
+                    const SimulationMeasurement& row) {
+    return {{"kind", "simulation"},
+            {"key", key},
+            {"scene", scene},
+            {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
+            {"step", request.step},
+            {"solver", request.solver},
+            {"status", row.status},
+            {"cause", cause_of(row)},
+            {"message", row.message},
+            {"seconds",
+             {{"setup", json_number(row.setup)}, {"stepping", json_number(row.seconds)}, {"repeats", row.repeats}}},
+            {"error", {{"position", json_number(row.position)}, {"velocity", json_number(row.velocity)}}},
+            {"totals", row.totals},
+            {"peak_memory", row.peak_memory}};
+}
+
+}  // namespace delassus::bench

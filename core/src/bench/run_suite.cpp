@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/run_suite.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+#include <set>
+
+#include "bench/key.hpp"
+#include "bench/reference.hpp"
+#include "bench/rows.hpp"
+#include "bench/scene_dumps.hpp"
+#include "bench/tasks.hpp"
+#include "delassus/error.hpp"
+#include "delassus/version.hpp"
+#include "support/library_location.hpp"
+#include "support/text_file.hpp"
+
+namespace delassus::bench {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+Json session_row(const RunPlan& plan, const Tasks& tasks, const std::string& code) {
+    const Suite& suite = plan.suite;
+    Json keys = Json::array(), solvers = Json::array();
+    for (const auto& task : tasks.solves) keys.push_back(task.key);
+    for (const auto& task : tasks.simulations) keys.push_back(task.key);
+    for (const auto& solver : suite.solvers) solvers.push_back(label_of(solver));
+    return {{"kind", "session"},
+            {"format", rows_format},
+            {"version", rows_version},
+            {"created", now()},
+            {"command", plan.command},
+            {"folder", plan.folder},
+            {"delassus", DELASSUS_VERSION},
+            {"code", code},
+            {"build", json_of(this_build())},
+            {"machine", json_of(this_machine())},
+            {"threads", 1},
+            {"suite",
+             {{"file", fs::absolute(suite.file).lexically_normal().string()},
+              {"hash", key_of({suite.text})},
+              {"title", suite.title.empty() ? suite.file.stem().string() : suite.title},
+              {"description", suite.description}}},
+            {"settings",
+             {{"tolerances", suite.tolerances},
+              {"time_limit", suite.time_limit},
+              {"memory_limit", suite.memory_limit > 0.0 ? Json(suite.memory_limit) : Json(nullptr)},
+              {"max_iterations", suite.max_iterations},
+              {"repeats", suite.repeats}}},
+            {"solvers", solvers},
+            {"left_out", suite.left_out},
+            {"keys", keys}};
+}
+
+class SuiteRun {
+public:
+    SuiteRun(const RunPlan& plan, const RunListener& listener, const Tasks& tasks, std::string code, ResultsFile& file)
+        : plan_(plan), listener_(listener), tasks_(tasks), code_(std::move(code)), file_(file) {
+        for (const auto& task : tasks.solves) total_ += !file.has(task.key);
+        for (const auto& task : tasks.simulations) total_ += !file.has(task.key);
+        counts_.skipped = tasks.solves.size() + tasks.simulations.size() - total_;
+    }
+
+    RunCounts run() {
+        for (const auto& task : tasks_.solves)
+            if (!stopped() && !file_.has(task.key)) solve(task);
+        for (const auto& task : tasks_.simulations)
+            if (!stopped() && !file_.has(task.key)) step(task);
+        counts_.interrupted = stopped();
+        return counts_;
+    }
+
+private:
+    [[nodiscard]] bool stopped() const { return plan_.worker.cancelled && plan_.worker.cancelled(); }
+
+    void begin(const std::string& what) const {
+        if (listener_.on_begin) listener_.on_begin(what, counts_.done + 1, total_);
+    }
+
+    void solve(const SolveTask& task) {
+        const TaskProblem& problem = tasks_.problems[task.problem];
+        // Tasks of a problem and a law follow one another, so the last reference is kept and no other.
+        if (!reference_ || reference_of_ != problem.facts.hash + task.law) {
+            begin(problem.name + "  reference");
+            reference_ = find_reference(plan_.worker, plan_.suite.references, problem.source, problem.facts, task.law,
+                                        plan_.cache);
+            reference_of_ = problem.facts.hash + task.law;
+            if (stopped()) return;
+            if (!reference_->row.is_null()) file_.add(reference_->row);
+        }
+        const SolverConfig& solver = plan_.suite.solvers[task.solver];
+        begin(fmt::format("{}  {}  {:g}", problem.name, label_of(solver), task.tolerance));
+        MeasureRequest request;
+        request.problem = problem.source;
+        request.solver = solver;
+        request.settings = {task.tolerance, plan_.suite.time_limit, plan_.suite.max_iterations, plan_.suite.repeats,
+                            task.law};
+        request.reference = reference_->place;
+        const Measurement row = measure(plan_.worker, request, listener_.on_sample);
+        if (stopped()) return;  // what was interrupted is run again
+        if (libraries_.insert(solver.name).second && !row.libraries.empty())
+            file_.add(
+                {{"kind", "libraries"}, {"solver", solver.name}, {"version", row.version}, {"files", row.libraries}});
+        file_.add(solve_row(task.key, problem.facts.hash, task.law, task.tolerance, row));
+        ++counts_.done;
+    }
+
+    void step(const SimulationTask& task) {
+        const TaskScene& scene = tasks_.scenes[task.scene];
+        if (!reference_ || reference_of_ != scene.facts.hash) {
+            begin(scene.entry.name + "  reference");
+            reference_ = find_step_reference(plan_.worker, plan_.suite.references, scene.entry, scene.facts,
+                                             scene.smallest_step, code_, plan_.cache);
+            reference_of_ = scene.facts.hash;
+            if (stopped()) return;
+            if (!reference_->row.is_null()) file_.add(reference_->row);
+        }
+        begin(fmt::format("{}  {}  h = {:g} s", scene.entry.name, task.request.timestepper, task.request.step));
+        SimulateRequest request = task.request;
+        request.reference = reference_->place;
+        const SimulationMeasurement row = simulate(plan_.worker, request);
+        if (stopped()) return;
+        file_.add(simulation_row(task.key, scene.facts.hash, request, row));
+        ++counts_.done;
+    }
+
+    const RunPlan& plan_;
+    const RunListener& listener_;
+    const Tasks& tasks_;
+    std::string code_;
+    ResultsFile& file_;
+    std::size_t total_ = 0;
+    RunCounts counts_;
+    std::optional<Reference> reference_;
+    std::string reference_of_;
+    std::set<std::string> libraries_;
+};
+
+}  // namespace
+
+std::string code_hash(const Registry& registry, const fs::path& command) {
+    std::set<fs::path> files = {command};
+    const fs::path library = library_directory();
+    for (const auto& folder : {library, library / "delassus"})
+        for (const auto& entry : fs::directory_iterator(folder))
+            if (entry.is_regular_file() && entry.path().filename().string().find("delassus") != std::string::npos &&
+                entry.path().filename().string().find(".so") != std::string::npos)
+                files.insert(entry.path());
+    for (const auto& plugin : registry.plugins()) files.insert(plugin.library);
+    for (const auto& folder : registry.folders())
+        for (const char* list : {"ranking.json", "references.txt"})
+            if (fs::exists(folder / list)) files.insert(folder / list);
+    std::vector<std::string> contents;
+    for (const auto& file : files) contents.push_back(key_of({read_file(file)}));
+    return key_of(contents);
+}
+
+RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunListener& listener) {
+    RunPlan plan = given;
+    const std::string code = code_hash(registry, plan.worker.command);
+    for (const auto& solver : plan.suite.solvers)
+        if (is_library_path(solver.name) && !fs::is_regular_file(solver.name))
+            throw InputError(fmt::format("there is no plugin {}", solver.name));
+    if (plan.suite.memory_limit > 0.0)
+        plan.worker.resident_limit = static_cast<std::uint64_t>(plan.suite.memory_limit * 1024.0 * 1024.0);
+
+    std::error_code failure;
+    fs::create_directories(plan.output, failure);
+    if (failure)
+        throw InputError(fmt::format("the folder {} cannot be made: {}", plan.output.string(), failure.message()));
+    ResultsFile file(plan.output);
+    add_dumped_problems(plan.worker, plan.output / "problems", plan.suite);
+    const Tasks tasks = make_tasks(plan.suite, plan.worker, code);
+    if (tasks.solves.empty() && tasks.simulations.empty())
+        throw InputError(fmt::format("{} asks for no run: {}", plan.suite.file.string(),
+                                     plan.suite.left_out.empty() ? "it names no solver" : plan.suite.left_out.front()));
+
+    file.add(session_row(plan, tasks, code));
+    for (const auto& problem : tasks.problems)
+        file.add(problem_row(problem.facts, {problem.source, problem.name, problem.family}));
+    for (const auto& scene : tasks.scenes)
+        file.add({{"kind", "scene"},
+                  {"scene", scene.facts.hash},
+                  {"name", scene.entry.name},
+                  {"title", scene.facts.title},
+                  {"file", fs::absolute(scene.entry.source.file).lexically_normal().string()},
+                  {"set", Json(scene.entry.source.settings)},
+                  {"end", scene.facts.end},
+                  {"plan", scene.facts.plan}});
+    return SuiteRun(plan, listener, tasks, code, file).run();
+}
+
+}  // namespace delassus::bench

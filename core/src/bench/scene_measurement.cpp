@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/scene_measurement.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bench/ask.hpp"
+#include "delassus/error.hpp"
+
+namespace delassus::bench {
+
+namespace {
+
+Json scene_fields(const char* task, const WorkerSettings& worker, const SceneSource& scene) {
+    Json fields = {{"do", task},
+                   {"scene", std::filesystem::absolute(scene.file).string()},
+                   {"settings", Json(scene.settings)},
+                   {"end", scene.end},
+                   {"plugin_path", Json::array()}};
+    for (const auto& folder : worker.plugin_path) fields["plugin_path"].push_back(folder.string());
+    return fields;
+}
+
+/// How the process ended, where that tells more than what it said.
+void judge_end(SimulationMeasurement& row, const ChildResult& child, const WorkerSettings& worker, bool done) {
+    if (child.over_memory) {
+        row.status = "memory";
+        append(row.message, fmt::format("took more than its {} MiB", worker.resident_limit >> 20));
+    } else if (child.timed_out) {
+        row.status = "hung";
+        append(row.message, "gave no sign beyond its time limit and was killed");
+    } else if (child.cancelled) {
+        row.status = "cancelled";
+    } else if (child.signal != 0 || !done) {
+        row.status = "crashed";
+        append(row.message, child.signal != 0 ? signal_name(child.signal)
+                                              : fmt::format("left with exit code {}", child.exit_code.value_or(0)));
+        if (const auto line = last_line(child.errors); !line.empty()) append(row.message, line);
+    }
+}
+
+}  // namespace
+
+SceneFacts describe_scene(const WorkerSettings& worker, const SceneSource& scene) {
+    SceneFacts facts;
+    std::string failure;
+    bool done = false;
+    const auto child = ask(worker, scene_fields("plan", worker, scene), [&](const Json& line) {
+        const std::string event = line.at("event");
+        if (event == "scene") {
+            facts.hash = line.at("hash");
+            facts.title = line.at("title");
+            facts.step = line.at("step");
+            facts.end = line.at("end");
+            facts.integrator = line.at("integrator");
+        } else if (event == "plan") {
+            facts.plan = line.at("systems");
+        } else if (event == "failed") {
+            failure = line.at("message");
+        }
+        done = done || event == "done";
+        return loading_limit;
+    });
+    if (!failure.empty()) throw InputError(failure);
+    if (child.cancelled) throw Error("interrupted while reading " + scene.file.string());
+    if (!done) {
+        const auto line = last_line(child.errors);
+        throw InputError(fmt::format("{} could not be planned: the process that did ended{}", scene.file.string(),
+                                     line.empty() ? "" : ": " + line));
+    }
+    return facts;
+}
+
+SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateRequest& request) {
+    SimulationMeasurement row;
+    Json question = scene_fields("simulate", worker, request.scene);
+    question["timestepper"] = request.timestepper;
+    question["step"] = request.step;
+    question["solver"] = request.solver;
+    question["time_limit"] = request.time_limit;
+    question["repeats"] = request.repeats;
+    question["state"] = request.state.string();
+    question["reference"] = request.reference.string();
+    bool done = false;
+    const double run_limit = request.time_limit + grace_of(request.time_limit);
+    const auto child = ask(worker, question, [&](const Json& line) -> double {
+        const std::string event = line.at("event");
+        if (event == "begin") return run_limit;
+        if (event == "recorded") {
+            row.status = line.at("status");
+            row.message = line.at("message");
+            row.setup = number_of(line.at("setup"));
+            row.seconds = number_of(line.at("seconds"));
+            if (line.contains("error")) {
+                row.position = number_of(line.at("error").at("position"));
+                row.velocity = number_of(line.at("error").at("velocity"));
+            }
+            row.totals = line;
+            for (const char* own : {"event", "status", "message", "setup", "seconds", "error"}) row.totals.erase(own);
+        } else if (event == "repeat") {
+            row.repeats.push_back(number_of(line.at("seconds")));
+            const bool first = row.repeats.size() == 1;
+            row.setup = first ? number_of(line.at("setup")) : std::min(row.setup, number_of(line.at("setup")));
+            row.seconds = first ? row.repeats.back() : std::min(row.seconds, row.repeats.back());
+        } else if (event == "refused") {
+            row.status = "unsupported";
+            row.message = line.at("message");
+        } else if (event == "failed") {
+            if (row.status.empty()) row.status = line.at("kind") == "memory" ? "memory" : "error";
+            append(row.message, line.at("message").get<std::string>());
+            done = true;
+            return exit_limit;
+        } else if (event == "done") {
+            row.libraries = line.at("libraries").get<std::vector<std::string>>();
+            done = true;
+            return exit_limit;
+        }
+        return loading_limit;
+    });
+    judge_end(row, child, worker, done);
+    row.peak_memory = child.peak_memory;
+    return row;
+}
+
+}  // namespace delassus::bench

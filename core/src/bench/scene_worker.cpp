@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/scene_worker.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "delassus/simulation.hpp"
+#include "problem/structure.hpp"
+#include "process/supervision.hpp"
+#include "scene/plan_json.hpp"
+#include "support/atomic_file.hpp"
+#include "support/text_file.hpp"
+
+namespace delassus::bench {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+Registry registry_of(const Json& request) {
+    std::vector<fs::path> folders;
+    for (const auto& folder : request.at("plugin_path")) folders.emplace_back(folder.get<std::string>());
+    return Registry(folders);
+}
+
+SceneOverrides overrides_of(const Json& request) {
+    SceneOverrides overrides;
+    for (const auto& [path, value] : request.at("settings").items())
+        overrides.values.emplace_back(path, value.get<std::string>());
+    overrides.solver = request.value("solver", std::string());
+    overrides.integrator = request.value("timestepper", std::string());
+    if (request.value("step", 0.0) > 0.0) overrides.step = request.at("step").get<double>();
+    if (request.value("end", -1.0) >= 0.0) overrides.end = request.at("end").get<double>();
+    return overrides;
+}
+
+/// ‖δ‖_M² with the mass at a state; δ: n.
+double mass_norm_squared(const DynamicalSystem& system, const State& at, const std::vector<double>& delta) {
+    std::vector<double> product(delta.size());
+    system.multiply_mass(at, 1.0, delta.data(), product.data());
+    double sum = 0.0;
+    for (std::size_t i = 0; i < delta.size(); ++i) sum += delta[i] * product[i];
+    return std::max(sum, 0.0);
+}
+
+/// Largest displacement from the start and largest velocity of a run in the mass norm: what errors are relative to.
+struct Extent {
+    double displacement = 0.0, speed = 0.0;  // squared while the systems are added up
+};
+
+struct Run {
+    std::string status = "finished", message;
+    double setup = 0.0, seconds = 0.0;
+    Extent extent;
+};
+
+class SceneRun {
+public:
+    SceneRun(Scene scene, const Registry& registry, double time_limit) : scene_(std::move(scene)) {
+        const auto begin = Clock::now();
+        simulations_.reserve(scene_.systems.size());
+        for (auto& system : scene_.systems) simulations_.emplace_back(system, registry);
+        run_.setup = std::chrono::duration<double>(Clock::now() - begin).count();
+        time_limit_ = time_limit;
+    }
+
+    /// extent: measure it as well, on a clock that stands still.
+    Run run(bool extent) {
+        std::vector<State> start;
+        for (const auto& simulation : simulations_) start.push_back(simulation.state());
+        try {
+            for (std::size_t i = 0; i < simulations_.size() && run_.status == "finished"; ++i) {
+                Extent own;
+                while (!simulations_[i].finished()) {
+                    const auto begin = Clock::now();
+                    simulations_[i].step();
+                    run_.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+                    if (extent) widen(own, i, start[i]);
+                    if (run_.seconds > time_limit_ || interrupted()) {
+                        run_.status = interrupted() ? "cancelled" : "time_limit";
+                        run_.message = fmt::format("had come to t = {:.6g} s", simulations_[i].state().t);
+                        break;
+                    }
+                }
+                run_.extent.displacement += own.displacement;
+                run_.extent.speed += own.speed;
+            }
+        } catch (const StepFailure& failure) {
+            run_.status = "failed";
+            run_.message = failure.what();
+        }
+        if (run_.status == "finished") judge();
+        run_.extent = {std::sqrt(run_.extent.displacement), std::sqrt(run_.extent.speed)};
+        return run_;
+    }
+
+    [[nodiscard]] const std::vector<Simulation>& simulations() const { return simulations_; }
+
+    /// The systems' states at the end, with the extents.
+    [[nodiscard]] Json state() const {
+        Json systems = Json::array();
+        for (const auto& simulation : simulations_)
+            systems.push_back({{"q", simulation.state().q}, {"v", simulation.state().v}});
+        return {{"displacement", run_.extent.displacement}, {"speed", run_.extent.speed}, {"systems", systems}};
+    }
+
+    /// Distance of the end from the reference's in positions and velocities, in the mass norm, relative to the
+    /// reference's extents.
+    [[nodiscard]] Json error(const Json& reference) const {
+        double position = 0.0, velocity = 0.0;
+        for (std::size_t i = 0; i < simulations_.size(); ++i) {
+            const MultibodySystem& system = *scene_.systems[i].system;
+            State best;
+            best.t = simulations_[i].state().t;
+            best.q = reference.at("systems").at(i).at("q").get<std::vector<double>>();
+            best.v = reference.at("systems").at(i).at("v").get<std::vector<double>>();
+            std::vector<double> delta(best.v.size());
+            system.difference(best.q.data(), simulations_[i].state().q.data(), delta.data());
+            position += mass_norm_squared(system, best, delta);
+            for (std::size_t k = 0; k < delta.size(); ++k) delta[k] = simulations_[i].state().v[k] - best.v[k];
+            velocity += mass_norm_squared(system, best, delta);
+        }
+        const auto relative = [](double squared, double extent) {
+            return json_number(extent > 0.0 ? std::sqrt(squared) / extent : std::sqrt(squared));
+        };
+        return {{"position", relative(position, reference.at("displacement").get<double>())},
+                {"velocity", relative(velocity, reference.at("speed").get<double>())}};
+    }
+
+private:
+    void widen(Extent& extent, std::size_t index, const State& start) const {
+        const MultibodySystem& system = *scene_.systems[index].system;
+        const State& now = simulations_[index].state();
+        std::vector<double> delta(now.v.size());
+        system.difference(start.q.data(), now.q.data(), delta.data());
+        extent.displacement = std::max(extent.displacement, mass_norm_squared(system, now, delta));
+        extent.speed = std::max(extent.speed, mass_norm_squared(system, now, now.v));
+    }
+
+    void judge() {
+        const auto finite = [](const std::vector<double>& values) {
+            return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+        };
+        for (const auto& simulation : simulations_) {
+            const auto& totals = simulation.totals();
+            if (!finite(simulation.state().q) || !finite(simulation.state().v)) {
+                run_.status = "diverged";
+                run_.message = "the state is not finite";
+            } else if (totals.unsolved_steps > 0) {
+                run_.status = "unsolved";
+                run_.message = fmt::format("{} of {} steps missed the solver's tolerance, first {}",
+                                           totals.unsolved_steps, simulation.record().step, totals.first_unsolved);
+            }
+        }
+    }
+
+    Scene scene_;
+    std::vector<Simulation> simulations_;
+    Run run_;
+    double time_limit_ = 0.0;
+};
+
+/// Sums and extremes over the systems.
+Json totals_of(const std::vector<Simulation>& simulations) {
+    std::int64_t steps = 0, newton = 0, iterations = 0, unsolved = 0, contacts = 0;
+    double start = 0.0, end = 0.0, drift = 0.0, penetration = 0.0, natural = 0.0, solver_seconds = 0.0;
+    for (const auto& simulation : simulations) {
+        const SimulationTotals& totals = simulation.totals();
+        steps += simulation.record().step;
+        newton += totals.newton_iterations;
+        iterations += totals.solver_iterations;
+        unsolved += totals.unsolved_steps;
+        contacts = std::max(contacts, totals.most_contacts);
+        start += totals.start_energy;
+        end += totals.energy;
+        drift = std::max(drift, totals.worst_drift);
+        penetration = std::max(penetration, totals.worst_penetration);
+        natural = std::max(natural, totals.worst_natural);
+        solver_seconds += totals.solver_seconds;
+    }
+    return {{"steps", steps},
+            {"newton_iterations", newton},
+            {"solver_iterations", iterations},
+            {"unsolved_steps", unsolved},
+            {"most_contacts", contacts},
+            {"energy", {json_number(start), json_number(end)}},
+            {"drift", json_number(drift)},
+            {"penetration", json_number(penetration)},
+            {"natural", json_number(natural)},
+            {"solver_seconds", solver_seconds}};
+}
+
+}  // namespace
+
+void send_plan(const Channel& channel, const Json& request) {
+    const fs::path file = request.at("scene").get<std::string>();
+    Scene scene = read_scene(file, overrides_of(request));
+    Hash hash;
+    hash.add(std::vector<char>(scene.canonical.begin(), scene.canonical.end()));
+    double end = 0.0;
+    for (const auto& system : scene.systems) end = std::max(end, system.end);
+    const Json facts = {{"hash", fmt::format("{:016x}", hash.value())},
+                        {"title", scene.title},
+                        {"step", scene.systems.front().step},
+                        {"integrator", scene.systems.front().integrator},
+                        {"end", end}};
+    channel.send("scene", facts);
+    const Registry registry = registry_of(request);
+    channel.send("plan", Json::parse(plan_json(file.filename().string(), make_plan(scene, registry))));
+}
+
+void simulate(const Channel& channel, const Json& request) {
+    const fs::path file = request.at("scene").get<std::string>();
+    const double time_limit = request.at("time_limit");
+    const Registry registry = registry_of(request);
+    const auto prepare = [&] {
+        Scene scene = read_scene(file, overrides_of(request));
+        channel.send("begin");
+        return SceneRun(std::move(scene), registry, time_limit);
+    };
+    const auto state_file = request.at("state").get<std::string>();
+    try {
+        SceneRun first = prepare();
+        const Run run = first.run(!state_file.empty());
+        Json answer = totals_of(first.simulations());
+        answer["status"] = run.status;
+        answer["message"] = run.message;
+        answer["setup"] = run.setup;
+        answer["seconds"] = run.seconds;
+        const bool complete = run.status == "finished" || run.status == "unsolved";
+        if (complete && !state_file.empty()) write_file_atomically(state_file, text_of(first.state()));
+        if (const auto reference = request.at("reference").get<std::string>(); complete && !reference.empty())
+            answer["error"] = first.error(Json::parse(read_file(reference)));
+        channel.send("recorded", answer);
+        if (!complete) return;
+        for (int k = 0; k < request.at("repeats").get<int>() && !interrupted(); ++k) {
+            SceneRun again = prepare();
+            const Run repeated = again.run(false);
+            channel.send("repeat", {{"setup", repeated.setup}, {"seconds", repeated.seconds}});
+        }
+    } catch (const Unsupported& refusal) {
+        channel.send("refused", {{"message", refusal.what()}});
+    }
+}
+
+}  // namespace delassus::bench

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "bench/analysis.hpp"
+#include "bench/bench_writers.hpp"
+
+namespace delassus::bench {
+
+namespace {
+
+std::string seconds_text(double value) {
+    if (!std::isfinite(value)) return "—";
+    if (value < 1e-3) return fmt::format("{:.3g} µs", value * 1e6);
+    if (value < 1.0) return fmt::format("{:.3g} ms", value * 1e3);
+    return fmt::format("{:.3g} s", value);
+}
+
+std::string error_text(const Json& value) {
+    return value.is_number() ? fmt::format("{:.1e}", value.get<double>()) : "—";
+}
+
+/// A Markdown table with columns padded, so that it is a table on a terminal too.
+class Table {
+public:
+    explicit Table(std::vector<std::string> head) : rows_{std::move(head)} {}
+    void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+    [[nodiscard]] std::string text() const {
+        std::vector<std::size_t> widths(rows_.front().size(), 3);
+        for (const auto& row : rows_)
+            for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(row[i]));
+        std::string text;
+        for (std::size_t r = 0; r < rows_.size(); ++r) {
+            for (std::size_t i = 0; i < widths.size(); ++i) {
+                const std::string padding(widths[i] - width_of(rows_[r][i]), ' ');
+                text += i == 0 ? "| " + rows_[r][i] + padding + " |" : " " + padding + rows_[r][i] + " |";
+            }
+            text += '\n';
+            if (r > 0) continue;
+            for (std::size_t i = 0; i < widths.size(); ++i)
+                text += i == 0 ? "|:" + std::string(widths[i] + 1, '-') + "|" : std::string(widths[i] + 1, '-') + ":|";
+            text += '\n';
+        }
+        return text;
+    }
+
+private:
+    /// Characters of UTF-8.
+    static std::size_t width_of(const std::string& text) {
+        return static_cast<std::size_t>(std::count_if(
+            text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+    }
+    std::vector<std::vector<std::string>> rows_;
+};
+
+std::string name_of_hash(const std::vector<Json>& rows, const char* key, const Json& hash) {
+    for (const Json& row : rows)
+        if (row.at(key) == hash) return row.at("name");
+    return hash;
+}
+
+const std::map<std::string, std::string>& class_titles() {
+    static const std::map<std::string, std::string> titles = {
+        {"linear", "Linear problems (free rows only)"},     {"unsymmetric", "Linear problems, H unsymmetric"},
+        {"indefinite", "Linear problems, H indefinite"},    {"associated", "Contact problems, associated law"},
+        {"coulomb", "Contact problems, exact Coulomb law"}, {"all", "All problems"}};
+    return titles;
+}
+
+/// Solved, and mean time, for each solver at each tolerance.
+std::string class_text(const Json& one) {
+    const Json& tolerances = one.at("tolerances");
+    std::vector<std::string> head = {"solver"};
+    std::map<std::string, std::vector<std::string>> rows;
+    std::map<std::string, double> means;
+    std::vector<std::string> order;
+    for (const Json& at : tolerances) {
+        const auto tolerance = at.at("tolerance").get<double>();
+        head.push_back(fmt::format("solved {:g}", tolerance));
+        head.push_back("mean");
+        for (const Json& solver : at.at("solvers")) {
+            const std::string label = solver.at("solver");
+            if (!rows.contains(label)) order.push_back(label);
+            rows[label].push_back(solver.at("supported") == 0 ? "—"
+                                                              : fmt::format("{} of {}", solver.at("solved").get<int>(),
+                                                                            solver.at("supported").get<int>()));
+            rows[label].push_back(solver.at("supported") == 0 ? "—" : seconds_text(number_of(solver.at("mean"))));
+            means[label] += solver.at("supported") == 0 ? 1e9 : number_of(solver.at("mean"));
+        }
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](const auto& a, const auto& b) { return means.at(a) < means.at(b); });
+    Table table(head);
+    std::string refused;
+    for (const auto& label : order) {
+        if (means.at(label) >= 1e9) {
+            refused += (refused.empty() ? "" : ", ") + label;
+            continue;
+        }
+        std::vector<std::string> row = {label};
+        row.insert(row.end(), rows.at(label).begin(), rows.at(label).end());
+        row.resize(head.size(), "—");
+        table.add(row);
+    }
+    const int problems = one.at("problems");
+    return fmt::format(
+        "### {}: {}\n\n{}{}\n",
+        class_titles().count(one.at("name")) ? class_titles().at(one.at("name")) : one.at("name").get<std::string>(),
+        problems, table.text(), refused.empty() ? "" : fmt::format("\nTake none of these: {}.\n", refused));
+}
+
+/// The fastest solver of each problem at the tightest tolerance.
+std::string fastest_text(const ResultSet& results) {
+    double tightest = 1.0;
+    for (const auto& tolerance : results.session.at("settings").at("tolerances"))
+        tightest = std::min(tightest, tolerance.get<double>());
+    Table table({"problem", "rows", "law", "fastest", "time", "natural", "velocity", "iterations"});
+    std::map<std::string, const Json*> best;
+    std::vector<std::pair<std::string, const Json*>> asked;
+    for (const Json& row : results.solves) {
+        if (row.at("tolerance") != tightest) continue;
+        const std::string key = row.at("problem").get<std::string>() + row.at("law").get<std::string>();
+        if (asked.empty() || asked.back().first != key) asked.emplace_back(key, &row);
+        if (row.at("cause") != "") continue;
+        auto& held = best[key];
+        if (!held || total_seconds(row) < total_seconds(*held)) held = &row;
+    }
+    for (const auto& [key, any] : asked) {
+        std::string rows = "—";
+        for (const Json& problem : results.problems)
+            if (problem.at("problem") == any->at("problem")) rows = std::to_string(problem.at("m").get<int>());
+        const std::string name = name_of_hash(results.problems, "problem", any->at("problem"));
+        const Json* row = best.contains(key) ? best.at(key) : nullptr;
+        if (!row) {
+            table.add({name, rows, any->at("law"), "none solved it", "—", "—", "—", "—"});
+        } else {
+            table.add({name, rows, row->at("law"), row->at("label"), seconds_text(total_seconds(*row)),
+                       error_text(row->at("error").at("natural")), error_text(row->at("error").at("velocity")),
+                       std::to_string(row->at("iterations").get<std::int64_t>())});
+        }
+    }
+    return asked.empty() ? "" : fmt::format("### The fastest at {:g}\n\n{}\n", tightest, table.text());
+}
+
+std::string failures_text(const Json& analysis) {
+    std::map<std::string, std::string> causes;
+    for (const Json& failure : analysis.at("failures")) {
+        if (failure.at("cause") == "unsupported") continue;
+        auto& text = causes[failure.at("cause")];
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", failure.at("solver").get<std::string>(),
+                            failure.at("count").get<int>());
+    }
+    if (causes.empty()) return {};
+    std::string text = "### Failures (runs)\n\n";
+    if (const auto lies = causes.find("false_claim"); lies != causes.end()) {
+        text += fmt::format("- **FALSE CLAIM**: {}\n", lies->second);
+        causes.erase(lies);
+    }
+    for (auto& [cause, who] : causes) {
+        std::string spoken = cause;
+        std::replace(spoken.begin(), spoken.end(), '_', ' ');
+        text += fmt::format("- {}: {}\n", spoken, who);
+    }
+    return text + "\n";
+}
+
+std::string scaling_text(const Json& analysis) {
+    Table table({"family", "law", "solver", "tolerance", "cost grows as size^", "sizes"});
+    int count = 0;
+    for (const Json& one : analysis.at("scaling")) {
+        if (one.at("fit").is_null()) continue;
+        ++count;
+        table.add({one.at("family"), one.at("law"), one.at("solver"),
+                   fmt::format("{:g}", one.at("tolerance").get<double>()),
+                   fmt::format("{:.2f} ± {:.2f}", one.at("fit").at("exponent").get<double>(),
+                               one.at("fit").at("standard_error").get<double>()),
+                   std::to_string(one.at("points").size())});
+    }
+    return count == 0 ? "" : "### Growth of cost with size\n\n" + table.text() + "\n";
+}
+
+std::string stepping_text(const ResultSet& results, const Json& analysis) {
+    if (results.simulations.empty()) return {};
+    Table table({"scene", "timestepper", "step s", "error", "time", "steps", "order", "ended"});
+    for (const Json& row : results.simulations) {
+        std::string order = "—";
+        for (const Json& one : analysis.at("orders"))
+            if (one.at("scene") == row.at("scene") && one.at("timestepper") == row.at("timestepper") &&
+                one.at("solver") == row.at("solver") && !one.at("fit").is_null())
+                order = fmt::format("{:.2f}", one.at("fit").at("exponent").get<double>());
+        const Json& totals = row.at("totals");
+        table.add({name_of_hash(results.scenes, "scene", row.at("scene")), row.at("timestepper"),
+                   fmt::format("{:g}", row.at("step").get<double>()), error_text(row.at("error").at("position")),
+                   seconds_text(number_of(row.at("seconds").at("stepping"))),
+                   totals.contains("steps") ? std::to_string(totals.at("steps").get<std::int64_t>()) : "—", order,
+                   row.at("status")});
+    }
+    return "### Timesteppers: error of the trajectory's end\n\n" + table.text() + "\n";
+}
+
+}  // namespace
+
+std::string summary_markdown(const ResultSet& results, const Json& analysis) {
+    const Json& session = results.session;
+    const Json& machine = session.at("machine");
+    std::string text = fmt::format("## {}\n\n", session.at("suite").at("title").get<std::string>());
+    text += fmt::format("{} runs of solvers on {} problems, {} runs of {} scenes; delassus {}, {}, {}.\n",
+                        results.solves.size(), results.problems.size(), results.simulations.size(),
+                        results.scenes.size(), session.at("delassus").get<std::string>(),
+                        session.at("created").get<std::string>(), machine.at("processor").get<std::string>());
+    if (results.missing > 0)
+        text += fmt::format("**Not complete**: {} runs are missing. Run the same command again to go on.\n",
+                            results.missing);
+    if (number_of(machine.at("load")) > 0.5 * machine.at("cores").get<double>())
+        text +=
+            fmt::format("The machine was busy when this began (load {:.1f}): times are longer than on a quiet one.\n",
+                        machine.at("load").get<double>());
+    text += '\n';
+    for (const Json& one : analysis.at("classes"))
+        if (one.at("name") != "all") text += class_text(one);
+    text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) + stepping_text(results, analysis);
+    if (!results.solves.empty())
+        text += fmt::format(
+            "Mean: shifted geometric mean of setup and solve (shift {:g} s) over the problems that any solver solved; "
+            "one that "
+            "it did not solve counts as the time limit, {:g} s.\n",
+            mean_shift, session.at("settings").at("time_limit").get<double>());
+    return text;
+}
+
+}  // namespace delassus::bench

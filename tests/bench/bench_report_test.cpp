@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The report of a suite in a browser: its charts, its switches, its red rows.
+// g++ 12 with sanitizers sees uninitialised members inside std::regex.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+
+#include "bench_fixture.hpp"
+#include "support/browser.hpp"
+#include "support/html_page.hpp"
+
+namespace delassus::bench_test {
+namespace {
+
+class BenchReport : public BenchTest {
+protected:
+    void SetUp() override {
+        BenchTest::SetUp();
+        if (!fs::exists(page_parts() / "echarts.min.js"))
+            GTEST_SKIP() << "built without the chart library, so no page is written";
+        std::ofstream(folder / "pendulum.yaml")
+            << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/pendulum.yaml");
+        const auto run = run_suite(
+            suite("title: <img src=x onerror=alert(1)>\n"
+                  "problems: [stops, {generate: sphere_pile, set: {contacts: [10, 30, 90]}}]\n"
+                  "solvers: [misbehaving, misbehaving(behaviour=lie), misbehaving(behaviour=crash), apgd, pgs]\n"
+                  "tolerances: [1e-3, 1e-6]\n"
+                  "scenes: [{path: pendulum.yaml, end: 0.1, steps: [0.02, 0.01]}]\n"
+                  "timesteppers: [hht]\n"
+                  "repeats: 1\n"));
+        ASSERT_EQ(run.exit_code, 0) << run.errors;
+        page = content_of(folder / "out" / "report.html");
+    }
+
+    /// Opens the page with a script at its end.
+    [[nodiscard]] tests::Browsed open(const std::string& script, const std::vector<std::string>& flags = {}) const {
+        std::string text = page;
+        text.insert(text.rfind("</body>"), "<script>{" + script + "}</script>");
+        std::ofstream(folder / "open.html", std::ios::binary) << text;
+        auto all = flags;
+        all.emplace_back("--disable-gpu");
+        return tests::open_in_browser(folder / "open.html", folder / "profile", all);
+    }
+
+    std::string page;
+};
+
+TEST_F(BenchReport, IsWholeInOneFile) {
+    const auto data = page.find("<script type=\"application/json\"");
+    const auto library = page.find("<script>", data);
+    const auto own = page.find("<script>\n// SPDX", library);
+    ASSERT_NE(own, std::string::npos);
+    tests::expect_nothing_from_elsewhere(page.substr(0, data) + page.substr(own));
+    for (const char* mark : {"@bench.css@", "@bench.js@", "@bench_scenes.js@", "@data@"})
+        EXPECT_EQ(page.find(mark), std::string::npos) << mark;
+}
+
+TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
+    // Before and after a click on the switch of apgd: how many series the first problem's chart has. Then the velocity.
+    const auto run = open(
+        "charts.forEach((entry) => { if (!entry.chart) entry.draw(); });"
+        "const chart = () => document.querySelector('#problem-2 .chart').chart.chart.getOption().series.filter((s) => "
+        "s.name === 'apgd').length;"
+        "const root = document.documentElement; root.dataset.before = chart();"
+        "const button = [...document.querySelectorAll('#legend button')].find((one) => one.dataset.name === 'apgd');"
+        "button.scrollIntoView(); const {left, top} = button.getBoundingClientRect();"
+        "document.elementFromPoint(left + 6, top + 6).dispatchEvent(new MouseEvent('click', {bubbles: true}));"
+        "root.dataset.after = chart(); root.dataset.pressed = button.getAttribute('aria-pressed');"
+        "button.click(); root.dataset.again = chart();"
+        "[...document.querySelectorAll('#problem-2 .tools button')].find((one) => "
+        "one.textContent.startsWith('velocity')).click();"
+        "root.dataset.axis = document.querySelector('#problem-2 .chart').chart.chart.getOption().yAxis[0].name;");
+    ASSERT_FALSE(run.timed_out);
+    const std::string head = run.dom.substr(0, 600);
+    for (const char* fact : {"data-before=\"1\"", "data-after=\"0\"", "data-pressed=\"false\"", "data-again=\"1\"",
+                             "data-axis=\"velocity error\""})
+        EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
+    EXPECT_NE(run.dom.find("<tr class=\"lie\">"), std::string::npos);  // a false claim is a red row
+    EXPECT_NE(run.dom.find("<span class=\"status false_claim\">false claim</span>"), std::string::npos);
+    EXPECT_NE(run.dom.find("<span class=\"status crashed\">crashed</span>"), std::string::npos);
+    EXPECT_NE(run.dom.find("id=\"growth\""), std::string::npos);
+    EXPECT_NE(run.dom.find("collision detection"), std::string::npos);  // the plan of the scene
+    EXPECT_EQ(run.dom.find("<img src=\"x\""), std::string::npos);       // names are text, never markup
+    EXPECT_NE(run.dom.find("<svg"), std::string::npos);
+}
+
+TEST_F(BenchReport, AScreenshotShowsIt) {
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
+    const auto shot = folder / "report.png", blank = folder / "blank.png";
+    const auto drawn = open("", {"--window-size=1200,3000", "--screenshot=" + shot.string()});
+    const auto empty =
+        open("document.body.replaceChildren();", {"--window-size=1200,3000", "--screenshot=" + blank.string()});
+    ASSERT_FALSE(drawn.timed_out || empty.timed_out);
+    ASSERT_TRUE(fs::exists(shot) && fs::exists(blank)) << drawn.log;
+    EXPECT_GT(fs::file_size(shot), 5 * fs::file_size(blank));
+}
+
+}  // namespace
+}  // namespace delassus::bench_test

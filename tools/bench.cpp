@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus bench: suites of solvers on problems and timesteppers on scenes; reports; results before and after a change.
+#include <fmt/format.h>
+
+#include "bench/analysis.hpp"
+#include "bench/bench_writers.hpp"
+#include "bench/compare.hpp"
+#include "bench/compare_sets.hpp"
+#include "bench/reference.hpp"
+#include "bench/run_suite.hpp"
+#include "command.hpp"
+#include "delassus/error.hpp"
+#include "measuring.hpp"
+#include "process/child_process.hpp"
+#include "process/supervision.hpp"
+#include "support/atomic_file.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct BenchArguments {
+    std::string suite;
+    fs::path output, cache, folder, before, after;
+    std::vector<fs::path> plugin_path;
+    bool any_machine = false, json = false;
+};
+
+/// Writes all that is made of results.jsonl, prints the summary and the path of the page.
+void report(const fs::path& folder) {
+    const bench::ResultSet results = bench::read_results(folder);
+    const bench::Json analysis = bench::analyse(results);
+    const std::string summary = bench::summary_markdown(results, analysis);
+    write_file_atomically(folder / "summary.md", summary);
+    write_file_atomically(folder / "results.csv", bench::solves_csv(results));
+    if (!results.simulations.empty())
+        write_file_atomically(folder / "simulations.csv", bench::simulations_csv(results));
+    const auto no_page = write_page(folder / "report.html", [&] { return bench::bench_page(results, analysis); });
+    fmt::print("{}\n{}\n", summary,
+               (folder / (no_page.empty() ? "report.html" : "summary.md")).lexically_normal().string());
+    if (!no_page.empty()) fmt::print(stderr, "delassus: {}\n", no_page);
+}
+
+int run_bench(const BenchArguments& arguments) {
+    const auto folders = absolute(arguments.plugin_path);
+    const Registry registry(folders);
+    bench::RunPlan plan;
+    plan.suite = bench::read_suite(bench::find_suite(arguments.suite), registry);
+    plan.output =
+        !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
+    plan.cache =
+        fs::absolute(!arguments.cache.empty() ? arguments.cache : bench::cache_folder(plan.output / "references"));
+    plan.worker.command = own_program();
+    plan.worker.plugin_path = folders;
+    plan.worker.cancelled = interrupted;
+    plan.command = bench::shell_line(own_command_line());
+    plan.folder = fs::current_path().string();
+    install_interrupt_handler();
+    bench::RunCounts counts;
+    {
+        MeasuringProgress progress;
+        bench::RunListener listener;
+        listener.on_begin = [&](const std::string& what, std::size_t number, std::size_t total) {
+            progress.begin(fmt::format("[{}/{}] {}", number, total, what));
+        };
+        listener.on_sample = [&](const CurveSample& sample) { progress.sample(sample); };
+        counts = bench::run_suite(plan, registry, listener);
+    }
+    for (const auto& sentence : plan.suite.left_out) fmt::print(stderr, "delassus: left out: {}\n", sentence);
+    if (counts.skipped > 0)
+        fmt::print(stderr, "delassus: {} runs were done before and are taken from {}\n", counts.skipped,
+                   (plan.output / "results.jsonl").string());
+    report(plan.output);
+    if (!counts.interrupted) return exit_solved;
+    fmt::print(stderr, "delassus: interrupted; the same command goes on from there\n");
+    return exit_not_converged;
+}
+
+int compare_results(const BenchArguments& arguments) {
+    const auto comparison = bench::compare_sets(bench::read_results(arguments.before),
+                                                bench::read_results(arguments.after), arguments.any_machine);
+    if (arguments.json) {
+        fmt::print("{}\n", bench::text_of(comparison, 1));
+    } else {
+        fmt::print("A is {}, B is {}; ratios of setup and solve, below 1 where B is faster\n\n{}",
+                   arguments.before.string(), arguments.after.string(), bench::compare_text(comparison));
+    }
+    return exit_solved;
+}
+
+int list_suites(const BenchArguments& arguments) {
+    const Registry registry(absolute(arguments.plugin_path));
+    for (const auto& suite : bench::shipped_suites(registry))
+        fmt::print("{}: {}\n    {}\n    {}\n", suite.name, suite.title, suite.description, suite.file.string());
+    return exit_solved;
+}
+
+}  // namespace
+
+void add_bench(CLI::App& program, Action& action) {
+    auto arguments = std::make_shared<BenchArguments>();
+    auto* bench = program.add_subcommand(
+        "bench", "Run suites of solvers on problems and timesteppers on scenes, and report what they cost and reach");
+    bench->require_subcommand(1);
+
+    auto* run = bench->add_subcommand(
+        "run", "Run a suite, or what is left of it, and write the report. Exit code 0 if all of it was run, else 3");
+    run->add_option("suite", arguments->suite, "Suite file (YAML), or the name of one of `delassus bench list`")
+        ->required()
+        ->type_name("SUITE");
+    run->add_option("-o,--output", arguments->output,
+                    "Folder for results.jsonl, report.html, summary.md and CSV files [delassus-bench-SUITE]")
+        ->type_name("DIR");
+    run->add_option("--cache", arguments->cache, "Folder of reference solutions [~/.cache/delassus/references]")
+        ->type_name("DIR");
+    add_plugin_path(*run, arguments->plugin_path);
+    run->callback([arguments, &action] { action.run = [arguments] { return run_bench(*arguments); }; });
+
+    auto* again = bench->add_subcommand("report", "Write the report of results again");
+    again->add_option("folder", arguments->folder, "Folder of `delassus bench run`")->required()->type_name("DIR");
+    again->callback([arguments, &action] {
+        action.run = [arguments] {
+            report(arguments->folder);
+            return exit_solved;
+        };
+    });
+
+    auto* compare = bench->add_subcommand(
+        "compare", "Set the times of two folders of results side by side, as ratios with their spread");
+    compare->add_option("a", arguments->before, "Results before a change")->required()->type_name("A");
+    compare->add_option("b", arguments->after, "Results after it")->required()->type_name("B");
+    compare->add_flag("--any-machine", arguments->any_machine, "Compare results of different machines all the same");
+    compare->add_flag("--json", arguments->json, "Print the comparison as JSON");
+    compare->callback([arguments, &action] { action.run = [arguments] { return compare_results(*arguments); }; });
+
+    auto* list = bench->add_subcommand("list", "List the suites that come with the library");
+    add_plugin_path(*list, arguments->plugin_path);
+    list->callback([arguments, &action] { action.run = [arguments] { return list_suites(*arguments); }; });
+}
+
+}  // namespace delassus::command

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What `delassus compare` and `delassus bench` have in common: a line of progress, a page, the command line.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "delassus/solver.hpp"
+
+namespace delassus::command {
+
+/// The one line on a terminal that says where a measurement is; nothing where there is no terminal.
+class MeasuringProgress {
+public:
+    MeasuringProgress();
+    ~MeasuringProgress() { clear(); }
+    MeasuringProgress(const MeasuringProgress&) = delete;
+    MeasuringProgress& operator=(const MeasuringProgress&) = delete;
+
+    void begin(const std::string& what);
+    void sample(const CurveSample& sample);
+    void clear() const;
+
+private:
+    void show(const std::string& figures) const;
+    bool shown_;
+    std::string what_;
+    std::chrono::steady_clock::time_point next_;
+};
+
+/// Writes the page that `text` makes; where a part of the page is missing, removes what was there before, which would
+/// mislead, and returns the sentence why there is none.
+[[nodiscard]] std::string write_page(const std::filesystem::path& file, const std::function<std::string()>& text);
+
+/// The command line of this process, as it was given.
+[[nodiscard]] std::vector<std::string> own_command_line();
+
+}  // namespace delassus::command
