@@ -7,6 +7,7 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -227,7 +228,6 @@ inline void SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix,
         if (static_cast<Eigen::Index>(i) >= positive) sign_[static_cast<std::size_t>(position_[i])] = -1.0;
     find_supernodes(permute(matrix, position_), moved);
     find_places(matrix);
-    return true;
 }
 
 inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const std::vector<std::int32_t>& parent) {
