@@ -50,13 +50,20 @@ void Islands::find(const Problem& problem) {
     for (std::int32_t i = 0; i < n; ++i)
         for_each_entry(problem.H, i, [&](std::size_t k) { join(i, problem.H.column[k]); });
     cone_column_.assign(problem.cones.size(), -1);  // any column of the cone's rows
-    for (std::size_t c = 0; c < problem.cones.size(); ++c)
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        std::int32_t top = -1;  // the root of the cone's columns
         for (auto row = first_row_[c]; row < first_row_[c + 1]; ++row)
             for_each_entry(problem.D, row, [&](std::size_t k) {
-                if (problem.D.value[k] == 0.0) return;
-                if (cone_column_[c] < 0) cone_column_[c] = problem.D.column[k];
-                join(cone_column_[c], problem.D.column[k]);
+                const auto column = problem.D.column[k];
+                if ((top >= 0 && parent_[static_cast<std::size_t>(column)] == top) || problem.D.value[k] == 0.0) return;
+                if (top < 0) {
+                    cone_column_[c] = column;
+                } else {
+                    join(top, column);
+                }
+                top = root(column);
             });
+    }
 
     touched_.assign(static_cast<std::size_t>(n), 0);  // by root
     for (const auto column : cone_column_)

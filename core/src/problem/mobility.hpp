@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the host itself asks of a definite H.
+#pragma once
+
+#include "delassus/sdk/h_inverse.hpp"
+
+namespace delassus {
+
+/// The diagonal of N = D H⁻¹ Dᵀ + E and the velocities that go with given reactions. All calls with the same problem;
+/// new a and b are fine. Unlike sdk::DelassusOperator it makes no blocks of N.
+class Mobility {
+public:
+    /// Reads the structure of H; throws std::invalid_argument unless it is definite or n = 0.
+    void analyze(const sdk::ProblemView& problem) { inverse_.analyze(problem); }
+    /// Throws NumericalFailure if H is not positive definite.
+    void factorize(const sdk::ProblemView& problem);
+    /// As factorize, where the values of H are those of the last factorisation: only D and E are new.
+    void refresh(const sdk::ProblemView& problem);
+
+    [[nodiscard]] const sdk::HInverse& inverse() const { return inverse_; }
+    /// Of N; m.
+    [[nodiscard]] const sdk::Vector& diagonal() const { return diagonal_; }
+    /// r ← D H⁻¹ a + b; resized to m.
+    void free_velocity(const sdk::ProblemView& problem, sdk::Vector& r) const;
+    /// x ← H⁻¹ (a + Dᵀ λ); resized to n. λ: m, or none for λ = 0.
+    void velocity(const sdk::ProblemView& problem, const double* lambda, sdk::Vector& x) const;
+
+private:
+    sdk::HInverse inverse_;
+    sdk::Vector inverse_diagonal_;  // of H, where H is diagonal
+    sdk::Vector diagonal_;
+    mutable sdk::Vector work_;
+};
+
+}  // namespace delassus
