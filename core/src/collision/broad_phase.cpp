@@ -27,7 +27,9 @@ struct BroadPhase::Query {
     void put(std::int32_t a, std::int32_t b) const {
         if (self.filter_(std::min(a, b), std::max(a, b))) pairs.emplace_back(std::min(a, b), std::max(a, b));
     }
-    static std::int32_t place_of(const fcl::CollisionObjectd* object) { return static_cast<const Leaf*>(object)->place; }
+    static std::int32_t place_of(const fcl::CollisionObjectd* object) {
+        return static_cast<const Leaf*>(object)->place;
+    }
 
     static bool any(fcl::CollisionObjectd* first, fcl::CollisionObjectd* second, void* data) {
         static_cast<const Query*>(data)->put(place_of(first), place_of(second));

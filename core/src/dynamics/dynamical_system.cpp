@@ -25,8 +25,10 @@ void UnilateralRows::grow(std::size_t entries) {
 
 void UnilateralRows::end_row(double gap, double rate) {
     // Rows come sorted as a rule, and are short.
-    for (auto last = static_cast<std::size_t>(row_start_.back()) + 1; last < used_; ++last)
-        for (auto k = last; k > static_cast<std::size_t>(row_start_.back()) && column_[k] < column_[k - 1]; --k) {
+    const auto begin = column_.begin() + row_start_.back(), end = column_.begin() + static_cast<std::ptrdiff_t>(used_);
+    for (auto next = std::is_sorted_until(begin, end); next != end; ++next)
+        for (auto k = static_cast<std::size_t>(next - column_.begin());
+             k > static_cast<std::size_t>(row_start_.back()) && column_[k] < column_[k - 1]; --k) {
             std::swap(column_[k], column_[k - 1]);
             std::swap(value_[k], value_[k - 1]);
         }

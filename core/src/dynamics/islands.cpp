@@ -48,21 +48,24 @@ void Islands::find(const Problem& problem) {
     parent_.resize(static_cast<std::size_t>(n));
     std::iota(parent_.begin(), parent_.end(), 0);
     for (std::int32_t i = 0; i < n; ++i)
-        for_each_entry(problem.H, i, [&](std::size_t k) { join(i, problem.H.column[k]); });
+        for_each_entry(problem.H, i, [&](std::size_t k) {
+            if (problem.H.column[k] != i) join(i, problem.H.column[k]);
+        });
     cone_column_.assign(problem.cones.size(), -1);  // any column of the cone's rows
     for (std::size_t c = 0; c < problem.cones.size(); ++c) {
         std::int32_t top = -1;  // the root of the cone's columns
-        for (auto row = first_row_[c]; row < first_row_[c + 1]; ++row)
-            for_each_entry(problem.D, row, [&](std::size_t k) {
-                const auto column = problem.D.column[k];
-                if ((top >= 0 && parent_[static_cast<std::size_t>(column)] == top) || problem.D.value[k] == 0.0) return;
-                if (top < 0) {
-                    cone_column_[c] = column;
-                } else {
-                    join(top, column);
-                }
-                top = root(column);
-            });
+        const auto& D = problem.D;
+        const auto end = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(first_row_[c + 1])]);
+        for (auto k = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(first_row_[c])]); k < end; ++k) {
+            const auto column = D.column[k];
+            if ((top >= 0 && parent_[static_cast<std::size_t>(column)] == top) || D.value[k] == 0.0) continue;
+            if (top < 0) {
+                cone_column_[c] = column;
+            } else {
+                join(top, column);
+            }
+            top = root(column);
+        }
     }
 
     touched_.assign(static_cast<std::size_t>(n), 0);  // by root

@@ -125,7 +125,7 @@ void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& r
 
 // d · ṗ = d · v + (s × d) · ω with ω = A ω̄, for a point at s from the mass centre; a node has no ω.
 MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::point_of(std::int32_t owner,
-                                                                                       const Vector3d& point) const {
+                                                                                        const Vector3d& point) const {
     const auto count = static_cast<std::int32_t>(bodies.size());
     if (owner >= count) return {nodes[static_cast<std::size_t>(owner - count)].column, nullptr, Vector3d::Zero()};
     const auto& place = at[owner];

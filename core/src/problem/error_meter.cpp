@@ -68,13 +68,14 @@ struct ErrorMeter::Implementation {
     }
 
     void take_mobility() {
+        const Vector* diagonal = &reference.diagonal;
         if (prepared.mobility) {
-            prepared.mobility->free_velocity(view, reference.r);
+            diagonal = &prepared.mobility->free_velocity(view, reference.r);
         } else {
             reference = prepared.structure == Structure::Unsymmetric ? of_unsymmetric(view) : of_singular(view);
         }
         r_norm = reference.r.norm();
-        residual.assign(view, prepared.mobility ? prepared.mobility->diagonal() : reference.diagonal, reference.r);
+        residual.assign(view, *diagonal, reference.r);
     }
 
     /// u = D x + E λ + b, in the scratch vector.
@@ -98,31 +99,73 @@ struct ErrorMeter::Implementation {
     /// One pass over D and E for plain_u, for impulse = Dᵀ λ, and for Errors::rounding, which it returns. A product of
     /// k terms is off by at most k ε times the product of the absolute values (Higham, Accuracy and Stability of
     /// Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts for one.
-    double pass_over_rows(const VectorView& x, const VectorView& lambda) const {
+    double pass_over_rows(const double* x, const double* lambda) const {
         plain_u.resize(view.m);
         impulse.setZero(view.n);
+        const delassus_matrix &D = view.raw->D, &E = view.raw->E;
         double sum = 0.0;
         for (std::size_t c = 0; c < view.cones.size(); ++c) {
             const double s = residual.scaling()[c];
             const auto first = view.cones[c].first_row;
-            for (Eigen::Index row = first; row < first + view.cones[c].rows; ++row) {
+            for (auto row = first; row < first + view.cones[c].rows; ++row) {
                 double u = view.b[row], magnitude = std::abs(u);
-                const auto add = [&](double term) {
+                for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k) {
+                    const double term = D.value[k] * x[D.column[k]];
                     u += term;
                     magnitude += std::abs(term);
-                };
-                for (sdk::SparseRowsView::InnerIterator entry(view.D, row); entry; ++entry) {
-                    add(entry.value() * x[entry.col()]);
-                    impulse[entry.col()] += entry.value() * lambda[row];
+                    impulse[D.column[k]] += D.value[k] * lambda[row];
                 }
-                for (sdk::SparseRowsView::InnerIterator entry(view.E, row); entry; ++entry)
-                    add(entry.value() * lambda[entry.col()]);
+                for (auto k = E.row_start[row]; k < E.row_start[row + 1]; ++k) {
+                    const double term = E.value[k] * lambda[E.column[k]];
+                    u += term;
+                    magnitude += std::abs(term);
+                }
                 plain_u[row] = u;
                 const double scaled = s * magnitude + std::abs(lambda[row]) / s;
                 sum += scaled * scaled;
             }
         }
         return 0.5 * std::numeric_limits<double>::epsilon() * std::sqrt(sum) / residual.reference();
+    }
+
+    /// Squares of what Errors reports of the cones, but for the gap, which is a sum.
+    struct ConeSums {
+        double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
+    };
+    /// u: with the De Saxcé term where the law asks for it.
+    [[nodiscard]] ConeSums sums_over_cones(const double* lambda, const Vector& u) const {
+        ConeSums sums;
+        work.resize(view.m);
+        const auto squared_distance = [](const double* from, const double* to, std::int32_t rows) {
+            double sum = 0.0;
+            for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - to[i]) * (from[i] - to[i]);
+            return sum;
+        };
+        for (std::size_t c = 0; c < view.cones.size(); ++c) {
+            const auto& cone = view.cones[c];
+            const auto& operations = sdk::operations_of(cone);
+            const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
+            const double s = residual.scaling()[c];
+            const double *lambda_c = lambda + cone.first_row, *u_c = u.data() + cone.first_row;
+            double* work_c = work.data() + cone.first_row;
+            sums.natural += residual.squared_block(c, lambda_c, plain_u.data() + cone.first_row);
+            std::copy_n(lambda_c, cone.rows, work_c);
+            sdk::project(cone, work_c);
+            sums.cone += squared_distance(lambda_c, work_c, cone.rows) / (s * s);
+            std::copy_n(u_c, cone.rows, work_c);
+            if (friction) {
+                sdk::FrictionCone::project_dual(cone, work_c);
+                sums.gap += sdk::FrictionCone::gap(cone, lambda_c, u_c);
+            } else {
+                operations.project_dual(cone, work_c);
+                sums.gap += operations.gap(cone, lambda_c, u_c);
+            }
+            sums.dual += squared_distance(u_c, work_c, cone.rows) * s * s;
+            for (std::int32_t i = 0; i < cone.rows; ++i) work_c[i] = lambda_c[i] - u_c[i];
+            sdk::project(cone, work_c);
+            sums.siconos += squared_distance(lambda_c, work_c, cone.rows);
+        }
+        return sums;
     }
 
     const PreparedProblem::Implementation& prepared;
@@ -154,42 +197,21 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
     const VectorView x(x_values.data(), problem.n);
     const VectorView lambda(lambda_values.data(), problem.m);
     Errors errors;
-    errors.rounding = self.pass_over_rows(x, lambda);
-    const Vector& u = self.judged_velocity();
-    errors.natural = self.residual.natural(lambda, self.plain_u);
+    errors.rounding = self.pass_over_rows(x.data(), lambda.data());
     if (problem.n > 0) {
         Vector& momentum = self.momentum;
         momentum.noalias() = problem.H * x;
         errors.balance = ratio((momentum - self.impulse - problem.a).norm(),
                                std::max({momentum.norm(), self.impulse.norm(), problem.a.norm()}));
     }
-
-    double cone_sum = 0.0, dual_sum = 0.0, gap_sum = 0.0, siconos_sum = 0.0;
-    Vector& work = self.work;
-    work.resize(problem.m);
-    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
-        const auto& cone = problem.cones[c];
-        const auto& operations = sdk::operations_of(cone);
-        const double s = self.residual.scaling()[c];
-        const auto lambda_c = lambda.segment(cone.first_row, cone.rows);
-        const auto u_c = u.segment(cone.first_row, cone.rows);
-        auto work_c = work.segment(cone.first_row, cone.rows);
-        work_c = lambda_c;
-        sdk::project(cone, work_c.data());
-        cone_sum += (lambda_c - work_c).squaredNorm() / (s * s);
-        work_c = u_c;
-        operations.project_dual(cone, work_c.data());
-        dual_sum += (u_c - work_c).squaredNorm() * s * s;
-        gap_sum += operations.gap(cone, lambda.data() + cone.first_row, u.data() + cone.first_row);
-        work_c = lambda_c - u_c;
-        sdk::project(cone, work_c.data());
-        siconos_sum += (lambda_c - work_c).squaredNorm();
-    }
+    const Vector& u = self.judged_velocity();
+    const auto sums = self.sums_over_cones(lambda.data(), u);
     const double reference = self.residual.reference();
-    errors.cone = std::sqrt(cone_sum) / reference;
-    errors.dual = std::sqrt(dual_sum) / reference;
-    errors.gap = std::abs(gap_sum) / (reference * reference);
-    errors.siconos = ratio(std::sqrt(siconos_sum), std::max({self.r_norm, lambda.norm(), u.norm()}));
+    errors.natural = std::sqrt(sums.natural) / reference;
+    errors.cone = std::sqrt(sums.cone) / reference;
+    errors.dual = std::sqrt(sums.dual) / reference;
+    errors.gap = std::abs(sums.gap) / (reference * reference);
+    errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), u.norm()}));
     return errors;
 }
 

@@ -14,22 +14,22 @@ public:
     void analyze(const sdk::ProblemView& problem) { inverse_.analyze(problem); }
     /// Throws NumericalFailure if H is not positive definite.
     void factorize(const sdk::ProblemView& problem);
-    /// As factorize, where the values of H are those of the last factorisation: only D and E are new.
-    void refresh(const sdk::ProblemView& problem);
+    /// Says that D and E are new, while the values of H are those of the last factorisation.
+    void refresh() { diagonal_is_known_ = false; }
 
     [[nodiscard]] const sdk::HInverse& inverse() const { return inverse_; }
-    /// Of N; m.
-    [[nodiscard]] const sdk::Vector& diagonal() const { return diagonal_; }
-    /// r ← D H⁻¹ a + b; resized to m.
-    void free_velocity(const sdk::ProblemView& problem, sdk::Vector& r) const;
+    /// r ← D H⁻¹ a + b, resized to m; the diagonal of N, m, valid until the next call.
+    const sdk::Vector& free_velocity(const sdk::ProblemView& problem, sdk::Vector& r);
     /// x ← H⁻¹ (a + Dᵀ λ); resized to n. λ: m, or none for λ = 0.
     void velocity(const sdk::ProblemView& problem, const double* lambda, sdk::Vector& x) const;
 
 private:
+    void find_diagonal(const sdk::ProblemView& problem);
+
     sdk::HInverse inverse_;
     sdk::Vector inverse_diagonal_;  // of H, where H is diagonal
-    sdk::Vector diagonal_;
-    mutable sdk::Vector work_;
+    sdk::Vector diagonal_, work_;
+    bool diagonal_is_known_ = false;
 };
 
 }  // namespace delassus

@@ -81,8 +81,7 @@ void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<dou
     if (a.size() != self.problem.a.size() || b.size() != self.problem.b.size())
         throw InputError(fmt::format("the right-hand side has {} and {} entries; the problem has n = {} and m = {}",
                                      a.size(), b.size(), self.problem.n(), self.problem.m()));
-    if (!all_finite(a) || !all_finite(b))
-        throw InputError("the right-hand side holds a value that is not finite");
+    if (!all_finite(a) || !all_finite(b)) throw InputError("the right-hand side holds a value that is not finite");
     self.problem.a = std::move(a);
     self.problem.b = std::move(b);
     self.raw.a = self.problem.a.data();
@@ -134,14 +133,13 @@ void PreparedProblem::renew(const Problem& other) {
     } else {
         validate_values(other, !same_H);
     }
-    const bool same_rows = same_H && !new_places && self.problem.D.value == other.D.value &&
-                           self.problem.E.value == other.E.value;
+    const bool same_rows =
+        same_H && !new_places && self.problem.D.value == other.D.value && self.problem.E.value == other.E.value;
     self.copy(other, new_places);
     if (!same_rows) {
         const Structure before = self.structure;
-        const sdk::ProblemView view(self.raw);
         if (same_H && self.mobility.use_count() == 1) {
-            self.mobility->refresh(view);
+            self.mobility->refresh();
         } else {
             self.detect_structure();
         }

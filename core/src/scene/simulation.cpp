@@ -86,7 +86,8 @@ const StepRecord& Simulation::step() {
     };
     try {
         taken = advance(next);
-        if (!all_finite(next.q) || !all_finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
+        if (!all_finite(next.q) || !all_finite(next.v))
+            throw StepFailure("the state at the end of the step is not finite");
     } catch (const Unsupported& error) {
         undo();
         throw Unsupported(fmt::format("{}: {}", where(), error.what()));
