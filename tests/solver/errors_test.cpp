@@ -186,7 +186,9 @@ TEST(Renewal, EqualsANewProblem) {
     std::set<std::uint64_t> values = {kept.raw().values_id};
     for (std::size_t k = 0; k < sequence.size(); ++k) {
         kept.renew(sequence[k]);
-        if (k > 0) EXPECT_TRUE(values.insert(kept.raw().values_id).second) << k;
+        if (k > 0) {
+            EXPECT_TRUE(values.insert(kept.raw().values_id).second) << k;
+        }
         const PreparedProblem fresh(sequence[k]);
         EXPECT_EQ(kept.needs(), fresh.needs()) << k;
         EXPECT_EQ(kept.structure(), fresh.structure()) << k;
