@@ -3,6 +3,7 @@
 
 #include <Eigen/SparseLU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -58,6 +59,20 @@ constexpr double vanishing_velocity = 1e-8;
 double ratio(double numerator, double denominator) {
     return denominator > 0.0 ? numerator / denominator : numerator;
 }
+
+/// Projections through the table of cones, and those that fill most problems without it.
+struct AnyCone {
+    const sdk::ConeOperations& operations;
+    [[nodiscard]] static std::int32_t rows(const delassus_cone& cone) { return cone.rows; }
+    void project(const delassus_cone& cone, double* lambda) const { operations.project(cone, lambda); }
+    void project_dual(const delassus_cone& cone, double* u) const { operations.project_dual(cone, u); }
+    [[nodiscard]] double gap(const delassus_cone& cone, const double* lambda, const double* u) const {
+        return operations.gap(cone, lambda, u);
+    }
+};
+struct SpatialFriction : sdk::FrictionCone {
+    [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
+};
 
 }  // namespace
 
@@ -132,38 +147,43 @@ struct ErrorMeter::Implementation {
     struct ConeSums {
         double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
     };
-    /// u: with the De Saxcé term where the law asks for it.
+    /// u: with the De Saxcé term where the law asks for it. trial: memory for the rows of the largest cone.
+    template <class Projections>
+    void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* u, double* trial,
+                  ConeSums& sums) const {
+        const auto& cone = view.cones[c];
+        const std::int32_t rows = on.rows(cone);
+        const double square = residual.scaling()[c] * residual.scaling()[c];
+        const auto squared_distance = [&](const double* from) {
+            double sum = 0.0;
+            for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - trial[i]) * (from[i] - trial[i]);
+            return sum;
+        };
+        for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i];
+        on.project(cone, trial);
+        sums.cone += squared_distance(lambda) / square;
+        for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - u[i];
+        on.project(cone, trial);
+        sums.siconos += squared_distance(lambda);
+        for (std::int32_t i = 0; i < rows; ++i) trial[i] = u[i];
+        on.project_dual(cone, trial);
+        sums.dual += squared_distance(u) * square;
+        sums.gap += on.gap(cone, lambda, u);
+    }
+
     [[nodiscard]] ConeSums sums_over_cones(const double* lambda, const Vector& u) const {
         ConeSums sums;
         work.resize(view.m);
-        const auto squared_distance = [](const double* from, const double* to, std::int32_t rows) {
-            double sum = 0.0;
-            for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - to[i]) * (from[i] - to[i]);
-            return sum;
-        };
         for (std::size_t c = 0; c < view.cones.size(); ++c) {
             const auto& cone = view.cones[c];
-            const auto& operations = sdk::operations_of(cone);
-            const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
-            const double s = residual.scaling()[c];
             const double *lambda_c = lambda + cone.first_row, *u_c = u.data() + cone.first_row;
-            double* work_c = work.data() + cone.first_row;
             sums.natural += residual.squared_block(c, lambda_c, plain_u.data() + cone.first_row);
-            std::copy_n(lambda_c, cone.rows, work_c);
-            sdk::project(cone, work_c);
-            sums.cone += squared_distance(lambda_c, work_c, cone.rows) / (s * s);
-            std::copy_n(u_c, cone.rows, work_c);
-            if (friction) {
-                sdk::FrictionCone::project_dual(cone, work_c);
-                sums.gap += sdk::FrictionCone::gap(cone, lambda_c, u_c);
+            if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
+                std::array<double, 3> trial;
+                add_cone(SpatialFriction{}, c, lambda_c, u_c, trial.data(), sums);
             } else {
-                operations.project_dual(cone, work_c);
-                sums.gap += operations.gap(cone, lambda_c, u_c);
+                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u_c, work.data(), sums);
             }
-            sums.dual += squared_distance(u_c, work_c, cone.rows) * s * s;
-            for (std::int32_t i = 0; i < cone.rows; ++i) work_c[i] = lambda_c[i] - u_c[i];
-            sdk::project(cone, work_c);
-            sums.siconos += squared_distance(lambda_c, work_c, cone.rows);
         }
         return sums;
     }
