@@ -60,6 +60,7 @@ public:
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
+        find_last_blocks();
         start_from_last_impulses(solution_.lambda);
         report.solved = solver.solve(problem_, solution_, true);
         if (!report.solved) report.message = solver.effort().unsolved;
@@ -76,8 +77,8 @@ public:
     [[nodiscard]] int order() const override { return 1; }
     [[nodiscard]] bool damps_at_once() const override { return true; }
     [[nodiscard]] bool pushed(std::uint64_t key) const override {
-        const double* impulse = last_impulse(key, 0);
-        return impulse && *impulse > 0.0;
+        const auto found = first_kept(key);
+        return found != kept_.end() && found->key == key && impulses_[static_cast<std::size_t>(found->first)] > 0.0;
     }
 
     void restart() override {
@@ -123,6 +124,12 @@ public:
     }
 
 private:
+    /// Where the impulses of a unilateral block of the last step stand in impulses_.
+    struct Kept {
+        std::uint64_t key;
+        std::int32_t first, rows;
+    };
+
     void assemble_balance(const State& state, double h) {
         const Tangent tangent = exact_ ? Tangent::Exact : Tangent::Symmetric;
         H_.begin(n_, n_);
@@ -140,7 +147,7 @@ private:
         }
         if (constraint_stiffness_ && !multipliers_.empty())
             system_.add_definite_constraint_stiffness(end_, multipliers_.data(), h * h, H_);
-        problem_.H = H_.finish();
+        H_.finish_into(problem_.H);
     }
 
     void assemble_constraints(const State& state, double h) {
@@ -160,33 +167,26 @@ private:
             problem_.cones[k].kind = ConeKind::Free;
             problem_.cones[k].rows = blocks_[k];
         }
-        problem_.D = D_.finish();
+        D_.finish_into(problem_.D);
     }
 
     void assemble_unilateral(const State& state, double h) {
         // Rows are appended to D, which is by compressed rows.
         auto& D = problem_.D;
+        const auto before = D.entries();
+        const auto& starts = rows_.row_start();
         D.rows += static_cast<std::int32_t>(rows_.rows().size());
         D.columns = n_;
+        D.column.insert(D.column.end(), rows_.column().begin(), rows_.column().end());
+        D.value.insert(D.value.end(), rows_.value().begin(), rows_.value().end());
+        for (std::size_t row = 1; row < starts.size(); ++row) D.row_start.push_back(before + starts[row]);
         std::size_t row = 0, place = blocks_.size();
         for (const auto& block : rows_.blocks()) {
             Cone& cone = problem_.cones[place++];
             cone = block.cone;
             for (auto* bounds : {&cone.lo, &cone.hi})
                 for (double& bound : *bounds) bound *= h;
-            for (std::int32_t i = 0; i < cone.rows; ++i, ++row) {
-                const auto first = rows_.entries().begin() + rows_.row_start()[row];
-                const auto last = rows_.entries().begin() + rows_.row_start()[row + 1];
-                sorted_.assign(first, last);
-                std::sort(sorted_.begin(), sorted_.end(),
-                          [](const auto& a, const auto& b) { return a.column < b.column; });
-                for (const auto& entry : sorted_) {
-                    D.column.push_back(entry.column);
-                    D.value.push_back(entry.value);
-                }
-                D.row_start.push_back(D.entries());
-                problem_.b.push_back(offset(block, i, rows_.rows()[row], rows_.speed(row, state.v.data()), h));
-            }
+            for (std::int32_t i = 0; i < cone.rows; ++i, ++row) problem_.b.push_back(offset(block, i, row, state, h));
         }
     }
 
@@ -194,15 +194,17 @@ private:
     // least, also where its first speed was less. One that left and comes back within the step, as a ball that bounces
     // low, does so about as fast.
     void report_reactions(const State& begin, const std::vector<double>& lambda, double h, StepReport& report) const {
-        std::size_t row = 0;
+        std::size_t row = 0, number = 0;
         for (const auto& block : rows_.blocks()) {
-            const double gap = std::max(rows_.rows()[row].gap, 0.0);
             const double reaction = lambda[static_cast<std::size_t>(m_) + row];
-            const double approach = -rows_.speed(row, begin.v.data());
+            const Kept* last = last_of_block_[number++];
             if (reaction != 0.0) ++report.active_blocks;
-            if (block.along_normal() && reaction > 0.0 && (approach < 0.0 || !pushed(block.key))) {
+            if (block.along_normal() && reaction > 0.0) {
+                const double gap = std::max(rows_.rows()[row].gap, 0.0);
+                const double approach = -rows_.speed(row, begin.v.data());
+                const bool pushed_before = last && impulses_[static_cast<std::size_t>(last->first)] > 0.0;
                 const double speed = std::max(std::abs(approach), gap / h);
-                if (speed > report.impact_speed) {
+                if ((approach < 0.0 || !pushed_before) && speed > report.impact_speed) {
                     report.impact_speed = speed;
                     report.impact_time = approach < 0.0 ? h : gap / speed;
                 }
@@ -211,12 +213,26 @@ private:
         }
     }
 
-    [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, const UnilateralRows::Row& row,
-                                double speed, double h) const {
-        if (i == 0 && block.along_normal() && block.restitution > 0.0 && speed < -restitution_speed_ &&
-            row.gap + h * speed <= 0.0)
-            return row.rate + block.restitution * speed;
-        return row.rate + std::max(row.gap / h, -recovery_speed_);
+    /// b of row number `row`, the i-th of its block.
+    [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, std::size_t row, const State& state,
+                                double h) const {
+        const auto& [gap, rate] = rows_.rows()[row];
+        if (i == 0 && block.along_normal() && block.restitution > 0.0) {
+            const double speed = rows_.speed(row, state.v.data());
+            if (speed < -restitution_speed_ && gap + h * speed <= 0.0) return rate + block.restitution * speed;
+        }
+        return rate + std::max(gap / h, -recovery_speed_);
+    }
+
+    // Blocks come by ascending keys as a rule, as they are kept: then each search begins where the last one ended.
+    void find_last_blocks() {
+        last_of_block_.clear();
+        auto next = kept_.cbegin();
+        for (const auto& block : rows_.blocks()) {
+            if (next == kept_.end() || next->key > block.key) next = first_kept(block.key);
+            while (next != kept_.end() && next->key < block.key) ++next;
+            last_of_block_.push_back(next != kept_.end() && next->key == block.key ? &*next : nullptr);
+        }
     }
 
     /// λ ← the impulses of the last step, for the constraints that are still there.
@@ -224,18 +240,19 @@ private:
         lambda = multipliers_;
         for (double& value : lambda) value *= last_h_;
         lambda.resize(static_cast<std::size_t>(m_), 0.0);
+        std::size_t number = 0;
         for (const auto& block : rows_.blocks()) {
-            const double* impulse = last_impulse(block.key, block.cone.rows);
-            for (std::int32_t i = 0; i < block.cone.rows; ++i) lambda.push_back(impulse ? impulse[i] : 0.0);
+            const Kept* last = last_of_block_[number++];
+            const bool fits = last && last->rows == block.cone.rows;
+            for (std::int32_t i = 0; i < block.cone.rows; ++i)
+                lambda.push_back(fits ? impulses_[static_cast<std::size_t>(last->first + i)] : 0.0);
         }
     }
 
-    /// The impulses of a block in the last step; null if it was not there, or with another number of rows (0: any).
-    [[nodiscard]] const double* last_impulse(std::uint64_t key, std::int32_t rows) const {
-        const auto found = std::lower_bound(kept_.begin(), kept_.end(), key,
-                                            [](const Kept& kept, std::uint64_t wanted) { return kept.key < wanted; });
-        if (found == kept_.end() || found->key != key || (rows > 0 && found->rows != rows)) return nullptr;
-        return impulses_.data() + found->first;
+    /// The first with a key not less.
+    [[nodiscard]] std::vector<Kept>::const_iterator first_kept(std::uint64_t key) const {
+        return std::lower_bound(kept_.begin(), kept_.end(), key,
+                                [](const Kept& kept, std::uint64_t wanted) { return kept.key < wanted; });
     }
 
     void keep(const std::vector<double>& lambda, double h) {
@@ -252,15 +269,11 @@ private:
         sort_kept();
     }
     void sort_kept() {
-        std::sort(kept_.begin(), kept_.end(),
-                  [](const Kept& a, const Kept& b) { return a.key != b.key ? a.key < b.key : a.first < b.first; });
+        const auto before = [](const Kept& a, const Kept& b) {
+            return a.key != b.key ? a.key < b.key : a.first < b.first;
+        };
+        if (!std::is_sorted(kept_.begin(), kept_.end(), before)) std::sort(kept_.begin(), kept_.end(), before);
     }
-
-    /// Where the impulses of a unilateral block of the last step stand in impulses_.
-    struct Kept {
-        std::uint64_t key;
-        std::int32_t first, rows;
-    };
 
     DynamicalSystem& system_;
     double recovery_speed_, restitution_speed_;
@@ -272,13 +285,13 @@ private:
     UnilateralRows rows_;
     std::vector<double> before_, after_, delta_;
     double last_h_ = 0.0;
-    std::vector<Kept> kept_;  // by ascending keys
+    std::vector<Kept> kept_;                  // by ascending keys
+    std::vector<const Kept*> last_of_block_;  // of the blocks of rows_: null where there was none
     std::vector<double> impulses_;
     // Kept so that a step like the last allocates nothing.
     Problem problem_;
     Solution solution_;
     State end_;
-    std::vector<UnilateralRows::Entry> sorted_;
 };
 
 const RegisterTimestepper row{

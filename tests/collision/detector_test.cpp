@@ -84,6 +84,14 @@ std::vector<Pose> heap_poses(int count, unsigned seed) {
     return poses;
 }
 
+bool same_bits(const std::vector<ContactPoint>& first, const std::vector<ContactPoint>& second) {
+    return std::equal(
+        first.begin(), first.end(), second.begin(), second.end(), [](const ContactPoint& a, const ContactPoint& b) {
+            return a.shape_a == b.shape_a && a.shape_b == b.shape_b && a.point_a == b.point_a &&
+                   a.point_b == b.point_b && a.normal == b.normal && a.gap == b.gap && a.feature == b.feature;
+        });
+}
+
 TEST(Detector, SameInputSameBits) {
     auto detector = make_collision_detector(heap(60)), other = make_collision_detector(heap(60));
     std::vector<ContactPoint> first, between, again, elsewhere;
@@ -93,12 +101,33 @@ TEST(Detector, SameInputSameBits) {
     other->detect(heap_poses(60, 1), 0.02, elsewhere);
     ASSERT_GT(first.size(), 100U);
     expect_consistent(first, 0.02);
-    const auto same = [](const ContactPoint& a, const ContactPoint& b) {
-        return a.shape_a == b.shape_a && a.shape_b == b.shape_b && a.point_a == b.point_a && a.point_b == b.point_b &&
-               a.normal == b.normal && a.gap == b.gap && a.feature == b.feature;
-    };
-    EXPECT_TRUE(std::equal(first.begin(), first.end(), again.begin(), again.end(), same));
-    EXPECT_TRUE(std::equal(first.begin(), first.end(), elsewhere.begin(), elsewhere.end(), same));
+    EXPECT_TRUE(same_bits(first, again));
+    EXPECT_TRUE(same_bits(first, elsewhere));
+}
+
+// The pairs that a detector keeps from call to call must not show: whether nothing, a few shapes, most of them or the
+// envelope changed, a new detector finds the same.
+TEST(Detector, FindsWhatANewOneFindsWhileShapesMove) {
+    const CollisionSetup setup = heap(60);
+    auto kept = make_collision_detector(setup);
+    auto poses = heap_poses(60, 1);
+    Random random(7);
+    std::vector<ContactPoint> contacts, expected;
+    std::size_t changes = 0, last = 0;
+    for (int step = 0; step < 60; ++step) {
+        const double share = step % 20 == 19 ? 1.0 : step % 5 == 4 ? 0.0 : 0.1;
+        for (std::size_t i = 0; i < poses.size(); ++i) {
+            if (setup.fixed[i] || random(0.0, 1.0) >= share) continue;
+            for (double& coordinate : poses[i].position) coordinate += random(-0.3, 0.3);
+        }
+        const double envelope = step % 7 == 6 ? 0.05 : 0.02;
+        kept->detect(poses, envelope, contacts);
+        make_collision_detector(setup)->detect(poses, envelope, expected);
+        ASSERT_TRUE(same_bits(contacts, expected)) << "step " << step;
+        changes += contacts.size() != last ? 1 : 0;
+        last = contacts.size();
+    }
+    EXPECT_GT(changes, 30U);
 }
 
 TEST(Detector, FindsWhatAllPairsFind) {

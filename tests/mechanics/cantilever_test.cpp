@@ -21,7 +21,7 @@ constexpr double inertia = depth * depth * depth * depth / 12.0, area = depth * 
 /// Clamped at x = 0; Poisson's ratio zero, so that the clamp is no more than the beam theory's.
 void make_cantilever(MultibodySystem& system, int across, ElementModel model, double gravity) {
     system.set_gravity({0.0, 0.0, -gravity});
-    ElasticBlockParameters block;
+    ElasticBlock block;
     block.edges = {length, depth, depth};
     block.cells = {10 * across, across, across};
     block.material = {young, 0.0, density, 0.0};

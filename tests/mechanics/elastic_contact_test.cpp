@@ -23,7 +23,7 @@ TEST(ElasticBlock, SlidesWithTheFrictionOfItsWeight) {
         const auto material = system.add_material({mu, 0.0});
         system.add_shape(plane, material);
         // Strong damping, so that it soon slides steadily.
-        ElasticBlockParameters block;
+        ElasticBlock block;
         block.corner = {0.0, 0.0, radius};
         block.edges = {0.4, 0.2, 0.2};
         block.cells = {4, 2, 2};
@@ -86,7 +86,7 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
     plane.kind = ShapeKind::Plane;
     const auto material = system.add_material({0.3, 0.0});
     system.add_shape(plane, material);
-    ElasticBlockParameters block;
+    ElasticBlock block;
     block.corner = {0.0, 0.0, 0.02};
     block.edges = {0.4, 0.2, 0.2};
     block.cells = {4, 2, 2};

@@ -91,7 +91,7 @@ std::unique_ptr<MultibodySystem> cables(double omega) {
 std::unique_ptr<MultibodySystem> block(double omega) {
     auto system = std::make_unique<MultibodySystem>();
     system->set_gravity({0.0, 0.0, 0.0});
-    ElasticBlockParameters block;
+    ElasticBlock block;
     block.cells = {2, 1, 1};
     block.edges = {2.0, 1.0, 1.0};
     block.material.young = omega * omega;

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
+#include "delassus/error.hpp"
 #include "support/small_problems.hpp"
 
 namespace delassus {
@@ -154,6 +156,72 @@ TEST(Identity, TellsPatternsFromValues) {
     EXPECT_NE(heavier.raw().values_id, first.raw().values_id);
     data.cones = {Cone::nonnegative(1)};
     EXPECT_NE(PreparedProblem(data).raw().pattern_id, first.raw().pattern_id);
+}
+
+/// Two masses tied by rows with these entries.
+Problem masses_with_rows(const std::vector<Triplet>& entries, std::vector<Cone> cones) {
+    Problem problem = tests::tied_masses();
+    problem.b.clear();
+    for (const Cone& cone : cones) problem.b.insert(problem.b.end(), static_cast<std::size_t>(cone.rows), 0.5);
+    problem.D = SparseMatrix::from_triplets(problem.m(), 2, entries);
+    problem.cones = std::move(cones);
+    return problem;
+}
+
+// Rows come, go and change kind while H stays: a renewed problem is judged, and says what it needs, as a new one does.
+TEST(Renewal, EqualsANewProblem) {
+    std::vector<Problem> sequence = {
+        masses_with_rows({{0, 0, 1.0}, {0, 1, -1.0}}, {Cone::free(1)}),
+        masses_with_rows({{0, 0, 2.0}, {0, 1, -1.0}}, {Cone::free(1)}),
+        masses_with_rows({{0, 0, 2.0}, {1, 1, -1.0}}, {Cone::nonnegative(2)}),
+        masses_with_rows({{0, 0, 2.0}, {0, 1, 1.0}, {1, 0, -4.0}, {1, 1, -2.0}}, {Cone::free(1), Cone::free(1)}),
+        masses_with_rows({{0, 0, 1.0}, {1, 1, 1.0}, {2, 0, 1.0}}, {Cone::free(1), Cone::friction(0.3, 2)}),
+        masses_with_rows({}, {}),
+        masses_with_rows({{0, 1, 1.0}}, {Cone::box({-1.0}, {2.0})})};
+    sequence.push_back(sequence[1]);
+    sequence.back().E = tests::identity(1);
+    sequence.push_back(sequence[1]);
+    sequence.back().H.value[1] = 5.0;
+    PreparedProblem kept(sequence[0]);
+    std::set<std::uint64_t> values = {kept.raw().values_id};
+    for (std::size_t k = 0; k < sequence.size(); ++k) {
+        kept.renew(sequence[k]);
+        if (k > 0) {
+            EXPECT_TRUE(values.insert(kept.raw().values_id).second) << k;
+        }
+        const PreparedProblem fresh(sequence[k]);
+        EXPECT_EQ(kept.needs(), fresh.needs()) << k;
+        EXPECT_EQ(kept.structure(), fresh.structure()) << k;
+        EXPECT_EQ(kept.raw().m, fresh.raw().m) << k;
+        const std::vector<double> x = {0.3, -0.7}, lambda(sequence[k].b.size(), 0.9);
+        const Errors here = kept.meter().measure(x, lambda), there = ErrorMeter(fresh).measure(x, lambda);
+        EXPECT_DOUBLE_EQ(here.natural, there.natural) << k;
+        EXPECT_DOUBLE_EQ(here.balance, there.balance) << k;
+        EXPECT_DOUBLE_EQ(here.gap, there.gap) << k;
+        EXPECT_DOUBLE_EQ(here.rounding, there.rounding) << k;
+    }
+}
+
+TEST(Renewal, KeepsItsIdentityWithItsValues) {
+    Problem data = tests::tied_masses();
+    PreparedProblem kept(data);
+    const auto pattern = kept.raw().pattern_id, values = kept.raw().values_id;
+    data.a = {9.0, 9.0};
+    kept.renew(data);
+    EXPECT_EQ(kept.raw().values_id, values);
+    data.D.value[0] = 7.0;
+    kept.renew(data);
+    EXPECT_NE(kept.raw().values_id, values);
+    EXPECT_EQ(kept.raw().pattern_id, pattern);
+}
+
+TEST(Renewal, RefusesWhatIsNotFiniteAndStaysAsItWas) {
+    Problem data = tests::tied_masses();
+    PreparedProblem kept(data);
+    const double before = data.D.value[0];
+    data.D.value[0] = std::nan("");
+    EXPECT_THROW(kept.renew(data), InputError);
+    EXPECT_EQ(kept.problem().D.value[0], before);
 }
 
 }  // namespace

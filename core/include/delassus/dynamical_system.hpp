@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -47,7 +48,7 @@ public:
     /// One block: `rows` rows with one cone.
     struct Block {
         Cone cone;                 ///< for a box, bounds of the force (N, Nm); a stepper multiplies by h
-        double restitution = 0.0;  /// e in [0, 1] of Newton's law u_n⁺ ≥ −e u_n⁻; normal row of a contact
+        double restitution = 0.0;  ///< e in [0, 1] of Newton's law u_n⁺ ≥ −e u_n⁻; normal row of a contact
         std::uint64_t key = 0;     ///< the same constraint has the same key in the next step: for warm starts
 
         /// Whether its first row is the distance of two things that cannot meet.
@@ -62,31 +63,42 @@ public:
 
     DELASSUS_API void clear();
 
-    /// Adds an entry to the row that end_row() closes. Columns of one row may come in any order but not twice.
-    void entry(std::int32_t column, double value) { entries_.push_back({column, value}); }
+    /// Adds entries to the row that end_row() closes, in the columns from `column` on. Columns of one row may come in
+    /// any order but not twice.
+    void entries(std::int32_t column, std::span<const double> values) {
+        const std::size_t end = used_ + values.size();
+        if (column_.size() < end) grow(end);
+        for (const double value : values) {
+            column_[used_] = column++;
+            value_[used_++] = value;
+        }
+    }
+    void entry(std::int32_t column, double value) { entries(column, {&value, 1}); }
     DELASSUS_API void end_row(double gap = 0.0, double rate = 0.0);
     /// Closes a block of the rows since the last one; throws InputError if their number is not cone.rows.
-    DELASSUS_API void end_block(Cone cone, std::uint64_t key, double restitution = 0.0);
+    DELASSUS_API void end_block(const Cone& cone, std::uint64_t key, double restitution = 0.0);
 
-    struct Entry {
-        std::int32_t column;
-        double value;
-    };
-    [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+    [[nodiscard]] std::span<const Block> blocks() const { return {blocks_.data(), block_count_}; }
     [[nodiscard]] const std::vector<Row>& rows() const { return rows_; }
-    [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
-    /// rows() + 1 positions in entries().
+    /// The entries of D_A by compressed rows; columns ascend within a row.
+    [[nodiscard]] std::span<const std::int32_t> column() const { return {column_.data(), used_}; }
+    [[nodiscard]] std::span<const double> value() const { return {value_.data(), used_}; }
+    /// rows() + 1 positions in column() and value().
     [[nodiscard]] const std::vector<std::int32_t>& row_start() const { return row_start_; }
 
     /// D_A v + rate of a row; v: of the system's n.
     [[nodiscard]] DELASSUS_API double speed(std::size_t row, const double* v) const;
 
 private:
+    DELASSUS_API void grow(std::size_t entries);
+
+    // Blocks and entries stay where they are when cleared, so that the next step finds their memory.
     std::vector<Block> blocks_;
     std::vector<Row> rows_;
-    std::vector<Entry> entries_;
+    std::vector<std::int32_t> column_;
+    std::vector<double> value_;
     std::vector<std::int32_t> row_start_ = {0};
-    std::size_t rows_in_blocks_ = 0;
+    std::size_t block_count_ = 0, used_ = 0, rows_in_blocks_ = 0;
 };
 
 class DELASSUS_API DynamicalSystem {

@@ -48,10 +48,18 @@ public:
     /// The matrix; valid until the next begin(). Throws InputError if a place lies outside.
     [[nodiscard]] DELASSUS_API const SparseMatrix& finish();
 
+    /// The same in place of another matrix, whose arrays are used again. Throws alike.
+    DELASSUS_API void finish_into(SparseMatrix& matrix);
+
     /// How often a pattern was built: grows by one whenever finish() met new places.
     [[nodiscard]] std::int64_t patterns() const { return patterns_; }
 
 private:
+    /// slot_ and the pattern of matrix_, for the places that were added.
+    void find_pattern();
+    /// values ← the sums; their number is that of the pattern.
+    void sum_up(std::vector<double>& values) const;
+
     struct Place {
         std::int32_t row, column;
         bool operator==(const Place&) const = default;

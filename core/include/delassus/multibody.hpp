@@ -144,7 +144,7 @@ enum class ElementModel {
 };
 
 /// A block of bricks, each of six tetrahedra around a diagonal (Kuhn's division, which fits from brick to brick).
-struct ElasticBlockParameters {
+struct ElasticBlock {
     std::string name;
     Vector3 corner{};                            ///< of the least coordinates, m
     Vector3 edges{1.0, 1.0, 1.0};                ///< m, > 0
@@ -171,7 +171,7 @@ struct ElasticMeshParameters {
     ElementModel model = ElementModel::Corotational;
     std::vector<AlignedBox> fixed_boxes;  ///< world frame at t = 0: the nodes in them do not move
     Vector3 velocity{};                   ///< m/s
-    double contact_radius = 0.0;          ///< as in ElasticBlockParameters
+    double contact_radius = 0.0;          ///< as in ElasticBlock
     std::int32_t contact_material = -1;
 };
 
@@ -248,7 +248,7 @@ public:
     void add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
                          ElementModel model = ElementModel::Corotational);
     /// Returns the number of its first node, at the corner; nodes are numbered with z fastest and x slowest.
-    std::int32_t add_elastic_block(const ElasticBlockParameters& block);
+    std::int32_t add_elastic_block(const ElasticBlock& block);
     /// Returns the number of its first node; nodes are numbered as the vertices of the mesh.
     std::int32_t add_elastic_mesh(const ElasticMeshParameters& body);
     void add_cable(const CableParameters& cable);

@@ -51,7 +51,7 @@ struct SceneSystem {
     // What a plan and a report name things by.
     std::vector<BodyParameters> bodies;  ///< by BodyIndex
     std::vector<NodeParameters> nodes;   ///< by number
-    std::vector<ElasticBlockParameters> elastic_blocks;
+    std::vector<ElasticBlock> elastic_blocks;
     std::vector<std::int32_t> node_contact_material;  ///< of each block or mesh whose nodes touch bodies
     std::vector<std::array<BodyIndex, 2>> beams;      ///< the bodies at the ends of each element
     std::vector<JointParameters> joints;              ///< by joint index

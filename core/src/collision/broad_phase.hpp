@@ -12,28 +12,36 @@
 
 namespace delassus::collision {
 
-/// Pairs of axis-aligned boxes that overlap, by FCL's dynamic tree. The tree holds boxes a little larger than given
-/// and moves one only when its shape has left it, so that slow scenes hardly touch the tree.
+/// Pairs of shapes that are near each other, by FCL's dynamic tree of axis-aligned boxes. The tree holds boxes a little
+/// larger than given. A shape that has left its larger box moves in the tree and finds its neighbours anew; the pairs
+/// of the others stay as they are, so that slow scenes hardly touch the tree.
 class BroadPhase {
 public:
-    /// Whether a pair of shapes may touch at all.
+    using Pair = std::pair<std::int32_t, std::int32_t>;
+    /// Whether a pair of boxes, by their places in `boxes`, may touch at all; asked once for each pair that comes near.
     using Filter = std::function<bool(std::int32_t, std::int32_t)>;
     using Box = fcl::AABBd;
 
     explicit BroadPhase(Filter filter);
     ~BroadPhase();
 
-    /// Appends the pairs (smaller index first, unordered among each other) among boxes[i] of shapes[i], the same shapes
-    /// in every call. slack: how much larger the boxes in the tree are, m.
-    void overlaps(const std::vector<std::int32_t>& shapes, const std::vector<Box>& boxes, double slack,
-                  std::vector<std::pair<std::int32_t, std::int32_t>>& pairs);
+    /// Pairs of places in boxes, smaller first, in ascending order: all pairs of boxes that overlap, and some that are
+    /// about to. The same number of boxes in every call. slack: how much larger the boxes in the tree are, m. Valid
+    /// until the next call.
+    const std::vector<Pair>& near_pairs(const std::vector<Box>& boxes, double slack);
 
 private:
     struct Leaf;
     struct Query;
+    void find_all();
+    void find_again();
+
     Filter filter_;
     std::vector<std::unique_ptr<Leaf>> leaves_;
+    std::vector<Box> large_;  // as in the tree
+    std::vector<char> has_moved_;
     std::vector<fcl::CollisionObjectd*> moved_;
+    std::vector<Pair> pairs_, found_, merged_;
     fcl::DynamicAABBTreeCollisionManagerd tree_;
 };
 

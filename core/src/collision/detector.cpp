@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "delassus/error.hpp"
@@ -52,7 +53,7 @@ Vector3d half_extent(const Placed& placed) {
 
 Detector::Detector(CollisionSetup setup)
     : setup_(std::move(setup)),
-      broad_phase_([this](std::int32_t shape_a, std::int32_t shape_b) { return may_touch(shape_a, shape_b); }) {
+      broad_phase_([this](std::int32_t a, std::int32_t b) { return may_touch(bounded_[a], bounded_[b]); }) {
     for (auto& [first, second] : setup_.apart) {
         if (first > second) std::swap(first, second);
     }
@@ -76,6 +77,7 @@ Detector::Detector(CollisionSetup setup)
     }
     if (!bounded_.empty()) slack_ /= static_cast<double>(bounded_.size());
     boxes_.resize(bounded_.size());
+    balls_.resize(bounded_.size());
 }
 
 bool Detector::is_fixed(std::int32_t body) const {
@@ -114,31 +116,42 @@ void Detector::place(std::span<const Pose> poses) {
     }
 }
 
-// Cost: linear in shapes, pairs of overlapping boxes and points, but for the tree's logarithm; planes are tried against
-// every shape.
+// Cost: linear in shapes, near pairs and points, but for the tree's logarithm where shapes left their boxes; planes are
+// tried against every shape.
 void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) {
     contacts.clear();
     if (!(envelope >= 0.0) || !std::isfinite(envelope))
         throw InputError(
             fmt::format("The envelope of contacts is {} m; it should be finite and not negative.", envelope));
     place(poses);
-    pairs_.clear();
     for (std::size_t i = 0; i < bounded_.size(); ++i) {
         const Placed& placed = placed_[bounded_[i]];
         const Vector3d half = half_extent(placed) + Vector3d::Constant(0.5 * envelope);
         boxes_[i].min_ = placed.position - half;
         boxes_[i].max_ = placed.position + half;
+        balls_[i] = {placed.position, (1.0 + 1e-12) * placed.solid->reach + 0.5 * envelope};
     }
-    broad_phase_.overlaps(bounded_, boxes_, slack_, pairs_);
+    pairs_.clear();
+    for (const auto& [a, b] : broad_phase_.near_pairs(boxes_, slack_)) {
+        const double far = balls_[a].radius + balls_[b].radius;
+        if ((balls_[a].center - balls_[b].center).squaredNorm() < far * far && boxes_[a].overlap(boxes_[b]))
+            pairs_.emplace_back(bounded_[a], bounded_[b]);
+    }
+    with_planes_.clear();
     for (const std::int32_t plane : planes_) {
         const Vector3d normal = placed_[plane].axis();
         for (const std::int32_t shape : bounded_) {
             const Placed& placed = placed_[shape];
             if (normal.dot(placed.position - placed_[plane].position) - placed.solid->reach >= envelope) continue;
-            if (may_touch(plane, shape)) pairs_.emplace_back(std::min(plane, shape), std::max(plane, shape));
+            if (may_touch(plane, shape)) with_planes_.emplace_back(std::min(plane, shape), std::max(plane, shape));
         }
     }
-    std::sort(pairs_.begin(), pairs_.end());
+    if (!with_planes_.empty()) {
+        std::sort(with_planes_.begin(), with_planes_.end());
+        merged_.clear();
+        std::merge(pairs_.begin(), pairs_.end(), with_planes_.begin(), with_planes_.end(), std::back_inserter(merged_));
+        pairs_.swap(merged_);
+    }
     for (const auto& [a, b] : pairs_) {
         const std::size_t first = contacts.size();
         narrow_phase_.collide(placed_[a], placed_[b], envelope, contacts);

@@ -24,8 +24,13 @@ private:
     std::vector<std::int32_t> bounded_;  ///< shapes that are not planes
     std::vector<std::int32_t> planes_;
     std::vector<BroadPhase::Box> boxes_;  ///< of bounded_
-    double slack_ = 0.0;                  ///< a tenth of the mean reach, m
-    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_;
+    struct Ball {
+        Vector3d center;
+        double radius;
+    };
+    std::vector<Ball> balls_;  ///< about bounded_: each holds its shape
+    double slack_ = 0.0;       ///< a tenth of the mean reach, m
+    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_, with_planes_, merged_;
     BroadPhase broad_phase_;
     NarrowPhase narrow_phase_;
 };

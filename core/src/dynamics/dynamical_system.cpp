@@ -12,32 +12,46 @@
 namespace delassus {
 
 void UnilateralRows::clear() {
-    blocks_.clear();
     rows_.clear();
-    entries_.clear();
     row_start_.assign(1, 0);
-    rows_in_blocks_ = 0;
+    block_count_ = used_ = rows_in_blocks_ = 0;
+}
+
+void UnilateralRows::grow(std::size_t entries) {
+    entries = std::max(entries, 2 * column_.size());
+    column_.resize(entries);
+    value_.resize(entries);
 }
 
 void UnilateralRows::end_row(double gap, double rate) {
+    // Rows come sorted as a rule, and are short.
+    const auto begin = column_.begin() + row_start_.back(), end = column_.begin() + static_cast<std::ptrdiff_t>(used_);
+    for (auto next = std::is_sorted_until(begin, end); next != end; ++next)
+        for (auto k = static_cast<std::size_t>(next - column_.begin());
+             k > static_cast<std::size_t>(row_start_.back()) && column_[k] < column_[k - 1]; --k) {
+            std::swap(column_[k], column_[k - 1]);
+            std::swap(value_[k], value_[k - 1]);
+        }
     rows_.push_back({gap, rate});
-    row_start_.push_back(static_cast<std::int32_t>(entries_.size()));
+    row_start_.push_back(static_cast<std::int32_t>(used_));
 }
 
-void UnilateralRows::end_block(Cone cone, std::uint64_t key, double restitution) {
+void UnilateralRows::end_block(const Cone& cone, std::uint64_t key, double restitution) {
     const auto given = static_cast<std::int32_t>(rows_.size() - rows_in_blocks_);
     if (given != cone.rows)
         throw InputError(fmt::format("a block of {} rows was given a cone of {}", given, cone.rows));
     rows_in_blocks_ = rows_.size();
-    blocks_.push_back({std::move(cone), restitution, key});
+    if (block_count_ == blocks_.size()) blocks_.emplace_back();
+    Block& block = blocks_[block_count_++];
+    block.cone = cone;
+    block.restitution = restitution;
+    block.key = key;
 }
 
 double UnilateralRows::speed(std::size_t row, const double* v) const {
     double speed = rows_[row].rate;
-    for (auto e = row_start_[row]; e < row_start_[row + 1]; ++e) {
-        const Entry& entry = entries_[static_cast<std::size_t>(e)];
-        speed += entry.value * v[entry.column];
-    }
+    for (auto e = static_cast<std::size_t>(row_start_[row]); e < static_cast<std::size_t>(row_start_[row + 1]); ++e)
+        speed += value_[e] * v[column_[e]];
     return speed;
 }
 

@@ -48,15 +48,25 @@ void Islands::find(const Problem& problem) {
     parent_.resize(static_cast<std::size_t>(n));
     std::iota(parent_.begin(), parent_.end(), 0);
     for (std::int32_t i = 0; i < n; ++i)
-        for_each_entry(problem.H, i, [&](std::size_t k) { join(i, problem.H.column[k]); });
+        for_each_entry(problem.H, i, [&](std::size_t k) {
+            if (problem.H.column[k] != i) join(i, problem.H.column[k]);
+        });
     cone_column_.assign(problem.cones.size(), -1);  // any column of the cone's rows
-    for (std::size_t c = 0; c < problem.cones.size(); ++c)
-        for (auto row = first_row_[c]; row < first_row_[c + 1]; ++row)
-            for_each_entry(problem.D, row, [&](std::size_t k) {
-                if (problem.D.value[k] == 0.0) return;
-                if (cone_column_[c] < 0) cone_column_[c] = problem.D.column[k];
-                join(cone_column_[c], problem.D.column[k]);
-            });
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        std::int32_t top = -1;  // the root of the cone's columns
+        const auto& D = problem.D;
+        const auto end = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(first_row_[c + 1])]);
+        for (auto k = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(first_row_[c])]); k < end; ++k) {
+            const auto column = D.column[k];
+            if ((top >= 0 && parent_[static_cast<std::size_t>(column)] == top) || D.value[k] == 0.0) continue;
+            if (top < 0) {
+                cone_column_[c] = column;
+            } else {
+                join(top, column);
+            }
+            top = root(column);
+        }
+    }
 
     touched_.assign(static_cast<std::size_t>(n), 0);  // by root
     for (const auto column : cone_column_)
@@ -64,15 +74,20 @@ void Islands::find(const Problem& problem) {
     number_.assign(static_cast<std::size_t>(n), -1);  // of the island, by root
     place_.resize(static_cast<std::size_t>(n));
     untouched_.columns.clear();
+    std::int32_t last_root = -1;  // neighbouring columns are of one island as a rule
+    Island* island = nullptr;
     for (std::int32_t i = 0; i < n; ++i) {
-        const auto r = static_cast<std::size_t>(root(i));
-        if (touched_[r] && number_[r] < 0) {
-            number_[r] = static_cast<std::int32_t>(count_);
-            next_island();
+        if (const auto top = root(i); top != last_root) {
+            last_root = top;
+            const auto r = static_cast<std::size_t>(top);
+            if (touched_[r] && number_[r] < 0) {
+                number_[r] = static_cast<std::int32_t>(count_);
+                next_island();
+            }
+            island = touched_[r] ? &islands_[static_cast<std::size_t>(number_[r])] : &untouched_;
         }
-        Island& island = touched_[r] ? islands_[static_cast<std::size_t>(number_[r])] : untouched_;
-        place_[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(island.columns.size());
-        island.columns.push_back(i);
+        place_[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(island->columns.size());
+        island->columns.push_back(i);
     }
     for (std::size_t c = 0; c < cone_column_.size(); ++c) {
         if (cone_column_[c] < 0) continue;
@@ -87,37 +102,59 @@ void Islands::part(const Island& island, Problem& part) const {
     part.name = whole.name;
     part.law = whole.law;
     part.source = whole.source;
-    for (SparseMatrix* matrix : {&part.H, &part.D}) {
-        matrix->rows = 0;
-        matrix->columns = static_cast<std::int32_t>(island.columns.size());
-        matrix->row_start.assign(1, 0);
-        matrix->column.clear();
-        matrix->value.clear();
-    }
     part.a.clear();
     part.b.clear();
-    const auto append_row = [&](const SparseMatrix& from, std::int32_t row, SparseMatrix& to) {
+    // The arrays take all entries first, and are cut to what there is at the end.
+    const auto begin = [&](SparseMatrix& matrix, std::int32_t entries) {
+        matrix.rows = 0;
+        matrix.columns = static_cast<std::int32_t>(island.columns.size());
+        matrix.row_start.assign(1, 0);
+        matrix.column.resize(static_cast<std::size_t>(entries));
+        matrix.value.resize(static_cast<std::size_t>(entries));
+    };
+    const auto append_row = [&](const SparseMatrix& from, std::int32_t row, bool with_zeros, SparseMatrix& to) {
+        auto next = static_cast<std::size_t>(to.row_start.back());
         for_each_entry(from, row, [&](std::size_t k) {
-            if (from.value[k] == 0.0 && &to == &part.D) return;  // it may link to another part
-            to.column.push_back(place_[static_cast<std::size_t>(from.column[k])]);
-            to.value.push_back(from.value[k]);
+            if (from.value[k] == 0.0 && !with_zeros) return;
+            to.column[next] = place_[static_cast<std::size_t>(from.column[k])];
+            to.value[next++] = from.value[k];
         });
-        to.row_start.push_back(to.entries());
+        to.row_start.push_back(static_cast<std::int32_t>(next));
         ++to.rows;
     };
+    const auto end = [](SparseMatrix& matrix) {
+        matrix.column.resize(static_cast<std::size_t>(matrix.row_start.back()));
+        matrix.value.resize(static_cast<std::size_t>(matrix.row_start.back()));
+    };
+    const auto entries_between = [](const SparseMatrix& matrix, std::int32_t first, std::int32_t last) {
+        return matrix.row_start[static_cast<std::size_t>(last)] - matrix.row_start[static_cast<std::size_t>(first)];
+    };
+
+    std::int32_t entries = 0;
+    for (const auto column : island.columns) entries += entries_between(whole.H, column, column + 1);
+    begin(part.H, entries);
     for (const auto column : island.columns) {
-        append_row(whole.H, column, part.H);
+        append_row(whole.H, column, true, part.H);
         part.a.push_back(whole.a[static_cast<std::size_t>(column)]);
     }
+    end(part.H);
+
+    entries = 0;
+    for (const auto c : island.cones) {
+        const auto cone = static_cast<std::size_t>(c);
+        entries += entries_between(whole.D, first_row_[cone], first_row_[cone + 1]);
+    }
+    begin(part.D, entries);
     part.cones.resize(island.cones.size());
     for (std::size_t k = 0; k < island.cones.size(); ++k) {
         const auto cone = static_cast<std::size_t>(island.cones[k]);
         part.cones[k] = whole.cones[cone];
         for (auto row = first_row_[cone]; row < first_row_[cone + 1]; ++row) {
-            append_row(whole.D, row, part.D);
+            append_row(whole.D, row, false, part.D);  // an entry of zero may link to another part
             part.b.push_back(whole.b[static_cast<std::size_t>(row)]);
         }
     }
+    end(part.D);
 }
 
 void Islands::take(const Island& island, const Solution& whole, Solution& part) const {

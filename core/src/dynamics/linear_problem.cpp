@@ -3,8 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+
+#include "support/finite.hpp"
 
 namespace delassus {
 
@@ -32,8 +33,7 @@ void require_step(const DynamicalSystem& system, const State& begin, double h, s
 }
 
 void require_finite(const State& begin, const State& end, double h, std::string_view method) {
-    const auto finite = [](double value) { return std::isfinite(value); };
-    if (!std::all_of(end.q.begin(), end.q.end(), finite) || !std::all_of(end.v.begin(), end.v.end(), finite))
+    if (!all_finite(end.q) || !all_finite(end.v))
         throw StepFailure(fmt::format("{} cannot take the step from t = {:.9g} with h = {:.9g}: its end is not finite",
                                       method, begin.t, h));
 }

@@ -25,11 +25,26 @@ void MatrixAssembler::add_matrix(const SparseMatrix& matrix, double factor) {
 }
 
 const SparseMatrix& MatrixAssembler::finish() {
-    if (repeats_ && count_ == slot_.size()) {
-        std::fill(matrix_.value.begin(), matrix_.value.end(), 0.0);
-        for (std::size_t k = 0; k < count_; ++k) matrix_.value[static_cast<std::size_t>(slot_[k])] += values_[k];
-        return matrix_;
-    }
+    if (!repeats_ || count_ != slot_.size()) find_pattern();
+    sum_up(matrix_.value);
+    return matrix_;
+}
+
+void MatrixAssembler::finish_into(SparseMatrix& matrix) {
+    if (!repeats_ || count_ != slot_.size()) find_pattern();
+    matrix.rows = matrix_.rows;
+    matrix.columns = matrix_.columns;
+    matrix.row_start = matrix_.row_start;
+    matrix.column = matrix_.column;
+    sum_up(matrix.value);
+}
+
+void MatrixAssembler::sum_up(std::vector<double>& values) const {
+    values.assign(matrix_.column.size(), 0.0);
+    for (std::size_t k = 0; k < count_; ++k) values[static_cast<std::size_t>(slot_[k])] += values_[k];
+}
+
+void MatrixAssembler::find_pattern() {
     places_.resize(count_);
     values_.resize(count_);
     for (const Place& place : places_)
@@ -45,19 +60,15 @@ const SparseMatrix& MatrixAssembler::finish() {
     slot_.resize(count_);
     matrix_.row_start.assign(static_cast<std::size_t>(matrix_.rows) + 1, 0);
     matrix_.column.clear();
-    matrix_.value.clear();
     for (std::size_t k = 0; k < count_; ++k) {
         if (k == 0 || !(at(order[k]) == at(order[k - 1]))) {
             matrix_.column.push_back(at(order[k]).column);
-            matrix_.value.push_back(0.0);
             ++matrix_.row_start[static_cast<std::size_t>(at(order[k]).row) + 1];
         }
-        slot_[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(matrix_.value.size()) - 1;
-        matrix_.value.back() += values_[static_cast<std::size_t>(order[k])];
+        slot_[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(matrix_.column.size()) - 1;
     }
     std::partial_sum(matrix_.row_start.begin(), matrix_.row_start.end(), matrix_.row_start.begin());
     ++patterns_;
-    return matrix_;
 }
 
 }  // namespace delassus

@@ -12,7 +12,7 @@ namespace delassus {
 
 namespace {
 
-void check(const ElasticBlockParameters& block) {
+void check(const ElasticBlock& block) {
     double nodes = 1.0;
     for (std::size_t i = 0; i < 3; ++i) {
         if (!(block.edges[i] > 0.0) || !std::isfinite(block.edges[i]) || !std::isfinite(block.corner[i]))
@@ -34,7 +34,7 @@ constexpr std::array<std::array<std::size_t, 3>, 6> orders = {
 
 }  // namespace
 
-std::int32_t MultibodySystem::add_elastic_block(const ElasticBlockParameters& block) {
+std::int32_t MultibodySystem::add_elastic_block(const ElasticBlock& block) {
     check(block);
     const auto first = node_count();
     const auto& cells = block.cells;

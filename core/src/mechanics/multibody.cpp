@@ -356,9 +356,13 @@ BodyIndex MultibodySystem::find_body(const std::string& name) const {
 Pose MultibodySystem::pose(const State& state, BodyIndex index) const {
     if (index == world_body) return {};
     implementation_->check_body(index, "pose()");
-    const auto& body = implementation_->bodies[static_cast<std::size_t>(index)];
+    return implementation_->pose_of(static_cast<std::size_t>(index), state.q.data());
+}
+
+Pose MultibodySystem::Implementation::pose_of(std::size_t index, const double* state_q) const {
+    const auto& body = bodies[index];
     if (body.column < 0) return body.parameters.pose;
-    const double* q = state.q.data() + body.position;
+    const double* q = state_q + body.position;
     return {{q[0], q[1], q[2]}, {q[3], q[4], q[5], q[6]}};
 }
 

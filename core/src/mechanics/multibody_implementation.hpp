@@ -99,9 +99,19 @@ struct MultibodySystem::Implementation {
 
     /// The body of a shape or of a node contact, or the node: bodies first, nodes after them, −1 for the world.
     [[nodiscard]] std::int32_t owner_of(std::int32_t shape) const;
-    /// Entries of direction · v of a point of an owner.
-    void put_point(std::int32_t owner, const mechanics::Vector3d& point, const mechanics::Vector3d& direction,
-                   double sign, UnilateralRows& rows) const;
+    /// A point of a body or node that may move.
+    struct PointOfOwner {
+        std::int32_t column;           ///< −1 if fixed
+        const mechanics::Matrix3d* A;  ///< null for a node
+        mechanics::Vector3d arm;       ///< from the mass centre, world frame
+
+        /// The entries of sign · direction · ṗ.
+        void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;
+    };
+    [[nodiscard]] PointOfOwner point_of(std::int32_t owner, const mechanics::Vector3d& point) const;
+    /// Of the pair where it was given, else from both: the geometric mean of friction, the larger restitution.
+    [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
+    [[nodiscard]] Pose pose_of(std::size_t body, const double* q) const;
     void make_detector();
 
     void collect_limits(double h, UnilateralRows& rows) const;

@@ -41,9 +41,10 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     self.collect_motors(state.t + h, rows);
     if (!self.detector) return;
     self.poses.resize(self.bodies.size() + self.nodes.size());
-    for (std::size_t k = 0; k < self.bodies.size(); ++k) self.poses[k] = pose(state, static_cast<BodyIndex>(k));
+    for (std::size_t k = 0; k < self.bodies.size(); ++k) self.poses[k] = self.pose_of(k, state.q.data());
     for (std::size_t k = 0; k < self.nodes.size(); ++k)
-        self.poses[self.bodies.size() + k].position = node_position(state, static_cast<std::int32_t>(k));
+        self.poses[self.bodies.size() + k].position =
+            mechanics::array(self.node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
     self.detector->detect(self.poses, self.envelope, self.contacts);
     self.collect_contacts(rows);
 }
@@ -76,16 +77,17 @@ void put_coordinate_row(const mechanics::Joint& joint, const mechanics::Placemen
             const auto& place = at[second ? joint.angle.second : joint.angle.first];
             if (place.column < 0) continue;
             const Vector3d coefficients = sign * joint.angle.coefficients(at, second);
-            for (int i = 0; i < 3; ++i) rows.entry(place.column + 3 + i, coefficients[i]);
+            rows.entries(place.column + 3, {coefficients.data(), 3});
         }
         return;
     }
     const auto columns = joint.slide.columns(at);
     mechanics::RowVector gradient;
     joint.slide.gradient(at, 0.0, columns, gradient);
-    for (int k = 0; k < columns.bodies; ++k)
-        for (int i = 0; i < 6; ++i)
-            rows.entry(columns.column[static_cast<std::size_t>(k)] + i, sign * gradient[6 * k + i]);
+    for (int k = 0; k < columns.bodies; ++k) {
+        const Eigen::Matrix<double, 6, 1> part = sign * gradient.segment<6>(6 * k);
+        rows.entries(columns.column[static_cast<std::size_t>(k)], {part.data(), 6});
+    }
 }
 
 }  // namespace
@@ -122,33 +124,49 @@ void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& r
 }
 
 // d · ṗ = d · v + (s × d) · ω with ω = A ω̄, for a point at s from the mass centre; a node has no ω.
-void MultibodySystem::Implementation::put_point(std::int32_t owner, const Vector3d& point, const Vector3d& direction,
-                                                double sign, UnilateralRows& rows) const {
+MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::point_of(std::int32_t owner,
+                                                                                        const Vector3d& point) const {
     const auto count = static_cast<std::int32_t>(bodies.size());
-    const auto column = owner >= count ? nodes[static_cast<std::size_t>(owner - count)].column : at[owner].column;
+    if (owner >= count) return {nodes[static_cast<std::size_t>(owner - count)].column, nullptr, Vector3d::Zero()};
+    const auto& place = at[owner];
+    return {place.column, &place.A, point - place.x};
+}
+
+void MultibodySystem::Implementation::PointOfOwner::put(const Vector3d& direction, double sign,
+                                                        UnilateralRows& rows) const {
     if (column < 0) return;
-    for (int i = 0; i < 3; ++i) rows.entry(column + i, sign * direction[i]);
-    if (owner >= count) return;
-    const Vector3d turning = at[owner].A.transpose() * (point - at[owner].x).cross(direction);
-    for (int i = 0; i < 3; ++i) rows.entry(column + 3 + i, sign * turning[i]);
+    std::array<double, 6> values;
+    for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)] = sign * direction[i];
+    if (!A) return rows.entries(column, {values.data(), 3});
+    const Vector3d turning = A->transpose() * arm.cross(direction);
+    for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(3 + i)] = sign * turning[i];
+    rows.entries(column, values);
+}
+
+ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t first, std::int32_t second) const {
+    const auto pair = material_pairs.find(std::minmax(first, second));
+    if (pair != material_pairs.end()) return pair->second;
+    const ContactMaterial &a = materials[static_cast<std::size_t>(first)],
+                          &b = materials[static_cast<std::size_t>(second)];
+    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
 }
 
 void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
     const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
+    std::int32_t last_a = -1, last_b = -1;  // neighbouring contacts are of the same materials as a rule
+    ContactMaterial material;
     for (const auto& contact : contacts) {
         const auto material_a = shape_material[static_cast<std::size_t>(contact.shape_a)];
         const auto material_b = shape_material[static_cast<std::size_t>(contact.shape_b)];
-        const auto pair = material_pairs.find(std::minmax(material_a, material_b));
-        const ContactMaterial &a = materials[static_cast<std::size_t>(material_a)],
-                              &b = materials[static_cast<std::size_t>(material_b)];
-        const ContactMaterial material =
-            pair != material_pairs.end()
-                ? pair->second
-                : ContactMaterial{std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
+        if (material_a != last_a || material_b != last_b) material = material_between(material_a, material_b);
+        last_a = material_a;
+        last_b = material_b;
         const Vector3d normal = vector(contact.normal);
+        const PointOfOwner a = point_of(owner_of(contact.shape_a), vector(contact.point_a));
+        const PointOfOwner b = point_of(owner_of(contact.shape_b), vector(contact.point_b));
         const auto put_row = [&](const Vector3d& direction) {
-            put_point(owner_of(contact.shape_a), vector(contact.point_a), direction, -1.0, rows);
-            put_point(owner_of(contact.shape_b), vector(contact.point_b), direction, 1.0, rows);
+            a.put(direction, -1.0, rows);
+            b.put(direction, 1.0, rows);
         };
         const auto key = key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), contact.feature);
         put_row(normal);

@@ -3,6 +3,7 @@
 
 #include <Eigen/SparseLU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -22,39 +23,34 @@ using sdk::VectorView;
 namespace {
 
 /// The diagonal of N and r = D H⁻¹ a + b.
-struct Mobility {
+struct Reference {
     Vector diagonal;
     Vector r;
 };
-
-void take_definite(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, Mobility& mobility) {
-    mobility.diagonal = N.diagonal();
-    N.free_velocity(problem, mobility.r);
-}
 
 void add_compliance(const sdk::ProblemView& problem, Vector& diagonal) {
     for (Eigen::Index i = 0; i < problem.m; ++i) diagonal[i] += problem.E.coeff(i, i);
 }
 
 /// |diag H|⁻¹ in place of an H⁻¹ that does not exist.
-Mobility of_singular(const sdk::ProblemView& problem) {
+Reference of_singular(const sdk::ProblemView& problem) {
     const Vector h = sdk::magnitude_of_diagonal(problem);
     return {sdk::stand_in_diagonal(problem, h), problem.D * problem.a.cwiseQuotient(h) + problem.b};
 }
 
-Mobility of_unsymmetric(const sdk::ProblemView& problem) {
+Reference of_unsymmetric(const sdk::ProblemView& problem) {
     const Eigen::SparseLU<sdk::SparseColumns> factor{sdk::SparseColumns(problem.H)};
     if (factor.info() != Eigen::Success) return of_singular(problem);
-    Mobility mobility;
-    mobility.diagonal.setZero(problem.m);
+    Reference reference;
+    reference.diagonal.setZero(problem.m);
     Vector row(problem.n);
     for (Eigen::Index i = 0; i < problem.m; ++i) {
         row = problem.D.row(i).transpose();
-        mobility.diagonal[i] = row.dot(Vector(factor.solve(row)));
+        reference.diagonal[i] = row.dot(Vector(factor.solve(row)));
     }
-    add_compliance(problem, mobility.diagonal);
-    mobility.r = problem.D * Vector(factor.solve(problem.a)) + problem.b;
-    return mobility;
+    add_compliance(problem, reference.diagonal);
+    reference.r = problem.D * Vector(factor.solve(problem.a)) + problem.b;
+    return reference;
 }
 
 /// A reference below this share of the velocities without reactions counts as rest.
@@ -63,6 +59,20 @@ constexpr double vanishing_velocity = 1e-8;
 double ratio(double numerator, double denominator) {
     return denominator > 0.0 ? numerator / denominator : numerator;
 }
+
+/// Projections through the table of cones, and those that fill most problems without it.
+struct AnyCone {
+    const sdk::ConeOperations& operations;
+    [[nodiscard]] static std::int32_t rows(const delassus_cone& cone) { return cone.rows; }
+    void project(const delassus_cone& cone, double* lambda) const { operations.project(cone, lambda); }
+    void project_dual(const delassus_cone& cone, double* u) const { operations.project_dual(cone, u); }
+    [[nodiscard]] double gap(const delassus_cone& cone, const double* lambda, const double* u) const {
+        return operations.gap(cone, lambda, u);
+    }
+};
+struct SpatialFriction : sdk::FrictionCone {
+    [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
+};
 
 }  // namespace
 
@@ -73,15 +83,14 @@ struct ErrorMeter::Implementation {
     }
 
     void take_mobility() {
-        if (prepared.operator_of_definite) {
-            take_definite(view, *prepared.operator_of_definite, mobility);
-        } else if (prepared.structure == Structure::Unsymmetric) {
-            mobility = of_unsymmetric(view);
+        const Vector* diagonal = &reference.diagonal;
+        if (prepared.mobility) {
+            diagonal = &prepared.mobility->free_velocity(view, reference.r);
         } else {
-            mobility = of_singular(view);
+            reference = prepared.structure == Structure::Unsymmetric ? of_unsymmetric(view) : of_singular(view);
         }
-        r_norm = mobility.r.norm();
-        residual.assign(view, mobility.diagonal, mobility.r);
+        r_norm = reference.r.norm();
+        residual.assign(view, *diagonal, reference.r);
     }
 
     /// u = D x + E λ + b, in the scratch vector.
@@ -92,39 +101,96 @@ struct ErrorMeter::Implementation {
         return plain_u;
     }
 
-    /// plain_u with the De Saxcé term where the law asks for it.
+    /// plain_u, with the De Saxcé term where the law asks for it.
     const Vector& judged_velocity() const {
+        if (!view.coulomb) return plain_u;
         judged_u = plain_u;
-        if (!view.coulomb) return judged_u;
         for (const auto& cone : view.cones)
             if (cone.kind == DELASSUS_CONE_FRICTION)
                 judged_u[cone.first_row] += sdk::FrictionCone::de_saxce(cone, plain_u.data() + cone.first_row);
         return judged_u;
     }
 
-    /// Errors::rounding. A product of k terms is off by at most k ε times the product of the absolute values (Higham,
-    /// Accuracy and Stability of Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts
-    /// for one.
-    [[nodiscard]] double rounding(const VectorView& x, const VectorView& lambda) const {
-        Vector& magnitude = work;
-        magnitude = view.b.cwiseAbs();
-        for (Eigen::Index row = 0; row < view.m; ++row) {
-            for (sdk::SparseRowsView::InnerIterator entry(view.D, row); entry; ++entry)
-                magnitude[row] += std::abs(entry.value() * x[entry.col()]);
-            for (sdk::SparseRowsView::InnerIterator entry(view.E, row); entry; ++entry)
-                magnitude[row] += std::abs(entry.value() * lambda[entry.col()]);
-        }
+    /// One pass over D and E for plain_u, for impulse = Dᵀ λ, and for Errors::rounding, which it returns. A product of
+    /// k terms is off by at most k ε times the product of the absolute values (Higham, Accuracy and Stability of
+    /// Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts for one.
+    double pass_over_rows(const double* x, const double* lambda) const {
+        plain_u.resize(view.m);
+        impulse.setZero(view.n);
+        const delassus_matrix &D = view.raw->D, &E = view.raw->E;
+        double sum = 0.0;
         for (std::size_t c = 0; c < view.cones.size(); ++c) {
             const double s = residual.scaling()[c];
-            for (std::int32_t i = view.cones[c].first_row; i < view.cones[c].first_row + view.cones[c].rows; ++i)
-                magnitude[i] = s * magnitude[i] + std::abs(lambda[i]) / s;
+            const auto first = view.cones[c].first_row;
+            for (auto row = first; row < first + view.cones[c].rows; ++row) {
+                double u = view.b[row], magnitude = std::abs(u);
+                for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k) {
+                    const double term = D.value[k] * x[D.column[k]];
+                    u += term;
+                    magnitude += std::abs(term);
+                    impulse[D.column[k]] += D.value[k] * lambda[row];
+                }
+                for (auto k = E.row_start[row]; k < E.row_start[row + 1]; ++k) {
+                    const double term = E.value[k] * lambda[E.column[k]];
+                    u += term;
+                    magnitude += std::abs(term);
+                }
+                plain_u[row] = u;
+                const double scaled = s * magnitude + std::abs(lambda[row]) / s;
+                sum += scaled * scaled;
+            }
         }
-        return 0.5 * std::numeric_limits<double>::epsilon() * magnitude.norm() / residual.reference();
+        return 0.5 * std::numeric_limits<double>::epsilon() * std::sqrt(sum) / residual.reference();
+    }
+
+    /// Squares of what Errors reports of the cones, but for the gap, which is a sum.
+    struct ConeSums {
+        double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
+    };
+    /// u: with the De Saxcé term where the law asks for it. trial: memory for the rows of the largest cone.
+    template <class Projections>
+    void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* u, double* trial,
+                  ConeSums& sums) const {
+        const auto& cone = view.cones[c];
+        const std::int32_t rows = on.rows(cone);
+        const double square = residual.scaling()[c] * residual.scaling()[c];
+        const auto squared_distance = [&](const double* from) {
+            double sum = 0.0;
+            for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - trial[i]) * (from[i] - trial[i]);
+            return sum;
+        };
+        for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i];
+        on.project(cone, trial);
+        sums.cone += squared_distance(lambda) / square;
+        for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - u[i];
+        on.project(cone, trial);
+        sums.siconos += squared_distance(lambda);
+        for (std::int32_t i = 0; i < rows; ++i) trial[i] = u[i];
+        on.project_dual(cone, trial);
+        sums.dual += squared_distance(u) * square;
+        sums.gap += on.gap(cone, lambda, u);
+    }
+
+    [[nodiscard]] ConeSums sums_over_cones(const double* lambda, const Vector& u) const {
+        ConeSums sums;
+        work.resize(view.m);
+        for (std::size_t c = 0; c < view.cones.size(); ++c) {
+            const auto& cone = view.cones[c];
+            const double *lambda_c = lambda + cone.first_row, *u_c = u.data() + cone.first_row;
+            sums.natural += residual.squared_block(c, lambda_c, plain_u.data() + cone.first_row);
+            if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
+                std::array<double, 3> trial;
+                add_cone(SpatialFriction{}, c, lambda_c, u_c, trial.data(), sums);
+            } else {
+                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u_c, work.data(), sums);
+            }
+        }
+        return sums;
     }
 
     const PreparedProblem::Implementation& prepared;
     sdk::ProblemView view;
-    Mobility mobility;
+    Reference reference;
     sdk::NaturalResidual residual;
     double r_norm = 0.0;
     // Kept so that measuring again allocates nothing.
@@ -150,45 +216,22 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
                                      x_values.size(), lambda_values.size(), problem.n, problem.m));
     const VectorView x(x_values.data(), problem.n);
     const VectorView lambda(lambda_values.data(), problem.m);
-    const Vector& plain_u = self.constraint_velocity(x, lambda);
-    const Vector& u = self.judged_velocity();
-
     Errors errors;
-    errors.natural = self.residual.natural(lambda, plain_u);
-    errors.rounding = self.rounding(x, lambda);
+    errors.rounding = self.pass_over_rows(x.data(), lambda.data());
     if (problem.n > 0) {
-        Vector &momentum = self.momentum, &impulse = self.impulse;
+        Vector& momentum = self.momentum;
         momentum.noalias() = problem.H * x;
-        impulse.noalias() = problem.D.transpose() * lambda;
-        errors.balance = ratio((momentum - impulse - problem.a).norm(),
-                               std::max({momentum.norm(), impulse.norm(), problem.a.norm()}));
+        errors.balance = ratio((momentum - self.impulse - problem.a).norm(),
+                               std::max({momentum.norm(), self.impulse.norm(), problem.a.norm()}));
     }
-
-    double cone_sum = 0.0, dual_sum = 0.0, gap_sum = 0.0, siconos_sum = 0.0;
-    Vector& work = self.work;
-    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
-        const auto& cone = problem.cones[c];
-        const auto& operations = sdk::operations_of(cone);
-        const double s = self.residual.scaling()[c];
-        const auto lambda_c = lambda.segment(cone.first_row, cone.rows);
-        const auto u_c = u.segment(cone.first_row, cone.rows);
-        auto work_c = work.segment(cone.first_row, cone.rows);
-        work_c = lambda_c;
-        operations.project(cone, work_c.data());
-        cone_sum += (lambda_c - work_c).squaredNorm() / (s * s);
-        work_c = u_c;
-        operations.project_dual(cone, work_c.data());
-        dual_sum += (u_c - work_c).squaredNorm() * s * s;
-        gap_sum += operations.gap(cone, lambda.data() + cone.first_row, u.data() + cone.first_row);
-        work_c = lambda_c - u_c;
-        operations.project(cone, work_c.data());
-        siconos_sum += (lambda_c - work_c).squaredNorm();
-    }
+    const Vector& u = self.judged_velocity();
+    const auto sums = self.sums_over_cones(lambda.data(), u);
     const double reference = self.residual.reference();
-    errors.cone = std::sqrt(cone_sum) / reference;
-    errors.dual = std::sqrt(dual_sum) / reference;
-    errors.gap = std::abs(gap_sum) / (reference * reference);
-    errors.siconos = ratio(std::sqrt(siconos_sum), std::max({self.r_norm, lambda.norm(), u.norm()}));
+    errors.natural = std::sqrt(sums.natural) / reference;
+    errors.cone = std::sqrt(sums.cone) / reference;
+    errors.dual = std::sqrt(sums.dual) / reference;
+    errors.gap = std::abs(sums.gap) / (reference * reference);
+    errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), u.norm()}));
     return errors;
 }
 
@@ -198,8 +241,8 @@ double ErrorMeter::natural(const double* x, const double* lambda_values) const {
     const VectorView lambda(lambda_values, problem.m);
     if (x || problem.n == 0)
         return self.residual.natural(lambda, self.constraint_velocity(VectorView(x, problem.n), lambda));
-    if (!self.prepared.operator_of_definite) return std::numeric_limits<double>::quiet_NaN();
-    self.prepared.operator_of_definite->velocity(problem, lambda, self.momentum);
+    if (!self.prepared.mobility) return std::numeric_limits<double>::quiet_NaN();
+    self.prepared.mobility->velocity(problem, lambda.data(), self.momentum);
     return self.residual.natural(lambda, self.constraint_velocity(VectorView(self.momentum.data(), problem.n), lambda));
 }
 
@@ -213,8 +256,10 @@ double ErrorMeter::velocity(std::span<const double> x_values, std::span<const do
     const Vector difference = VectorView(x_values.data(), problem.n) - reference;
     const auto energy_norm = [&](const auto& v) { return std::sqrt(std::abs(v.dot(Vector(problem.H * v)))); };
     double scale = energy_norm(reference);
-    if (const auto& N = implementation_->prepared.operator_of_definite) {
-        const double free = std::sqrt(std::abs(problem.a.dot(N->velocity(problem, Vector::Zero(problem.m).eval()))));
+    if (const auto& mobility = implementation_->prepared.mobility) {
+        Vector& x = implementation_->momentum;
+        mobility->velocity(problem, nullptr, x);
+        const double free = std::sqrt(std::abs(problem.a.dot(x)));
         if (scale <= vanishing_velocity * free) scale = free;
     }
     return ratio(energy_norm(difference), scale);
@@ -222,15 +267,14 @@ double ErrorMeter::velocity(std::span<const double> x_values, std::span<const do
 
 void ErrorMeter::velocity_of(std::span<const double> lambda_values, std::vector<double>& x) const {
     const auto& self = *implementation_;
-    if (self.view.n > 0 && !self.prepared.operator_of_definite)
+    if (self.view.n > 0 && !self.prepared.mobility)
         throw InputError("velocities follow from reactions alone only where H is definite");
     if (static_cast<Eigen::Index>(lambda_values.size()) != self.view.m)
         throw InputError(
             fmt::format("{} reactions do not fit a problem with m = {}", lambda_values.size(), self.view.m));
     x.resize(static_cast<std::size_t>(self.view.n));
     if (x.empty()) return;
-    self.prepared.operator_of_definite->velocity(self.view, VectorView(lambda_values.data(), self.view.m),
-                                                 self.momentum);
+    self.prepared.mobility->velocity(self.view, lambda_values.data(), self.momentum);
     std::copy(self.momentum.begin(), self.momentum.end(), x.begin());
 }
 

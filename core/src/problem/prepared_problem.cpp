@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <atomic>
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "problem/need_of.hpp"
+#include "problem/validate.hpp"
+#include "support/finite.hpp"
 
 namespace delassus {
 
@@ -48,7 +50,18 @@ std::uint64_t need_of(Law law) {
 PreparedProblem::PreparedProblem() : implementation_(std::make_unique<Implementation>()) {}
 
 PreparedProblem::PreparedProblem(Problem problem) : PreparedProblem() {
-    implementation_->take(std::move(problem));
+    auto& self = *implementation_;
+    self.problem = std::move(problem);
+    const auto n = self.problem.n();
+    const auto m = self.problem.m();
+    if (self.problem.H.rows == 0) self.problem.H = SparseMatrix::zero(n, n);
+    if (self.problem.D.rows == 0) self.problem.D = SparseMatrix::zero(m, n);
+    if (self.problem.E.rows == 0) self.problem.E = SparseMatrix::zero(m, m);
+    validate(self.problem);
+    self.lay_out();
+    self.detect_structure();
+    self.derive_needs(true);
+    self.identify();
 }
 
 PreparedProblem::~PreparedProblem() = default;
@@ -73,9 +86,7 @@ void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<dou
     if (a.size() != self.problem.a.size() || b.size() != self.problem.b.size())
         throw InputError(fmt::format("the right-hand side has {} and {} entries; the problem has n = {} and m = {}",
                                      a.size(), b.size(), self.problem.n(), self.problem.m()));
-    const auto finite = [](double value) { return std::isfinite(value); };
-    if (!std::all_of(a.begin(), a.end(), finite) || !std::all_of(b.begin(), b.end(), finite))
-        throw InputError("the right-hand side holds a value that is not finite");
+    if (!all_finite(a) || !all_finite(b)) throw InputError("the right-hand side holds a value that is not finite");
     self.problem.a = std::move(a);
     self.problem.b = std::move(b);
     self.raw.a = self.problem.a.data();
@@ -98,7 +109,8 @@ PreparedProblem PreparedProblem::with_law(Law law) const {
     to.problem = from.problem;
     to.problem.law = law;
     to.structure = from.structure;
-    to.operator_of_definite = from.operator_of_definite;
+    to.mobility = from.mobility;
+    to.redundancy = from.redundancy;
     to.lay_out();
     to.raw.needs = from.raw.needs;
     to.set_law_needs();
@@ -115,56 +127,77 @@ const ErrorMeter& PreparedProblem::meter() const {
 
 void PreparedProblem::renew(const Problem& other) {
     auto& self = *implementation_;
-    if (!self.same_places(other)) {
-        self.meter.reset();
-        self.take(other);
+    if (!self.same_places_of_H(other)) {
+        *this = PreparedProblem(other);
         return;
     }
-    validate(other);
+    const bool new_places = !self.same_places_of_rows(other);
     const bool same_H = self.problem.H.value == other.H.value;
-    const bool same_rows = same_H && self.problem.D.value == other.D.value && self.problem.E.value == other.E.value;
-    self.copy_values(other);
+    if (new_places) {
+        validate(other);
+    } else {
+        validate_values(other, !same_H);
+    }
+    const bool same_rows =
+        same_H && !new_places && self.problem.D.value == other.D.value && self.problem.E.value == other.E.value;
+    self.copy(other, new_places);
     if (!same_rows) {
-        self.prepare_matrices(same_H);
+        const Structure before = self.structure;
+        if (same_H && self.mobility.use_count() == 1) {
+            self.mobility->refresh();
+        } else {
+            self.detect_structure();
+        }
+        self.derive_needs(new_places);
+        self.identify_anew(new_places || self.structure != before);
     } else {
         self.set_law_needs();
     }
     if (self.meter) self.meter->renew();
 }
 
-void PreparedProblem::Implementation::take(Problem other) {
-    const auto n = other.n();
-    const auto m = other.m();
-    if (other.H.rows == 0) other.H = SparseMatrix::zero(n, n);
-    if (other.D.rows == 0) other.D = SparseMatrix::zero(m, n);
-    if (other.E.rows == 0) other.E = SparseMatrix::zero(m, m);
-    validate(other);
-    const bool same_H = operator_of_definite && problem.H.row_start == other.H.row_start &&
-                        problem.H.column == other.H.column && problem.H.value == other.H.value;
-    problem = std::move(other);
-    lay_out();
-    prepare_matrices(same_H);
+namespace {
+
+bool absent(const SparseMatrix& matrix) {
+    return matrix.rows == 0 && matrix.columns == 0;
 }
 
-void PreparedProblem::Implementation::prepare_matrices(bool same_H) {
-    if (same_H && operator_of_definite.use_count() == 1) {
-        raw.needs = need_of(structure);
-        operator_of_definite->refresh(sdk::ProblemView(raw));
-    } else {
-        detect_structure();
+bool same_places(const SparseMatrix& here, const SparseMatrix& there) {
+    if (absent(there)) return here.value.empty();  // here a zero matrix
+    return here.rows == there.rows && here.columns == there.columns && here.row_start == there.row_start &&
+           here.column == there.column;
+}
+
+/// An absent matrix becomes zero, rows × columns.
+void copy_matrix(const SparseMatrix& from, bool new_places, std::int32_t rows, std::int32_t columns, SparseMatrix& to) {
+    if (new_places && absent(from)) {
+        to.row_start.assign(static_cast<std::size_t>(rows) + 1, 0);
+        to.column.clear();
+    } else if (new_places) {
+        to.row_start = from.row_start;
+        to.column = from.column;
     }
-    derive_needs();
-    identify();
+    to.rows = rows;
+    to.columns = columns;
+    to.value = from.value;
 }
 
-bool PreparedProblem::Implementation::same_places(const Problem& other) const {
-    const auto same = [](const SparseMatrix& here, const SparseMatrix& there) {
-        if (there.rows == 0 && there.columns == 0) return here.value.empty();  // absent, here a zero matrix
-        return here.rows == there.rows && here.columns == there.columns && here.row_start == there.row_start &&
-               here.column == there.column;
-    };
-    return raw.n == other.n() && raw.m == other.m() && same(problem.H, other.H) && same(problem.D, other.D) &&
-           same(problem.E, other.E) &&
+void copy_cone(const Cone& from, Cone& to) {
+    to.kind = from.kind;
+    to.rows = from.rows;
+    to.mu = from.mu;
+    if (!from.lo.empty() || !to.lo.empty()) to.lo = from.lo;
+    if (!from.hi.empty() || !to.hi.empty()) to.hi = from.hi;
+}
+
+}  // namespace
+
+bool PreparedProblem::Implementation::same_places_of_H(const Problem& other) const {
+    return raw.n == other.n() && same_places(problem.H, other.H);
+}
+
+bool PreparedProblem::Implementation::same_places_of_rows(const Problem& other) const {
+    return raw.m == other.m() && same_places(problem.D, other.D) && same_places(problem.E, other.E) &&
            std::equal(problem.cones.begin(), problem.cones.end(), other.cones.begin(), other.cones.end(),
                       [](const Cone& here, const Cone& there) {
                           return here.kind == there.kind && here.rows == there.rows &&
@@ -172,17 +205,21 @@ bool PreparedProblem::Implementation::same_places(const Problem& other) const {
                       });
 }
 
-void PreparedProblem::Implementation::copy_values(const Problem& other) {
+void PreparedProblem::Implementation::copy(const Problem& other, bool new_places) {
+    const auto n = other.n(), m = other.m();
     problem.H.value = other.H.value;
-    problem.D.value = other.D.value;
-    problem.E.value = other.E.value;
+    copy_matrix(other.D, new_places, m, n, problem.D);
+    copy_matrix(other.E, new_places, m, m, problem.E);
     problem.a = other.a;
     problem.b = other.b;
-    problem.cones = other.cones;
+    problem.cones.resize(other.cones.size());
+    for (std::size_t c = 0; c < other.cones.size(); ++c) copy_cone(other.cones[c], problem.cones[c]);
     problem.law = other.law;
     problem.name = other.name;
     problem.source = other.source;
     problem.notes = other.notes;
+    raw.m = m;
+    cones.resize(problem.cones.size());
     point_to_arrays();
 }
 
@@ -222,19 +259,20 @@ void PreparedProblem::Implementation::point_to_arrays() {
 void PreparedProblem::Implementation::detect_structure() {
     const Structure before = structure;
     structure = structure_by_pattern(problem.H, blocks);
-    std::shared_ptr<sdk::DelassusOperator> candidate = std::move(operator_of_definite);
-    operator_of_definite.reset();
+    std::shared_ptr<Mobility> candidate = std::move(mobility);
+    mobility.reset();
     if (structure == Structure::Unsymmetric) return;
     raw.needs = need_of(structure);
     const sdk::ProblemView view(raw);
     try {
-        // One that was there keeps the analysis of a sparse H, if the pattern is still the same.
-        if (!candidate || before != structure || candidate.use_count() > 1)
-            candidate = std::make_shared<sdk::DelassusOperator>();
-        candidate->analyze(view);
+        // One that was there has analysed the same pattern.
+        if (!candidate || before != structure || candidate.use_count() > 1) {
+            candidate = std::make_shared<Mobility>();
+            candidate->analyze(view);
+        }
         candidate->factorize(view);
         if (candidate->inverse().smallest_relative_pivot() > 1e-14) {
-            operator_of_definite = std::move(candidate);
+            mobility = std::move(candidate);
             return;
         }
     } catch (const sdk::NumericalFailure&) {
@@ -242,12 +280,12 @@ void PreparedProblem::Implementation::detect_structure() {
     structure = structure_of_singular(problem.H, blocks);
 }
 
-void PreparedProblem::Implementation::derive_needs() {
+void PreparedProblem::Implementation::derive_needs(bool new_places) {
     raw.needs = need_of(structure);
     for (const auto& cone : cones) raw.needs |= sdk::operations_of(cone).capability;
     set_law_needs();
     if (raw.n > 0 && problem.E.entries() > 0) raw.needs |= DELASSUS_CAN_COMPLIANCE;
-    if (raw.n > 0 && raw.m > 0 && redundancy(problem.D, problem.E)) raw.needs |= DELASSUS_CAN_REDUNDANT;
+    if (raw.n > 0 && raw.m > 0 && redundancy(problem.D, problem.E, new_places)) raw.needs |= DELASSUS_CAN_REDUNDANT;
 }
 
 void PreparedProblem::Implementation::set_law_needs() {
@@ -270,6 +308,16 @@ void PreparedProblem::Implementation::identify() {
     for (const SparseMatrix* matrix : {&problem.H, &problem.D, &problem.E}) values.add(matrix->value);
     raw.pattern_id = pattern.value();
     raw.values_id = values.value();
+}
+
+// Hashing every entry would cost a step as much as judging its solution; numbers drawn from a counter tell as well that
+// something is new.
+void PreparedProblem::Implementation::identify_anew(bool new_places) {
+    static std::atomic<std::uint64_t> drawn = 0;
+    Hash hash;
+    hash.add_size(++drawn);
+    raw.values_id = hash.value();
+    if (new_places) raw.pattern_id = raw.values_id;
 }
 
 }  // namespace delassus

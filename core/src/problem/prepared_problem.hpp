@@ -6,7 +6,7 @@
 
 #include "delassus/errors.hpp"
 #include "delassus/needs.hpp"
-#include "delassus/sdk/delassus_operator.hpp"
+#include "problem/mobility.hpp"
 #include "problem/structure.hpp"
 
 namespace delassus {
@@ -18,26 +18,28 @@ struct PreparedProblem::Implementation {
     std::vector<delassus_cone> cones;
     delassus_problem raw{};
     /// Factored where H is definite or n = 0; null otherwise. The error meter measures with it.
-    std::shared_ptr<sdk::DelassusOperator> operator_of_definite;
+    std::shared_ptr<Mobility> mobility;
     mutable std::unique_ptr<ErrorMeter> meter;
     RedundancyCheck redundancy;
 
-    /// Takes the place of what was there; H⁻¹ is kept as far as H is the same.
-    void take(Problem other);
-    /// Structure of H, needs and identities, after new matrices; same_H: H is the one that was factored.
-    void prepare_matrices(bool same_H);
     void lay_out();
     /// raw's pointers to the arrays of the problem and the cones' numbers, which lay_out() placed.
     void point_to_arrays();
-    /// Whether the other problem has its entries, and cones of the same kinds, in the same places.
-    [[nodiscard]] bool same_places(const Problem& other) const;
-    /// Copies the numbers of a problem with the same places.
-    void copy_values(const Problem& other);
+    /// Whether the other problem has as many columns, and the entries of H in the same places.
+    [[nodiscard]] bool same_places_of_H(const Problem& other) const;
+    /// Whether the entries of D and E, and cones of the same kinds, are in the same places too.
+    [[nodiscard]] bool same_places_of_rows(const Problem& other) const;
+    /// Copies a problem with the same places of H.
+    void copy(const Problem& other, bool new_places);
     void detect_structure();
-    void derive_needs();
+    /// new_places: whether entries of D or E stand elsewhere than at the last call.
+    void derive_needs(bool new_places);
     /// The needs that come with the law, in place of another law's.
     void set_law_needs();
+    /// Identities from the content.
     void identify();
+    /// Identities that no other problem of this process has; the pattern's only if the places are new.
+    void identify_anew(bool new_places);
 };
 
 }  // namespace delassus

@@ -94,19 +94,39 @@ Structure structure_of_singular(const SparseMatrix& H, const BlockPartition& blo
     return factor.info() == Eigen::Success ? Structure::Semidefinite : Structure::Indefinite;
 }
 
-bool RedundancyCheck::operator()(const SparseMatrix& D, const SparseMatrix& E) {
+namespace {
+
+bool is_rigid(const SparseMatrix& E, std::int32_t row) {
+    return E.rows == 0 || E.row_start[row] == E.row_start[row + 1];
+}
+
+}  // namespace
+
+bool RedundancyCheck::operator()(const SparseMatrix& D, const SparseMatrix& E, bool new_places) {
+    if (new_places) certain_by_places_ = by_places(D, E);
+    return certain_by_places_ || by_values(D, E);
+}
+
+bool RedundancyCheck::by_places(const SparseMatrix& D, const SparseMatrix& E) {
     touched_.assign(static_cast<std::size_t>(D.columns), 0);
-    directions_.clear();
     std::int64_t rigid_rows = 0;
     for (std::int32_t row = 0; row < D.rows; ++row) {
-        if (E.rows > 0 && E.row_start[row] != E.row_start[row + 1]) continue;
+        if (!is_rigid(E, row)) continue;
         ++rigid_rows;
+        if (D.row_start[row] == D.row_start[row + 1]) return true;
+        for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k)
+            touched_[static_cast<std::size_t>(D.column[k])] = 1;
+    }
+    return rigid_rows > std::count(touched_.begin(), touched_.end(), 1);
+}
+
+bool RedundancyCheck::by_values(const SparseMatrix& D, const SparseMatrix& E) {
+    directions_.clear();
+    for (std::int32_t row = 0; row < D.rows; ++row) {
         const auto begin = D.row_start[row];
         const auto end = D.row_start[row + 1];
-        if (begin == end) return true;
-        if (D.value[begin] == 0.0) continue;
+        if (!is_rigid(E, row) || D.value[begin] == 0.0) continue;
         Hash hash;
-        for (auto k = begin; k < end; ++k) touched_[static_cast<std::size_t>(D.column[k])] = 1;
         hash.add(D.column.data() + begin, static_cast<std::size_t>(end - begin) * sizeof(std::int32_t));
         // The ratio to the row's first entry, rounded so that parallel rows meet in one bucket as a rule.
         for (auto k = begin; k < end; ++k) {
@@ -115,7 +135,6 @@ bool RedundancyCheck::operator()(const SparseMatrix& D, const SparseMatrix& E) {
         }
         directions_.push_back({hash.value(), row});
     }
-    if (rigid_rows > std::count(touched_.begin(), touched_.end(), 1)) return true;
 
     const auto parallel = [&](std::int32_t p, std::int32_t q) {
         const auto p_begin = D.row_start[p], q_begin = D.row_start[q];

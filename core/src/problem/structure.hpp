@@ -36,13 +36,19 @@ struct BlockPartition {
 /// its scratch arrays from call to call.
 class RedundancyCheck {
 public:
-    [[nodiscard]] bool operator()(const SparseMatrix& D, const SparseMatrix& E);
+    /// new_places: whether the entries of D and E stand elsewhere than in the last call; what the places alone tell is
+    /// kept.
+    [[nodiscard]] bool operator()(const SparseMatrix& D, const SparseMatrix& E, bool new_places);
 
 private:
+    [[nodiscard]] bool by_places(const SparseMatrix& D, const SparseMatrix& E);
+    [[nodiscard]] bool by_values(const SparseMatrix& D, const SparseMatrix& E);
+
     struct Direction {
         std::uint64_t hash;  ///< equal for parallel rows, as a rule
         std::int32_t row;
     };
+    bool certain_by_places_ = false;
     std::vector<char> touched_;
     std::vector<Direction> directions_;
 };

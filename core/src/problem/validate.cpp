@@ -7,6 +7,8 @@
 #include "delassus/error.hpp"
 #include "delassus/problem.hpp"
 #include "problem/symmetry.hpp"
+#include "problem/validate.hpp"
+#include "support/finite.hpp"
 
 namespace delassus {
 namespace {
@@ -37,6 +39,17 @@ public:
         }
     }
 
+    void run_values(bool new_H) const {
+        vector(problem_.a, "a");
+        vector(problem_.b, "b");
+        if (new_H) values(problem_.H, "H");
+        values(problem_.D, "D");
+        values(problem_.E, "E");
+        cones();
+        compliance();
+        if (new_H) symmetry_of_H();
+    }
+
 private:
     template <class... Arguments>
     [[noreturn]] void refuse(fmt::format_string<Arguments...> text, Arguments&&... arguments) const {
@@ -49,6 +62,7 @@ private:
         if (v.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
             refuse("{} has {} entries; at most 2147483646 are possible.", name, v.size());
         }
+        if (all_finite(v)) return;
         for (std::size_t k = 0; k < v.size(); ++k) {
             if (!std::isfinite(v[k])) refuse("{}[{}] is {}; every entry must be finite.", name, k, v[k]);
         }
@@ -90,6 +104,15 @@ private:
                     refuse("row {} of {} has column {} after column {}; columns must ascend and not repeat.", row, name,
                            A.column[k], A.column[k - 1]);
                 }
+            }
+        }
+        values(A, name);
+    }
+
+    void values(const SparseMatrix& A, const char* name) const {
+        if (all_finite(A.value)) return;
+        for (std::int32_t row = 0; row < A.rows; ++row) {
+            for (std::int32_t k = A.row_start[row]; k < A.row_start[row + 1]; ++k) {
                 if (!std::isfinite(A.value[k])) {
                     refuse("{}({}, {}) is {}; every entry must be finite.", name, row, A.column[k], A.value[k]);
                 }
@@ -187,6 +210,10 @@ private:
 
 void validate(const Problem& problem) {
     Checker(problem).run();
+}
+
+void validate_values(const Problem& problem, bool new_H) {
+    Checker(problem).run_values(new_H);
 }
 
 }  // namespace delassus

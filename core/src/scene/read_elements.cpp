@@ -59,7 +59,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::elastic_handlers
 }
 
 void SystemReader::read_elastic_block(const YAML::Node& item, const Copy& copy) {
-    ElasticBlockParameters block;
+    ElasticBlock block;
     block.corner = copy.offset;
     bool edges = false, cells = false;
     auto handlers = elastic_handlers(block);

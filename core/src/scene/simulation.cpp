@@ -9,6 +9,7 @@
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
+#include "support/finite.hpp"
 
 namespace delassus {
 namespace {
@@ -17,10 +18,6 @@ using Clock = std::chrono::steady_clock;
 
 /// Remaining times within this fraction of a step are whole steps that rounding spoiled.
 constexpr double rounding_of_step = 1e-9;
-
-bool finite(const std::vector<double>& values) {
-    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-}
 
 }  // namespace
 
@@ -92,7 +89,8 @@ const StepRecord& Simulation::step() {
     };
     try {
         taken = advance(next);
-        if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
+        if (!all_finite(next.q) || !all_finite(next.v))
+            throw StepFailure("the state at the end of the step is not finite");
     } catch (const Unsupported& error) {
         undo();
         throw Unsupported(fmt::format("{}: {}", where(), error.what()));

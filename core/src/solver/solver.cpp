@@ -10,6 +10,7 @@
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "solver/solver_implementation.hpp"
+#include "support/finite.hpp"
 
 namespace delassus {
 
@@ -23,10 +24,6 @@ constexpr double balance_floor = 1e-12;
 /// and up to this natural error at most.
 constexpr double rounding_slack = 32.0;
 constexpr double rounding_limit = 1e-10;
-
-bool all_finite(const std::vector<double>& values) {
-    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-}
 
 void check_settings(const SolveSettings& settings) {
     if (!(settings.tolerance > 0.0) || !std::isfinite(settings.tolerance))
