@@ -86,8 +86,8 @@ int compare_results(const BenchArguments& arguments) {
     if (arguments.json) {
         fmt::print("{}\n", bench::text_of(comparison, 1));
     } else {
-        fmt::print("A is {}, B is {}; ratios of setup and solve, below 1 where B is faster\n\n{}", arguments.before.string(),
-                   arguments.after.string(), bench::compare_text(comparison));
+        fmt::print("A is {}, B is {}; ratios of setup and solve, below 1 where B is faster\n\n{}",
+                   arguments.before.string(), arguments.after.string(), bench::compare_text(comparison));
     }
     return exit_solved;
 }

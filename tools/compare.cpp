@@ -7,8 +7,8 @@
 
 #include "bench/writers.hpp"
 #include "command.hpp"
-#include "measuring.hpp"
 #include "delassus/error.hpp"
+#include "measuring.hpp"
 #include "process/child_process.hpp"
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"

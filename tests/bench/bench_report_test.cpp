@@ -62,14 +62,16 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
     // Before and after a click on the switch of apgd: how many series the first problem's chart has. Then the velocity.
     const auto run = open(
         "charts.forEach((entry) => { if (!entry.chart) entry.draw(); });"
-        "const chart = () => document.querySelector('#problem-2 .chart').chart.chart.getOption().series.filter((s) => s.name === 'apgd').length;"
+        "const chart = () => document.querySelector('#problem-2 .chart').chart.chart.getOption().series.filter((s) => "
+        "s.name === 'apgd').length;"
         "const root = document.documentElement; root.dataset.before = chart();"
         "const button = [...document.querySelectorAll('#legend button')].find((one) => one.dataset.name === 'apgd');"
         "const {left, top} = button.getBoundingClientRect();"
         "document.elementFromPoint(left + 6, top + 6).dispatchEvent(new MouseEvent('click', {bubbles: true}));"
         "root.dataset.after = chart(); root.dataset.pressed = button.getAttribute('aria-pressed');"
         "button.click(); root.dataset.again = chart();"
-        "[...document.querySelectorAll('#problem-2 .tools button')].find((one) => one.textContent.startsWith('velocity')).click();"
+        "[...document.querySelectorAll('#problem-2 .tools button')].find((one) => "
+        "one.textContent.startsWith('velocity')).click();"
         "root.dataset.axis = document.querySelector('#problem-2 .chart').chart.chart.getOption().yAxis[0].name;");
     ASSERT_FALSE(run.timed_out);
     const std::string head = run.dom.substr(0, 600);
@@ -107,7 +109,8 @@ TEST_F(BenchReport, AScreenshotShowsIt) {
     if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
     const auto shot = folder / "report.png", blank = folder / "blank.png";
     const auto drawn = open("", {"--window-size=1200,3000", "--screenshot=" + shot.string()});
-    const auto empty = open("document.body.replaceChildren();", {"--window-size=1200,3000", "--screenshot=" + blank.string()});
+    const auto empty =
+        open("document.body.replaceChildren();", {"--window-size=1200,3000", "--screenshot=" + blank.string()});
     ASSERT_FALSE(drawn.timed_out || empty.timed_out);
     ASSERT_TRUE(fs::exists(shot) && fs::exists(blank)) << drawn.log;
     EXPECT_GT(fs::file_size(shot), 5 * fs::file_size(blank));

@@ -25,8 +25,7 @@ protected:
     /// Rows by "solver at tolerance".
     [[nodiscard]] static std::map<std::string, Json> by_run(const bench::ResultSet& set) {
         std::map<std::string, Json> rows;
-        for (const Json& row : set.solves)
-            rows[fmt_key(row.at("label"), row.at("tolerance").get<double>())] = row;
+        for (const Json& row : set.solves) rows[fmt_key(row.at("label"), row.at("tolerance").get<double>())] = row;
         return rows;
     }
     static std::string fmt_key(const std::string& label, double tolerance) {
@@ -43,13 +42,13 @@ protected:
 };
 
 TEST_F(BenchRun, EveryFailureIsARowWithItsCause) {
-    const auto run = run_suite(suite(
-        "problems: [stops, friction]\n"
-        "solvers:\n"
-        "  - {name: misbehaving, behaviour: [solve, lie, crash, hang, slow, throw, exit]}\n"
-        "tolerances: [1e-6]\n"
-        "time_limit: 0.3\n"
-        "repeats: 2\n"));
+    const auto run =
+        run_suite(suite("problems: [stops, friction]\n"
+                        "solvers:\n"
+                        "  - {name: misbehaving, behaviour: [solve, lie, crash, hang, slow, throw, exit]}\n"
+                        "tolerances: [1e-6]\n"
+                        "time_limit: 0.3\n"
+                        "repeats: 2\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = results();
     EXPECT_EQ(set.missing, 0U);
@@ -86,12 +85,12 @@ TEST_F(BenchRun, EveryFailureIsARowWithItsCause) {
 }
 
 TEST_F(BenchRun, MemoryBeyondTheLimitIsKilledAndSaid) {
-    const auto run = run_suite(suite(
-        "problems: [stops]\n"
-        "solvers: [misbehaving(behaviour=eat), misbehaving]\n"
-        "tolerances: [1e-6]\n"
-        "memory_limit: 200\n"
-        "repeats: 1\n"));
+    const auto run =
+        run_suite(suite("problems: [stops]\n"
+                        "solvers: [misbehaving(behaviour=eat), misbehaving]\n"
+                        "tolerances: [1e-6]\n"
+                        "memory_limit: 200\n"
+                        "repeats: 1\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = results();
     ASSERT_EQ(set.solves.size(), 2U);
@@ -139,11 +138,14 @@ TEST_F(BenchRun, AnInterruptedRunGoesOn) {
     EXPECT_EQ(lines("solve"), 6U);
 
     // A run that the suite no longer asks for is not in the report, and one that is new is run.
-    ASSERT_EQ(run_suite(suite("problems: [stops]\nsolvers: [misbehaving]\ntolerances: [1e-3, 1e-9]\nrepeats: 1\n")).exit_code, 0);
+    ASSERT_EQ(
+        run_suite(suite("problems: [stops]\nsolvers: [misbehaving]\ntolerances: [1e-3, 1e-9]\nrepeats: 1\n")).exit_code,
+        0);
     EXPECT_EQ(results().solves.size(), 2U);
     EXPECT_EQ(lines("solve"), 7U);
     // What a row depends on is in its key: more repeats are measured anew.
-    ASSERT_EQ(run_suite(suite("problems: [stops]\nsolvers: [misbehaving]\ntolerances: [1e-3]\nrepeats: 2\n")).exit_code, 0);
+    ASSERT_EQ(run_suite(suite("problems: [stops]\nsolvers: [misbehaving]\ntolerances: [1e-3]\nrepeats: 2\n")).exit_code,
+              0);
     EXPECT_EQ(lines("solve"), 8U);
 }
 
@@ -151,8 +153,10 @@ TEST_F(BenchRun, CtrlCEndsItWithWhatThereIs) {
     ChildSettings child;
     child.program = DELASSUS_COMMAND;
     const auto file = suite(
-        "problems: [stops]\nsolvers: [misbehaving, misbehaving(behaviour=slow)]\ntolerances: [1e-6]\ntime_limit: 60\nrepeats: 1\n");
-    child.arguments = {"bench", "run", file.string(), "-o", (folder / "out").string(), "--plugin-path", DELASSUS_TEST_PLUGINS};
+        "problems: [stops]\nsolvers: [misbehaving, misbehaving(behaviour=slow)]\ntolerances: [1e-6]\ntime_limit: "
+        "60\nrepeats: 1\n");
+    child.arguments = {
+        "bench", "run", file.string(), "-o", (folder / "out").string(), "--plugin-path", DELASSUS_TEST_PLUGINS};
     child.timeout = 60.0;
     child.cancel_grace = 30.0;
     const auto begin = std::chrono::steady_clock::now();
@@ -194,17 +198,19 @@ TEST_F(BenchRun, ReferencesAreConfirmedAndCached) {
 }
 
 TEST_F(BenchRun, TimesteppersConvergeAtTheirOrder) {
-    std::ofstream(folder / "pendulum.yaml") << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/pendulum.yaml");
-    const auto run = run_suite(suite(
-        "scenes: [{path: pendulum.yaml, end: 0.5, steps: [0.02, 0.01, 0.005]}]\n"
-        "timesteppers: [euler_implicit_linearized, generalized_alpha, rk4]\n"
-        "references: {timestepper: generalized_alpha, step_fraction: 0.05}\n"
-        "repeats: 1\n"));
+    std::ofstream(folder / "pendulum.yaml")
+        << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/pendulum.yaml");
+    const auto run =
+        run_suite(suite("scenes: [{path: pendulum.yaml, end: 0.5, steps: [0.02, 0.01, 0.005]}]\n"
+                        "timesteppers: [euler_implicit_linearized, generalized_alpha, rk4]\n"
+                        "references: {timestepper: generalized_alpha, step_fraction: 0.05}\n"
+                        "repeats: 1\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = results();
     ASSERT_EQ(set.simulations.size(), 9U);
     EXPECT_EQ(set.simulations[8].at("cause"), "unsupported");  // rk4 takes no joint
-    const Json page = Json::parse(content_of(folder / "out" / "results.jsonl").substr(0, content_of(folder / "out" / "results.jsonl").find('\n')));
+    const Json page = Json::parse(content_of(folder / "out" / "results.jsonl")
+                                      .substr(0, content_of(folder / "out" / "results.jsonl").find('\n')));
     EXPECT_EQ(page.at("kind"), "session");
     const auto ratio = [&](std::size_t coarse) {
         return set.simulations[coarse].at("error").at("position").get<double>() /
@@ -220,9 +226,9 @@ TEST_F(BenchRun, TimesteppersConvergeAtTheirOrder) {
 TEST_F(BenchRun, StepsOfScenesAreProblems) {
     std::ofstream(folder / "incline.yaml")
         << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/box_on_incline.yaml");
-    const auto run = run_suite(suite(
-        "problems: [{scene: incline.yaml, end: 0.01, every: 5}]\nsolvers: [pgs]\ntolerances: [1e-3]\nrepeats: 1\n"
-        "references: none\n"));
+    const auto run = run_suite(
+        suite("problems: [{scene: incline.yaml, end: 0.01, every: 5}]\nsolvers: [pgs]\ntolerances: [1e-3]\nrepeats: 1\n"
+              "references: none\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     ASSERT_FALSE(results().problems.empty());
     EXPECT_NE(results().problems[0].at("name").get<std::string>().find("incline: "), std::string::npos);
@@ -231,7 +237,9 @@ TEST_F(BenchRun, StepsOfScenesAreProblems) {
 
 TEST_F(BenchRun, EqualContentIsRunOnce) {
     fs::copy(folder / "stops", folder / "twin", fs::copy_options::recursive);
-    ASSERT_EQ(run_suite(suite("problems: [stops, twin]\nsolvers: [misbehaving]\ntolerances: [1e-3]\nrepeats: 1\n")).exit_code, 0);
+    ASSERT_EQ(
+        run_suite(suite("problems: [stops, twin]\nsolvers: [misbehaving]\ntolerances: [1e-3]\nrepeats: 1\n")).exit_code,
+        0);
     EXPECT_EQ(results().problems.size(), 1U);
 }
 
@@ -248,10 +256,12 @@ TEST_F(BenchRun, FamiliesHaveAnExponent) {
 TEST_F(BenchRun, WhatIsNoResultIsRefused) {
     EXPECT_EQ(bench({"report", folder.string()}).exit_code, 2);
     fs::create_directories(folder / "out");
-    std::ofstream(folder / "out" / "results.jsonl") << "{\"kind\": \"session\", \"format\": \"delassus-bench\", \"version\": 99}\n";
+    std::ofstream(folder / "out" / "results.jsonl")
+        << "{\"kind\": \"session\", \"format\": \"delassus-bench\", \"version\": 99}\n";
     const auto run = bench({"report", (folder / "out").string()});
     EXPECT_EQ(run.exit_code, 2);
-    EXPECT_NE(run.errors.find("the format is delassus-bench 99; this version reads delassus-bench 1"), std::string::npos)
+    EXPECT_NE(run.errors.find("the format is delassus-bench 99; this version reads delassus-bench 1"),
+              std::string::npos)
         << run.errors;
     EXPECT_EQ(run_suite(suite("problems: [stops]\nsolvers: [misbehaving]\n")).exit_code, 2);
 }

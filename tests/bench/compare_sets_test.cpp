@@ -15,8 +15,13 @@ using bench::Json;
 Json solve(const std::string& solver, std::vector<double> seconds, const std::string& cause = "") {
     Json repeats = Json::array();
     for (const double one : seconds) repeats.push_back({0.25 * one, 0.75 * one});
-    return {{"kind", "solve"},    {"problem", "p"},  {"law", "associated"}, {"label", solver},
-            {"tolerance", 1e-6}, {"cause", cause}, {"seconds", {{"setup", 0.0}, {"solve", 0.0}, {"repeats", repeats}}}};
+    return {{"kind", "solve"},
+            {"problem", "p"},
+            {"law", "associated"},
+            {"label", solver},
+            {"tolerance", 1e-6},
+            {"cause", cause},
+            {"seconds", {{"setup", 0.0}, {"solve", 0.0}, {"repeats", repeats}}}};
 }
 
 bench::ResultSet set_of(std::vector<Json> solves) {

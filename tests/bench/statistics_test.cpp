@@ -15,10 +15,8 @@ namespace {
 //        6     3     –     3      2  1  –
 //        10    5     –     5      2  1  –
 //        –     –     –     –
-const Times table = {{1.0, 2.0, 4.0},
-                     {6.0, 3.0, std::nullopt},
-                     {10.0, 5.0, std::nullopt},
-                     {std::nullopt, std::nullopt, std::nullopt}};
+const Times table = {
+    {1.0, 2.0, 4.0}, {6.0, 3.0, std::nullopt}, {10.0, 5.0, std::nullopt}, {std::nullopt, std::nullopt, std::nullopt}};
 
 TEST(Statistics, ProfilesAreThoseOfTheTable) {
     const Profiles profiles = performance_profiles(table);
@@ -48,8 +46,9 @@ TEST(Statistics, ShiftedGeometricMean) {
 }
 
 TEST(Statistics, FitsAPowerExactly) {
-    const auto fit = fit_power({10.0, 100.0, 1000.0, 20000.0}, {3.0 * std::pow(10.0, 1.4), 3.0 * std::pow(100.0, 1.4),
-                                                                3.0 * std::pow(1000.0, 1.4), 3.0 * std::pow(20000.0, 1.4)});
+    const auto fit =
+        fit_power({10.0, 100.0, 1000.0, 20000.0}, {3.0 * std::pow(10.0, 1.4), 3.0 * std::pow(100.0, 1.4),
+                                                   3.0 * std::pow(1000.0, 1.4), 3.0 * std::pow(20000.0, 1.4)});
     ASSERT_TRUE(fit.has_value());
     EXPECT_NEAR(fit->exponent, 1.4, 1e-12);
     EXPECT_NEAR(fit->factor, 3.0, 1e-10);

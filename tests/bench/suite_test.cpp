@@ -40,7 +40,8 @@ TEST_F(SuiteTest, SweepsExpand) {
 }
 
 TEST_F(SuiteTest, FoldersAreListedAndOptionalOnesMayBeAbsent) {
-    const auto suite = read("problems: [{folder: .}, {path: absent, optional: true}, {folder: $NO_SUCH_PLACE, optional: true}]\n");
+    const auto suite =
+        read("problems: [{folder: .}, {path: absent, optional: true}, {folder: $NO_SUCH_PLACE, optional: true}]\n");
     ASSERT_EQ(suite.problems.size(), 2U);
     EXPECT_EQ(suite.problems[0].source.path.filename(), "friction");
     EXPECT_EQ(suite.left_out.size(), 2U);
@@ -61,22 +62,27 @@ TEST_F(SuiteTest, TimesteppersHaveStepsAndOptions) {
 TEST_F(SuiteTest, MistakesAreNamedWithTheirPlace) {
     const std::string file = (folder / "suite.yaml").string();
     const std::map<std::string, std::string> cases = {
-        {"problems: [stops]\ntolerence: [1e-3]\n", "line 2: a suite has no key \"tolerence\"; did you mean \"tolerances\"?"},
-        {"problems:\n  - {genrate: chain}\n", "line 2: a problem of the suite has no key \"genrate\"; did you mean \"generate\"?"},
+        {"problems: [stops]\ntolerence: [1e-3]\n",
+         "line 2: a suite has no key \"tolerence\"; did you mean \"tolerances\"?"},
+        {"problems:\n  - {genrate: chain}\n",
+         "line 2: a problem of the suite has no key \"genrate\"; did you mean \"generate\"?"},
         {"problems:\n  - {generate: chian}\n", "line 2: there is no generator \"chian\"; did you mean \"chain\"?"},
-        {"problems:\n  - {generate: chain, set: {bodys: 3}}\n", "line 2: chain has no parameter \"bodys\"; did you mean \"bodies\"?"},
+        {"problems:\n  - {generate: chain, set: {bodys: 3}}\n",
+         "line 2: chain has no parameter \"bodys\"; did you mean \"bodies\"?"},
         {"problems:\n  - {generate: chain, set: {bodies: 0}}\n", "line 2: chain: bodies = 0 lies outside its range"},
         {"problems:\n  - absent\n", "line 2: there is no "},
         {"problems:\n  - {path: stops, folder: .}\n", "line 2: a problem of the suite has one of"},
         {"problems: [stops]\nsolvers:\n  - pgss\n", "line 3: there is no solver \"pgss\"; did you mean \"pgs\"?"},
-        {"problems: [stops]\nsolvers:\n  - {name: pgs, omgea: 1}\n", "line 3: pgs has no option \"omgea\"; did you mean \"omega\"?"},
+        {"problems: [stops]\nsolvers:\n  - {name: pgs, omgea: 1}\n",
+         "line 3: pgs has no option \"omgea\"; did you mean \"omega\"?"},
         {"problems: [stops]\nsolvers: [pgs, pgs]\n", "line 2: the solver pgs is listed twice"},
         {"problems: [stops]\ntolerances: [0]\n", "line 2: \"tolerances\" is 0; it must be positive"},
         {"problems: [stops]\ntime_limit: .inf\n", "line 2: \"time_limit\" is .inf; it must be positive and finite"},
         {"problems: [stops]\nrepeats: 0\n", "line 2: \"repeats\" must be at least 1"},
         {"problems: [stops]\nlaws: [sticky]\n", "line 2:"},
         {"scenes: [absent.yaml]\n", "line 1: there is no scene "},
-        {"problems: [stops]\ntimesteppers: [newmarck]\n", "line 2: there is no timestepper \"newmarck\"; did you mean \"newmark\"?"},
+        {"problems: [stops]\ntimesteppers: [newmarck]\n",
+         "line 2: there is no timestepper \"newmarck\"; did you mean \"newmark\"?"},
         {"problems: [stops]\ntimesteppers: [newmark(x=1)]\n", "line 2: newmark has no option \"x\""},
         {"title: nothing\n", "has neither problems nor scenes nor axes"},
         {"problems: [stops\n", "not valid YAML"}};

@@ -14,6 +14,10 @@ command=$prefix/bin/delassus
 grep -q '^apgd' "$scratch/list"
 if "$command" plugins list | grep -A99 '^Rejected'; then echo "installed plugins were rejected" >&2; exit 1; fi
 
+"$command" bench list | tee "$scratch/suites"
+grep -q '^quick: ' "$scratch/suites"
+grep -q "$prefix.*quick.yaml" "$scratch/suites"
+
 # Only what is installed may be used from here on.
 cp -r "$source/examples/plugin" "$source/examples/embed" "$source/examples/system" "$source/examples/problems/box_stack" "$scratch"
 flags=${CONSUMER_FLAGS:-}

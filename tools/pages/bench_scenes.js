@@ -7,7 +7,7 @@ function sceneOption(rows, scene, measure) {
   const point = (row) => [Math.max(row.seconds.stepping, least.seconds), Math.max(row.error[measure], least.error),
     [`h = ${short(row.step)} s, ${whole(row.totals.steps)} steps`, `${seconds(row.seconds.stepping)} s`, `${measure} ${error(row.error[measure])}`]];
   const all = names.map((name) => [name, rows.filter((row) => row.timestepper === name && row.error[measure] !== null)
-    .sort((a, b) => a.step - b.step).map(point)]);
+    .sort((a, b) => b.step - a.step).map(point)]);
   const values = all.flatMap(([, data]) => data);
   const order = (name) => results.analysis.orders.find((one) => one.scene === scene.scene && one.timestepper === name)?.fit;
   return {

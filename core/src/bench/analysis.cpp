@@ -61,7 +61,8 @@ Json analyse_tolerance(const Rows& rows, double tolerance, double time_limit) {
     };
     Times times(problems.size(), std::vector<std::optional<double>>(solvers.size()));
     for (const Json* row : own)
-        if (solved(*row)) times[index(problems, problem_of(*row))][index(solvers, label_of(*row))] = total_seconds(*row);
+        if (solved(*row))
+            times[index(problems, problem_of(*row))][index(solvers, label_of(*row))] = total_seconds(*row);
     const Profiles profiles = performance_profiles(times, least_time);
 
     Json list = Json::array();
@@ -86,14 +87,16 @@ Json analyse_tolerance(const Rows& rows, double tolerance, double time_limit) {
                         {"memory", memory},
                         {"ratios", profiles.ratios[s]}});
     }
-    return {{"tolerance", tolerance}, {"problems", problems.size()}, {"solved_by_any", profiles.problems}, {"solvers", list}};
+    return {{"tolerance", tolerance},
+            {"problems", problems.size()},
+            {"solved_by_any", profiles.problems},
+            {"solvers", list}};
 }
 
 Json analyse_class(const std::string& name, const Rows& rows, const Json& settings) {
     Json tolerances = Json::array();
     for (const auto& tolerance : settings.at("tolerances"))
-        tolerances.push_back(
-            analyse_tolerance(rows, tolerance.get<double>(), settings.at("time_limit").get<double>()));
+        tolerances.push_back(analyse_tolerance(rows, tolerance.get<double>(), settings.at("time_limit").get<double>()));
     return {{"name", name}, {"problems", distinct(rows, problem_of).size()}, {"tolerances", tolerances}};
 }
 
@@ -202,7 +205,8 @@ Json recording_ratio(const Rows& rows) {
     for (const Json* row : rows) {
         const double least = number_of(row->at("seconds").at("solve"));
         const double recorded = number_of(row->at("seconds").at("recorded").at(1));
-        if (solved(*row) && !row->at("seconds").at("repeats").empty() && least > 1e-2) ratios.push_back(recorded / least);
+        if (solved(*row) && !row->at("seconds").at("repeats").empty() && least > 1e-2)
+            ratios.push_back(recorded / least);
     }
     if (ratios.empty()) return {{"ratio", nullptr}, {"runs", 0}};
     std::sort(ratios.begin(), ratios.end());

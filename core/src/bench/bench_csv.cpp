@@ -55,7 +55,8 @@ std::string solves_csv(const ResultSet& results) {
 
 std::string simulations_csv(const ResultSet& results) {
     std::string text =
-        "scene,hash,timestepper,step_s,solver,status,cause,steps,newton_iterations,solver_iterations,setup_s,stepping_s,"
+        "scene,hash,timestepper,step_s,solver,status,cause,steps,newton_iterations,solver_iterations,setup_s,stepping_"
+        "s,"
         "position_error,velocity_error,start_energy,end_energy,drift,penetration,peak_memory_bytes,message\r\n";
     for (const Json& row : results.simulations) {
         const Json& totals = row.at("totals");

@@ -26,9 +26,7 @@ Json thinned(const Json& samples) {
 
 /// The rows, curves thinned and kept only at the tightest tolerance of each solver on each problem.
 std::vector<Json> page_rows(std::vector<Json> rows) {
-    const auto run_of = [](const Json& row) {
-        return Json{row.at("problem"), row.at("law"), row.at("label")}.dump();
-    };
+    const auto run_of = [](const Json& row) { return Json{row.at("problem"), row.at("law"), row.at("label")}.dump(); };
     std::map<std::string, double> tightest;
     for (const Json& row : rows) {
         const auto tolerance = row.at("tolerance").get<double>();

@@ -101,8 +101,8 @@ Comparison compare(const ComparePlan& plan, const CompareListener& listener) {
             ++number;
             if (listener.on_begin) listener.on_begin(facts[p], label_of(solver), number, total);
             solutions.push_back(scratch.path() / std::to_string(number));
-            problem.results.push_back(
-                measure(plan.worker, {plan.problems[p], solver, plan.settings, solutions.back(), {}}, listener.on_sample));
+            problem.results.push_back(measure(
+                plan.worker, {plan.problems[p], solver, plan.settings, solutions.back(), {}}, listener.on_sample));
         }
         if (!cancelled()) compare_velocities(plan, problem, solutions);
         comparison.problems.push_back(std::move(problem));

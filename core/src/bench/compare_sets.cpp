@@ -19,14 +19,15 @@ void check_comparable(const ResultSet& before, const ResultSet& after, bool any_
     const Json &a = before.session, &b = after.session;
     for (const char* what : {"processor", "cores"})
         if (!any_machine && a.at("machine").at(what) != b.at("machine").at(what))
-            throw InputError(fmt::format(
-                "the sets come from different machines ({} {} and {}), so ratios of their times say nothing of a change; "
-                "--any-machine compares them all the same",
-                what, a.at("machine").at(what).dump(), b.at("machine").at(what).dump()));
+            throw InputError(
+                fmt::format("the sets come from different machines ({} {} and {}), so ratios of their times say "
+                            "nothing of a change; "
+                            "--any-machine compares them all the same",
+                            what, a.at("machine").at(what).dump(), b.at("machine").at(what).dump()));
     for (const char* what : {"time_limit", "memory_limit", "max_iterations"})
         if (a.at("settings").at(what) != b.at("settings").at(what))
-            throw InputError(fmt::format("the sets have different limits ({} {} and {}), so they cannot be compared", what,
-                                         a.at("settings").at(what).dump(), b.at("settings").at(what).dump()));
+            throw InputError(fmt::format("the sets have different limits ({} {} and {}), so they cannot be compared",
+                                         what, a.at("settings").at(what).dump(), b.at("settings").at(what).dump()));
 }
 
 /// What makes two runs the same whatever the code.
@@ -68,7 +69,10 @@ Json compare_sets(const ResultSet& before, const ResultSet& after, bool any_mach
         for (const Json& scene : set->scenes) names[scene.at("scene")] = scene.at("name");
     }
 
-    Json result = {{"solvers", Json::array()}, {"runs", Json::array()}, {"changed", Json::array()}, {"simulations", Json::array()}};
+    Json result = {{"solvers", Json::array()},
+                   {"runs", Json::array()},
+                   {"changed", Json::array()},
+                   {"simulations", Json::array()}};
     std::map<std::string, Sum> sums;
     std::size_t common = 0;
     const auto compare = [&](const Json& row) {
@@ -110,7 +114,8 @@ Json compare_sets(const ResultSet& before, const ResultSet& after, bool any_mach
     for (const Json& row : after.solves) compare(row);
     for (const Json& row : after.simulations) compare(row);
     if (common == 0)
-        throw InputError("the sets have no run in common: no problem (by its content) with the same law, solver and tolerance");
+        throw InputError(
+            "the sets have no run in common: no problem (by its content) with the same law, solver and tolerance");
     for (const auto& [name, sum] : sums)
         result["solvers"].push_back({{"solver", name},
                                      {"runs", sum.runs},
@@ -130,9 +135,9 @@ std::string compare_text(const Json& comparison) {
     std::string result = fmt::format("{:<{}}  {:>5}  {:>7}  {:>15}  {:>6}  {:>6}\n", "solver", width, "runs", "B / A",
                                      "spread", "faster", "slower");
     for (const Json& row : comparison.at("solvers"))
-        result += fmt::format("{:<{}}  {:>5}  {:>7.3f}  {:>6.3f} … {:>6.3f}  {:>6}  {:>6}\n", text(row, "solver"), width,
-                              row.at("runs").get<int>(), number(row, "ratio"), number(row, "low"), number(row, "high"),
-                              row.at("faster").get<int>(), row.at("slower").get<int>());
+        result += fmt::format("{:<{}}  {:>5}  {:>7.3f}  {:>6.3f} … {:>6.3f}  {:>6}  {:>6}\n", text(row, "solver"),
+                              width, row.at("runs").get<int>(), number(row, "ratio"), number(row, "low"),
+                              number(row, "high"), row.at("faster").get<int>(), row.at("slower").get<int>());
     std::vector<const Json*> certain;
     for (const char* part : {"runs", "simulations"})
         for (const Json& row : comparison.at(part))
@@ -141,10 +146,10 @@ std::string compare_text(const Json& comparison) {
         return std::abs(std::log(number(*a, "ratio"))) > std::abs(std::log(number(*b, "ratio")));
     });
     const auto what = [&](const Json& row) {
-        return row.contains("problem")
-                   ? fmt::format("{} ({}), {}, {:g}", text(row, "problem"), text(row, "law"), text(row, "solver"),
-                                 number(row, "tolerance"))
-                   : fmt::format("{}, {}, h = {:g} s", text(row, "scene"), text(row, "timestepper"), number(row, "step"));
+        return row.contains("problem") ? fmt::format("{} ({}), {}, {:g}", text(row, "problem"), text(row, "law"),
+                                                     text(row, "solver"), number(row, "tolerance"))
+                                       : fmt::format("{}, {}, h = {:g} s", text(row, "scene"), text(row, "timestepper"),
+                                                     number(row, "step"));
     };
     if (!certain.empty()) result += "\nbeyond the spread of the repeats, the largest first:\n";
     for (std::size_t k = 0; k < std::min<std::size_t>(certain.size(), 20); ++k)

@@ -14,9 +14,9 @@ std::string csv_text(const Comparison& comparison) {
             for (const auto& repeat : row.repeats) slowest = std::max(slowest, repeat.solve);
             const Errors none{unknown, unknown, unknown, unknown, unknown, unknown};
             const Errors& error = row.error ? *row.error : none;
-            text += fmt::format("{},{},{},{},{},{},{},{}", csv_field(problem.facts.name), problem.facts.n, problem.facts.m,
-                                problem.facts.law, problem.facts.structure, csv_field(row.label), row.status,
-                                row.iterations ? std::to_string(*row.iterations) : "");
+            text += fmt::format("{},{},{},{},{},{},{},{}", csv_field(problem.facts.name), problem.facts.n,
+                                problem.facts.m, problem.facts.law, problem.facts.structure, csv_field(row.label),
+                                row.status, row.iterations ? std::to_string(*row.iterations) : "");
             for (const double value : {row.setup, row.solve, slowest, error.natural, error.balance, error.cone,
                                        error.dual, error.gap, error.siconos, row.velocity})
                 (text += ',') += csv_number(value);

@@ -27,8 +27,7 @@ std::string reached(const Measurement& row) {
 }
 
 /// How the process ended, where that tells more than what it said.
-void judge_end(Measurement& row, const ChildResult& child, double time_limit, std::uint64_t resident_limit,
-               bool done) {
+void judge_end(Measurement& row, const ChildResult& child, double time_limit, std::uint64_t resident_limit, bool done) {
     const bool has_result = !row.status.empty();
     std::string sentence;
     std::string status;
@@ -169,7 +168,7 @@ ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem
     const auto child = ask(worker, problem_fields("describe", problem, law), [&](const Json& line) {
         const std::string event = line.at("event");
         if (event == "problem") {
-            facts = {line.at("name"), line.at("law"), line.at("structure"), line.at("n"), line.at("m"), {},
+            facts = {line.at("name"), line.at("law"),   line.at("structure"), line.at("n"), line.at("m"), {},
                      line.at("hash"), line.at("source")};
             for (const auto& [kind, count] : line.at("cones").items()) facts.cones.emplace_back(kind, count);
         }

@@ -17,8 +17,8 @@ namespace delassus::bench {
 struct WorkerSettings {
     std::filesystem::path command;  ///< the delassus command, absolute
     std::vector<std::filesystem::path> plugin_path;
-    std::uint64_t memory_limit = 0;   ///< bytes of address space for each; 0 for none
-    std::function<bool()> cancelled;  ///< true: end the one that runs with what it has reached. May be empty.
+    std::uint64_t memory_limit = 0;    ///< bytes of address space for each; 0 for none
+    std::function<bool()> cancelled;   ///< true: end the one that runs with what it has reached. May be empty.
     std::uint64_t resident_limit = 0;  ///< bytes resident in each; 0 for none
 };
 
@@ -39,7 +39,7 @@ struct MeasureRequest {
     ProblemSource problem;
     SolverConfig solver;  ///< name and options; the rest is in settings
     ComparisonSettings settings;
-    std::filesystem::path solution;   ///< folder for x and λ, which must not exist; may be empty
+    std::filesystem::path solution;        ///< folder for x and λ, which must not exist; may be empty
     std::filesystem::path reference = {};  ///< solution folder that velocities are compared with; may be empty
 };
 
@@ -55,8 +55,7 @@ struct MeasureRequest {
                                   const std::function<void(const CurveSample&)>& on_sample = {});
 
 /// Reads the problem in a process of its own. Throws InputError with its sentence if it cannot be read.
-[[nodiscard]] ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem,
-                                    const std::string& law);
+[[nodiscard]] ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem, const std::string& law);
 
 /// ‖x − x*‖_H / ‖x*‖_H of each solution folder against the reference; unknown where there is no such folder, or if
 /// the worker fails.

@@ -169,12 +169,9 @@ Reference find_step_reference(const WorkerSettings& worker, const SuiteReference
     if (auto row = cached_row(report); row && fs::exists(file)) return {file, *row};
 
     const ScratchFolder scratch;
-    Json row = {{"kind", "reference"},
-                {"of", facts.hash},
-                {"law", ""},
-                {"found", false},
-                {"cached", false},
-                {"solver", request.timestepper.empty() ? facts.integrator : request.timestepper},
+    Json row = {{"kind", "reference"}, {"of", facts.hash},
+                {"law", ""},           {"found", false},
+                {"cached", false},     {"solver", request.timestepper.empty() ? facts.integrator : request.timestepper},
                 {"step", request.step}};
     request.state = scratch.path() / "state.json";
     const auto fine = simulate(worker, request);
@@ -190,9 +187,8 @@ Reference find_step_reference(const WorkerSettings& worker, const SuiteReference
     const auto coarse = simulate(worker, request);
     if (worker.cancelled && worker.cancelled()) return {};
     row["found"] = true;
-    row["second"] = {{"step", request.step},
-                     {"position", json_number(coarse.position)},
-                     {"velocity", json_number(coarse.velocity)}};
+    row["second"] = {
+        {"step", request.step}, {"position", json_number(coarse.position)}, {"velocity", json_number(coarse.velocity)}};
     row["confirmed"] = std::isfinite(coarse.position);
     row["message"] = "";
     make_folder(cache);

@@ -23,8 +23,8 @@ struct ProblemFacts {
     std::string name, law, structure;
     std::int32_t n = 0, m = 0;
     std::vector<std::pair<std::string, std::int64_t>> cones;  ///< blocks of each kind that occurs
-    std::string hash;                                         ///< of everything but names and law, 16 digits
-    std::string source;                                       ///< where it came from, as the problem says
+    std::string hash = {};                                    ///< of everything but names and law, 16 digits
+    std::string source = {};                                  ///< where it came from, as the problem says
 };
 
 /// The solver's own seconds in one run that recorded no curve.

@@ -14,7 +14,7 @@ namespace delassus::bench {
 /// What a results file holds, as of its last session: rows that this session did not ask for are left out, and of rows
 /// with the same key the last counts.
 struct ResultSet {
-    Json session;                                      ///< the last; null if the file holds none
+    Json session;                                       ///< the last; null if the file holds none
     std::vector<Json> problems, references, libraries;  ///< of all sessions, the last of the same name
     std::vector<Json> scenes;                           ///< with their plans
     std::vector<Json> axes;                             ///< that the session's cells are of
@@ -29,8 +29,8 @@ struct ResultSet {
 /// Appends rows; a row is in the file when add() returns.
 class ResultsFile {
 public:
-    /// Opens or creates the file, cuts an incomplete last line off, and notes what is there. Throws InputError on a file
-    /// of another format or version.
+    /// Opens or creates the file, cuts an incomplete last line off, and notes what is there. Throws InputError on a
+    /// file of another format or version.
     explicit ResultsFile(const std::filesystem::path& folder);
 
     [[nodiscard]] bool has(const std::string& key) const { return keys_.contains(key); }

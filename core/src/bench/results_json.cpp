@@ -68,23 +68,22 @@ std::string json_text(const Comparison& comparison) {
     const auto& settings = comparison.settings;
     Json problems = Json::array();
     for (const auto& problem : comparison.problems) problems.push_back(json_of(problem));
-    const Json json = {
-        {"format", "delassus-comparison"},
-        {"version", 1},
-        {"created", comparison.created},
-        {"command", comparison.command},
-        {"folder", comparison.folder},
-        {"delassus", comparison.build.version},
-        {"build", bench::json_of(comparison.build)},
-        {"machine", bench::json_of(comparison.machine)},
-        {"settings",
-         {{"tolerance", settings.tolerance},
-          {"time_limit", settings.time_limit},
-          {"max_iterations", settings.max_iterations},
-          {"repeats", settings.repeats},
-          {"law", settings.law.empty() ? Json(nullptr) : Json(settings.law)}}},
-        {"interrupted", comparison.interrupted},
-        {"problems", problems}};
+    const Json json = {{"format", "delassus-comparison"},
+                       {"version", 1},
+                       {"created", comparison.created},
+                       {"command", comparison.command},
+                       {"folder", comparison.folder},
+                       {"delassus", comparison.build.version},
+                       {"build", bench::json_of(comparison.build)},
+                       {"machine", bench::json_of(comparison.machine)},
+                       {"settings",
+                        {{"tolerance", settings.tolerance},
+                         {"time_limit", settings.time_limit},
+                         {"max_iterations", settings.max_iterations},
+                         {"repeats", settings.repeats},
+                         {"law", settings.law.empty() ? Json(nullptr) : Json(settings.law)}}},
+                       {"interrupted", comparison.interrupted},
+                       {"problems", problems}};
     return text_of(json, 1) + "\n";
 }
 

@@ -25,8 +25,8 @@ std::string cause_of(const Measurement& row) {
     const std::string& status = row.status;
     if (status == "solved") return {};
     if (status == "hung") return "time_limit";
-    const bool limit = status == "iteration_limit" || status == "time_limit" || status == "stalled" ||
-                       status == "numerical_failure";
+    const bool limit =
+        status == "iteration_limit" || status == "time_limit" || status == "stalled" || status == "numerical_failure";
     if (limit && row.error && !(row.error->natural <= diverged_error)) return "diverged";
     return status;
 }
@@ -57,8 +57,8 @@ Json problem_row(const ProblemFacts& facts, const SuiteProblem& problem) {
 
 Json solve_row(const std::string& key, const std::string& problem, const std::string& law, double tolerance,
                const Measurement& row) {
-    Json json = {{"kind", "solve"}, {"key", key},          {"problem", problem},
-                 {"law", law},      {"tolerance", tolerance}, {"cause", cause_of(row)}};
+    Json json = {{"kind", "solve"},       {"key", key}, {"problem", problem}, {"law", law}, {"tolerance", tolerance},
+                 {"cause", cause_of(row)}};
     json.update(json_of(row));
     json["seconds"]["recorded"] = {json_number(row.recorded.setup), json_number(row.recorded.solve)};
     json["stages"] = row.stages;
@@ -76,7 +76,8 @@ Json simulation_row(const std::string& key, const std::string& scene, const Simu
             {"status", row.status},
             {"cause", cause_of(row)},
             {"message", row.message},
-            {"seconds", {{"setup", json_number(row.setup)}, {"stepping", json_number(row.seconds)}, {"repeats", row.repeats}}},
+            {"seconds",
+             {{"setup", json_number(row.setup)}, {"stepping", json_number(row.seconds)}, {"repeats", row.repeats}}},
             {"error", {{"position", json_number(row.position)}, {"velocity", json_number(row.velocity)}}},
             {"totals", row.totals},
             {"peak_memory", row.peak_memory}};

@@ -108,7 +108,8 @@ private:
         const Measurement row = measure(plan_.worker, request, listener_.on_sample);
         if (stopped()) return;  // what was interrupted is run again
         if (libraries_.insert(solver.name).second && !row.libraries.empty())
-            file_.add({{"kind", "libraries"}, {"solver", solver.name}, {"version", row.version}, {"files", row.libraries}});
+            file_.add(
+                {{"kind", "libraries"}, {"solver", solver.name}, {"version", row.version}, {"files", row.libraries}});
         file_.add(solve_row(task.key, problem.facts.hash, task.law, task.tolerance, row));
         ++counts_.done;
     }

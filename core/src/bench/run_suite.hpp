@@ -33,8 +33,8 @@ struct RunCounts {
     bool interrupted = false;
 };
 
-/// Reads every problem and scene once to see that it can be read (InputError, nothing has been written then). Rows go to
-/// results.jsonl in plan.output as they come. Ends early when plan.worker.cancelled says so.
+/// Reads every problem and scene once to see that it can be read (InputError, nothing has been written then). Rows go
+/// to results.jsonl in plan.output as they come. Ends early when plan.worker.cancelled says so.
 RunCounts run_suite(const RunPlan& plan, const Registry& registry, const RunListener& listener);
 
 }  // namespace delassus::bench

@@ -18,8 +18,14 @@ namespace {
 void run_scene(const WorkerSettings& worker, const SuiteDump& dump, const fs::path& folder) {
     ChildSettings child;
     child.program = worker.command;
-    child.arguments = {"run", dump.scene.file.string(), "-o", folder.string(), "--dump-problems",
-                       std::to_string(dump.every), "--every", "1000000"};
+    child.arguments = {"run",
+                       dump.scene.file.string(),
+                       "-o",
+                       folder.string(),
+                       "--dump-problems",
+                       std::to_string(dump.every),
+                       "--every",
+                       "1000000"};
     for (const auto& [path, value] : dump.scene.settings) {
         child.arguments.emplace_back("--set");
         child.arguments.push_back(path + "=" + value);
@@ -45,7 +51,8 @@ void run_scene(const WorkerSettings& worker, const SuiteDump& dump, const fs::pa
 
 void add_dumped_problems(const WorkerSettings& worker, const fs::path& folder, Suite& suite) {
     for (const auto& dump : suite.dumps) {
-        std::vector<std::string> parts = {read_file(dump.scene.file), std::to_string(dump.every), digits(dump.scene.end)};
+        std::vector<std::string> parts = {read_file(dump.scene.file), std::to_string(dump.every),
+                                          digits(dump.scene.end)};
         for (const auto& [key, value] : dump.scene.settings) parts.push_back(key + "=" + value);
         const std::string name = dump.scene.file.stem().string();
         const fs::path own = folder / (name + "-" + key_of(parts).substr(0, 8));
@@ -59,7 +66,8 @@ void add_dumped_problems(const WorkerSettings& worker, const fs::path& folder, S
         if (fs::is_directory(own / "problems"))
             for (const auto& entry : fs::directory_iterator(own / "problems")) found.push_back(entry.path());
         if (found.empty())
-            throw InputError(fmt::format("{}: no step of {} has a problem with rows", dump.place, dump.scene.file.string()));
+            throw InputError(
+                fmt::format("{}: no step of {} has a problem with rows", dump.place, dump.scene.file.string()));
         std::sort(found.begin(), found.end());
         for (const auto& problem : found)
             suite.problems.push_back({problem, fmt::format("{}: {}", name, problem.filename().string()), {}});

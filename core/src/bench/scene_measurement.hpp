@@ -47,8 +47,8 @@ struct SimulationMeasurement {
     /// unsupported, crashed, hung, memory, input (refused as bad input), cancelled, error.
     std::string status;
     std::string message;
-    double setup = unknown, seconds = unknown;  ///< s, the least of the repeats
-    std::vector<double> repeats;                ///< s of stepping of each
+    double setup = unknown, seconds = unknown;      ///< s, the least of the repeats
+    std::vector<double> repeats;                    ///< s of stepping of each
     double position = unknown, velocity = unknown;  ///< distance of the end from the reference's, relative (docs)
     Json totals = Json::object();                   ///< steps, Newton and solver iterations, energy, drift, penetration, …
     Json watched = Json::object();                  ///< measures of scenes (suite_axis.hpp), and "place" of the body

@@ -83,8 +83,7 @@ void read_references(const Source& source, const YAML::Node& node, SuiteReferenc
                    references.step_fraction = positive(source, n, "step_fraction");
                    if (references.step_fraction >= 1.0) source.refuse(n, "\"step_fraction\" must be below 1");
                }},
-              {"time_limit",
-               [&](const YAML::Node& n) { references.time_limit = positive(source, n, "time_limit"); }}});
+              {"time_limit", [&](const YAML::Node& n) { references.time_limit = positive(source, n, "time_limit"); }}});
 }
 
 SuiteScene read_scene_item(const Source& source, const YAML::Node& item) {
@@ -92,26 +91,25 @@ SuiteScene read_scene_item(const Source& source, const YAML::Node& item) {
     if (item.IsScalar()) {
         scene.source.file = suite_path(source, item.Scalar());
     } else {
-        read_map(source, item, "a scene of the suite",
-                 {{"path", [&](const YAML::Node& n) { scene.source.file = suite_path(source, scalar(source, n, "path")); }},
-                  {"name", [&](const YAML::Node& n) { scene.name = scalar(source, n, "name"); }},
-                  {"set", [&](const YAML::Node& n) { scene.source.settings = read_options(source, n); }},
-                  {"end", [&](const YAML::Node& n) { scene.source.end = positive(source, n, "end"); }},
-                  {"steps", [&](const YAML::Node& n) { scene.steps = positive_list(source, n, "steps"); }},
-                  {"timesteppers",
-                   [&](const YAML::Node& n) { scene.timesteppers = read_timesteppers(source, n); }},
-                  {"reference", [&](const YAML::Node& n) {
-                       read_map(source, n, "\"reference\"",
-                                {{"timestepper",
-                                  [&](const YAML::Node& t) {
-                                      const auto [name, options] = parse_name_with_options(
-                                          scalar(source, t, "timestepper"), "timestepper");
-                                      scene.reference_timestepper = timestepper_text(source, t, name, options);
-                                  }},
-                                 {"step", [&](const YAML::Node& t) {
-                                      scene.reference_step = positive(source, t, "step");
-                                  }}});
-                   }}});
+        read_map(
+            source, item, "a scene of the suite",
+            {{"path", [&](const YAML::Node& n) { scene.source.file = suite_path(source, scalar(source, n, "path")); }},
+             {"name", [&](const YAML::Node& n) { scene.name = scalar(source, n, "name"); }},
+             {"set", [&](const YAML::Node& n) { scene.source.settings = read_options(source, n); }},
+             {"end", [&](const YAML::Node& n) { scene.source.end = positive(source, n, "end"); }},
+             {"steps", [&](const YAML::Node& n) { scene.steps = positive_list(source, n, "steps"); }},
+             {"timesteppers", [&](const YAML::Node& n) { scene.timesteppers = read_timesteppers(source, n); }},
+             {"reference", [&](const YAML::Node& n) {
+                  read_map(
+                      source, n, "\"reference\"",
+                      {{"timestepper",
+                        [&](const YAML::Node& t) {
+                            const auto [name, options] =
+                                parse_name_with_options(scalar(source, t, "timestepper"), "timestepper");
+                            scene.reference_timestepper = timestepper_text(source, t, name, options);
+                        }},
+                       {"step", [&](const YAML::Node& t) { scene.reference_step = positive(source, t, "step"); }}});
+              }}});
     }
     if (scene.source.file.empty()) source.refuse(item, "a scene of the suite needs its \"path\"");
     if (!fs::is_regular_file(scene.source.file))
@@ -292,9 +290,9 @@ fs::path find_suite(const std::string& name_or_path) {
         return fs::weakly_canonical(suite_folder() / (name_or_path + ".yaml"));
     std::sort(names.begin(), names.end());
     const std::vector<std::string_view> views(names.begin(), names.end());
-    throw InputError(fmt::format("there is no suite {}: no such file{}", name_or_path,
-                                 names.empty() ? "" : ", and of those that come with the library" +
-                                                          nearest_name_hint(name_or_path, views)));
+    throw InputError(fmt::format(
+        "there is no suite {}: no such file{}", name_or_path,
+        names.empty() ? "" : ", and of those that come with the library" + nearest_name_hint(name_or_path, views)));
 }
 
 }  // namespace delassus::bench

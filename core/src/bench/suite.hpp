@@ -33,8 +33,8 @@ struct SuiteTimestepper {
 
 struct SuiteScene {
     SceneSource source;
-    std::string name;           ///< the file's, without its ending, if none is given
-    std::vector<double> steps;  ///< s, in place of the timesteppers' and the suite's; may be empty
+    std::string name;                            ///< the file's, without its ending, if none is given
+    std::vector<double> steps;                   ///< s, in place of the timesteppers' and the suite's; may be empty
     std::vector<SuiteTimestepper> timesteppers;  ///< in place of the suite's; may be empty
     // What the end is measured against.
     std::string reference_timestepper;  ///< empty: the suite's
@@ -71,8 +71,8 @@ struct Suite {
     std::vector<std::string> left_out;  ///< sentences: optional files that are not there, solvers that were not built
 };
 
-/// Reads the suite; folders are listed and sweeps expanded, nothing is loaded or run. Throws InputError with file, line,
-/// key and the nearest valid key.
+/// Reads the suite; folders are listed and sweeps expanded, nothing is loaded or run. Throws InputError with file,
+/// line, key and the nearest valid key.
 [[nodiscard]] Suite read_suite(const std::filesystem::path& file, const Registry& registry);
 
 /// Leaves of the suite only the axes of those names. Throws InputError for a name that none has.

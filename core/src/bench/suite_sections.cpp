@@ -48,7 +48,10 @@ void add_generated(const Source& source, const YAML::Node& item, const std::stri
             problem.source.parameters[key] = number_of(source, item, key, values.at(key));
         }
         problem.name = all.empty() ? kind : fmt::format("{}({})", kind, all);
-        problem.family = !family.empty() ? family : !swept ? "" : fixed.empty() ? kind : fmt::format("{}({})", kind, fixed);
+        problem.family = !family.empty() ? family
+                         : !swept        ? ""
+                         : fixed.empty() ? kind
+                                         : fmt::format("{}({})", kind, fixed);
         check_generator(source, item, problem.source);
         suite.problems.push_back(std::move(problem));
     }
@@ -114,24 +117,26 @@ void read_problem_item(const Source& source, const YAML::Node& item, Suite& suit
     if (item.IsScalar()) {
         path = item.Scalar();
     } else {
-        read_map(source, item, "a problem of the suite",
-                 {{"path", [&](const YAML::Node& n) { path = scalar(source, n, "path"); }},
-                  {"folder", [&](const YAML::Node& n) { folder = scalar(source, n, "folder"); }},
-                  {"optional", [&](const YAML::Node& n) { optional = value<bool>(source, n, "optional", "true or false"); }},
-                  {"generate", [&](const YAML::Node& n) { kind = scalar(source, n, "generate"); }},
-                  {"scene", [&](const YAML::Node& n) { scene = scalar(source, n, "scene"); }},
-                  {"set", [&](const YAML::Node& n) { axes = axes_of(source, n, "set"); }},
-                  {"name", [&](const YAML::Node& n) { name = scalar(source, n, "name"); }},
-                  {"family", [&](const YAML::Node& n) { family = scalar(source, n, "family"); }},
-                  {"every",
-                   [&](const YAML::Node& n) {
-                       dump.every = value<std::int64_t>(source, n, "every", "a number of steps");
-                       if (dump.every < 1) source.refuse(n, "\"every\" must be at least 1");
-                   }},
-                  {"end", [&](const YAML::Node& n) { dump.scene.end = value<double>(source, n, "end", "a time in s"); }}});
+        read_map(
+            source, item, "a problem of the suite",
+            {{"path", [&](const YAML::Node& n) { path = scalar(source, n, "path"); }},
+             {"folder", [&](const YAML::Node& n) { folder = scalar(source, n, "folder"); }},
+             {"optional", [&](const YAML::Node& n) { optional = value<bool>(source, n, "optional", "true or false"); }},
+             {"generate", [&](const YAML::Node& n) { kind = scalar(source, n, "generate"); }},
+             {"scene", [&](const YAML::Node& n) { scene = scalar(source, n, "scene"); }},
+             {"set", [&](const YAML::Node& n) { axes = axes_of(source, n, "set"); }},
+             {"name", [&](const YAML::Node& n) { name = scalar(source, n, "name"); }},
+             {"family", [&](const YAML::Node& n) { family = scalar(source, n, "family"); }},
+             {"every",
+              [&](const YAML::Node& n) {
+                  dump.every = value<std::int64_t>(source, n, "every", "a number of steps");
+                  if (dump.every < 1) source.refuse(n, "\"every\" must be at least 1");
+              }},
+             {"end", [&](const YAML::Node& n) { dump.scene.end = value<double>(source, n, "end", "a time in s"); }}});
     }
     const int kinds = !path.empty() + !folder.empty() + !kind.empty() + !scene.empty();
-    if (kinds != 1) source.refuse(item, "a problem of the suite has one of \"path\", \"folder\", \"generate\" and \"scene\"");
+    if (kinds != 1)
+        source.refuse(item, "a problem of the suite has one of \"path\", \"folder\", \"generate\" and \"scene\"");
     if (!kind.empty()) {
         add_generated(source, item, kind, family, axes, suite);
         return;
@@ -139,9 +144,9 @@ void read_problem_item(const Source& source, const YAML::Node& item, Suite& suit
     const std::string text = !path.empty() ? path : !folder.empty() ? folder : scene;
     const fs::path file = suite_path(source, text);
     if (file.empty() || !fs::exists(file)) {
-        const std::string sentence =
-            file.empty() ? fmt::format("{} begins with an environment variable that is not set", text)
-                         : fmt::format("there is no {}", file.string());
+        const std::string sentence = file.empty()
+                                         ? fmt::format("{} begins with an environment variable that is not set", text)
+                                         : fmt::format("there is no {}", file.string());
         if (!optional) source.refuse(item, sentence);
         suite.left_out.push_back(sentence);
         return;
@@ -149,7 +154,8 @@ void read_problem_item(const Source& source, const YAML::Node& item, Suite& suit
     if (!scene.empty()) {
         dump.scene.file = file;
         for (const auto& [key, values] : axes) {
-            if (values.size() != 1) source.refuse(item, "a scene whose problems are taken has single values in \"set\"");
+            if (values.size() != 1)
+                source.refuse(item, "a scene whose problems are taken has single values in \"set\"");
             dump.scene.settings[key] = values.front();
         }
         dump.place = source.at(item);

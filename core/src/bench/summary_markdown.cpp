@@ -32,12 +32,9 @@ std::string name_of_hash(const std::vector<Json>& rows, const char* key, const J
 
 const std::map<std::string, std::string>& class_titles() {
     static const std::map<std::string, std::string> titles = {
-        {"linear", "Linear problems (free rows only)"},
-        {"unsymmetric", "Linear problems, H unsymmetric"},
-        {"indefinite", "Linear problems, H indefinite"},
-        {"associated", "Contact problems, associated law"},
-        {"coulomb", "Contact problems, exact Coulomb law"},
-        {"all", "All problems"}};
+        {"linear", "Linear problems (free rows only)"},     {"unsymmetric", "Linear problems, H unsymmetric"},
+        {"indefinite", "Linear problems, H indefinite"},    {"associated", "Contact problems, associated law"},
+        {"coulomb", "Contact problems, exact Coulomb law"}, {"all", "All problems"}};
     return titles;
 }
 
@@ -77,9 +74,10 @@ std::string class_text(const Json& one) {
         table.add(row);
     }
     const int problems = one.at("problems");
-    return fmt::format("### {}: {}\n\n{}{}\n", class_titles().count(one.at("name")) ? class_titles().at(one.at("name"))
-                                                                                     : one.at("name").get<std::string>(),
-                       problems, table.text(), refused.empty() ? "" : fmt::format("\nTake none of these: {}.\n", refused));
+    return fmt::format(
+        "### {}: {}\n\n{}{}\n",
+        class_titles().count(one.at("name")) ? class_titles().at(one.at("name")) : one.at("name").get<std::string>(),
+        problems, table.text(), refused.empty() ? "" : fmt::format("\nTake none of these: {}.\n", refused));
 }
 
 /// The fastest solver of each problem at the tightest tolerance.
@@ -143,7 +141,8 @@ std::string scaling_text(const Json& analysis) {
     for (const Json& one : analysis.at("scaling")) {
         if (one.at("fit").is_null()) continue;
         ++count;
-        table.add({one.at("family"), one.at("law"), one.at("solver"), fmt::format("{:g}", one.at("tolerance").get<double>()),
+        table.add({one.at("family"), one.at("law"), one.at("solver"),
+                   fmt::format("{:g}", one.at("tolerance").get<double>()),
                    fmt::format("{:.2f} ± {:.2f}", one.at("fit").at("exponent").get<double>(),
                                one.at("fit").at("standard_error").get<double>()),
                    std::to_string(one.at("points").size())});
@@ -177,14 +176,16 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     const Json& machine = session.at("machine");
     std::string text = fmt::format("## {}\n\n", session.at("suite").at("title").get<std::string>());
     text += fmt::format("{} runs of solvers on {} problems, {} runs of {} scenes; delassus {}, {}, {}.\n",
-                        results.solves.size(), results.problems.size(), results.simulations.size(), results.scenes.size(),
-                        session.at("delassus").get<std::string>(), session.at("created").get<std::string>(),
-                        machine.at("processor").get<std::string>());
+                        results.solves.size(), results.problems.size(), results.simulations.size(),
+                        results.scenes.size(), session.at("delassus").get<std::string>(),
+                        session.at("created").get<std::string>(), machine.at("processor").get<std::string>());
     if (results.missing > 0)
-        text += fmt::format("**Not complete**: {} runs are missing. Run the same command again to go on.\n", results.missing);
+        text += fmt::format("**Not complete**: {} runs are missing. Run the same command again to go on.\n",
+                            results.missing);
     if (number_of(machine.at("load")) > 0.5 * machine.at("cores").get<double>())
-        text += fmt::format("The machine was busy when this began (load {:.1f}): times are longer than on a quiet one.\n",
-                            machine.at("load").get<double>());
+        text +=
+            fmt::format("The machine was busy when this began (load {:.1f}): times are longer than on a quiet one.\n",
+                        machine.at("load").get<double>());
     text += '\n';
     text += axes_markdown(results);
     for (const Json& one : analysis.at("classes"))
@@ -192,7 +193,8 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) + stepping_text(results, analysis);
     if (!results.solves.empty())
         text += fmt::format(
-            "Mean: shifted geometric mean of setup and solve (shift {:g} s) over the problems that any solver solved; one that "
+            "Mean: shifted geometric mean of setup and solve (shift {:g} s) over the problems that any solver solved; "
+            "one that "
             "it did not solve counts as the time limit, {:g} s.\n",
             mean_shift, session.at("settings").at("time_limit").get<double>());
     return text;

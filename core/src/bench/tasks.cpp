@@ -24,8 +24,8 @@ std::string key_of_run(std::vector<std::string> parts, const Suite& suite, const
 /// Names tell problems apart in tables.
 std::string unique_name(const std::string& name, const std::vector<TaskProblem>& others) {
     std::string unique = name;
-    for (int number = 2; std::any_of(others.begin(), others.end(),
-                                     [&](const TaskProblem& other) { return other.name == unique; });
+    for (int number = 2;
+         std::any_of(others.begin(), others.end(), [&](const TaskProblem& other) { return other.name == unique; });
          ++number)
         unique = fmt::format("{} ({})", name, number);
     return unique;
@@ -75,12 +75,12 @@ void add_simulations(Tasks& tasks, const Suite& suite, const std::string& code) 
     const auto& references = suite.references;
     for (auto& task : tasks.simulations) {
         const TaskScene& scene = tasks.scenes[task.scene];
-        task.key = key_of_run({"simulation", scene.facts.hash, digits(scene.facts.end), task.request.timestepper,
-                               digits(task.request.step), task.request.solver, scene.entry.reference_timestepper,
-                               digits(scene.entry.reference_step), references.timestepper,
-                               digits(references.step_fraction), digits(scene.smallest_step),
-                               std::to_string(references.solvers.empty())},
-                              suite, code);
+        task.key =
+            key_of_run({"simulation", scene.facts.hash, digits(scene.facts.end), task.request.timestepper,
+                        digits(task.request.step), task.request.solver, scene.entry.reference_timestepper,
+                        digits(scene.entry.reference_step), references.timestepper, digits(references.step_fraction),
+                        digits(scene.smallest_step), std::to_string(references.solvers.empty())},
+                       suite, code);
     }
 }
 

@@ -192,7 +192,8 @@ std::set<std::string> mapped_libraries() {
     std::set<std::string> names;
     std::ifstream maps("/proc/self/maps");
     for (std::string line; std::getline(maps, line);)
-        if (const auto slash = line.rfind('/'); slash != std::string::npos && line.find(".so", slash) != std::string::npos)
+        if (const auto slash = line.rfind('/');
+            slash != std::string::npos && line.find(".so", slash) != std::string::npos)
             names.insert(line.substr(slash + 1));
     return names;
 }

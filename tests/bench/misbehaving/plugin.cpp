@@ -16,7 +16,7 @@ namespace {
 
 using namespace delassus::sdk;
 
-constexpr const char* behaviours[] = {"solve", "slow", "crash", "crash_late", "hang", "deaf",
+constexpr const char* behaviours[] = {"solve", "slow", "crash", "crash_late", "hang",  "deaf",
                                       "lie",   "nan",  "print", "exit",       "throw", "eat"};
 
 class Misbehaving : public Solver {
