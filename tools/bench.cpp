@@ -51,9 +51,10 @@ int run_bench(const BenchArguments& arguments) {
     bench::RunPlan plan;
     plan.suite = bench::read_suite(bench::find_suite(arguments.suite), registry);
     if (!arguments.only.empty()) bench::keep_axes(plan.suite, arguments.only);
-    plan.output = !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
-    plan.cache = fs::absolute(!arguments.cache.empty() ? arguments.cache
-                                                       : bench::cache_folder(plan.output / "references"));
+    plan.output =
+        !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
+    plan.cache =
+        fs::absolute(!arguments.cache.empty() ? arguments.cache : bench::cache_folder(plan.output / "references"));
     plan.worker.command = own_program();
     plan.worker.plugin_path = folders;
     plan.worker.cancelled = interrupted;

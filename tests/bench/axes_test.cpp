@@ -44,7 +44,8 @@ TEST_F(Axes, ValuesAndBoundsExpand) {
         "time_limit: 3\n"
         "solvers: [pgs]\n"
         "axes:\n"
-        "  - {name: boxes, generate: box_stack, set: {boxes: $(value), mass: 2}, values: [1, 4], bounds: {speed: $(1e-7 * value)}}\n"
+        "  - {name: boxes, generate: box_stack, set: {boxes: $(value), mass: 2}, values: [1, 4], bounds: {speed: "
+        "$(1e-7 * value)}}\n"
         "  - name: fall\n"
         "    scene: fall.yaml\n"
         "    set: {bodies.stone.mass: $(value ^ 2), gravity: '[0, 0, $(-value)]'}\n"
@@ -73,21 +74,29 @@ TEST_F(Axes, MistakesAreNamedWithTheirPlace) {
         {head + "values: [1]}\n", "line 2: an axis needs \"bounds\""},
         {head + "bounds: {speed: 1}}\n", "line 2: an axis needs its \"values\""},
         {head + "values: [1, x], bounds: {speed: 1}}\n", "line 2: \"values\" is \"x\"; it must be a finite number"},
-        {head + "values: [1, 2], bounds: {sped: 1}}\n", "line 2: problems have no measure \"sped\"; did you mean \"speed\"?"},
+        {head + "values: [1, 2], bounds: {sped: 1}}\n",
+         "line 2: problems have no measure \"sped\"; did you mean \"speed\"?"},
         {head + "values: [1, 2], bounds: {drift: 1}}\n", "line 2: problems have no measure \"drift\""},
         {head + "values: [1, 2], bounds: {speed: -1}}\n", "line 2: the bound of \"speed\" is negative"},
         {head + "values: [1, 2], bounds: {speed: [1]}}\n", "line 2: \"speed\" has 1 bounds for 2 values"},
         {head + "values: [1, 2], bounds: {speed: $(1 +)}}\n", "line 2: the formula in \"$(1 +)\" cannot be read"},
         {head + "values: [0.5], bounds: {speed: 1}}\n", "line 2: box_stack: boxes = 0.5 lies outside its range"},
-        {head + "value: [1], bounds: {speed: 1}}\n", "line 2: an axis of the suite has no key \"value\"; did you mean \"values\"?"},
-        {head + "values: [1], bounds: {speed: 1}, timesteppers: [hht]}\n", "line 2: \"timesteppers\" and \"step_solvers\" are of scenes"},
-        {"axes:\n  - {name: a, generate: box_stack, values: [1, 2], bounds: {speed: 1}}\n", "line 2: nothing in \"set\" depends on the value"},
+        {head + "value: [1], bounds: {speed: 1}}\n",
+         "line 2: an axis of the suite has no key \"value\"; did you mean \"values\"?"},
+        {head + "values: [1], bounds: {speed: 1}, timesteppers: [hht]}\n",
+         "line 2: \"timesteppers\" and \"step_solvers\" are of scenes"},
+        {"axes:\n  - {name: a, generate: box_stack, values: [1, 2], bounds: {speed: 1}}\n",
+         "line 2: nothing in \"set\" depends on the value"},
         {scene + "bounds: {velocity: 1}}\n", "line 2: scenes have no measure \"velocity\""},
-        {scene + "bounds: {position: {body: stone, within: 1}}}\n", "line 2: \"position\" needs \"body\", \"at\" and \"within\""},
+        {scene + "bounds: {position: {body: stone, within: 1}}}\n",
+         "line 2: \"position\" needs \"body\", \"at\" and \"within\""},
         {scene + "bounds: {position: {body: stone, at: [0, 0], within: 1}}}\n", "line 2: \"at\" must be [x, y, z]"},
-        {scene + "bounds: {drift: 1}, timesteppers: [hhtt]}\n", "line 2: there is no timestepper \"hhtt\"; did you mean \"hht\"?"},
-        {scene + "bounds: {drift: 1}, tolerance: 1}\n", "line 2: \"solvers\", \"law\" and \"tolerance\" are of problems"},
-        {head + "values: [1], bounds: {speed: 1}}\n  - {name: a, scene: fall.yaml, values: [0], bounds: {drift: 1}}\n", "line 3: the axis \"a\" is listed twice"}};
+        {scene + "bounds: {drift: 1}, timesteppers: [hhtt]}\n",
+         "line 2: there is no timestepper \"hhtt\"; did you mean \"hht\"?"},
+        {scene + "bounds: {drift: 1}, tolerance: 1}\n",
+         "line 2: \"solvers\", \"law\" and \"tolerance\" are of problems"},
+        {head + "values: [1], bounds: {speed: 1}}\n  - {name: a, scene: fall.yaml, values: [0], bounds: {drift: 1}}\n",
+         "line 3: the axis \"a\" is listed twice"}};
     for (const auto& [text, sentence] : cases) {
         try {
             static_cast<void>(read(text));
@@ -136,8 +145,8 @@ TEST(Judgement, OfScenes) {
     run.watched["drift"] = nullptr;  // not finite
     EXPECT_EQ(bench::judge(run, {{"drift", 1.0}}, {}).outcome, "wrong");
     const std::map<std::string, std::string> outcomes = {
-        {"diverged", "wrong"},   {"unsolved", "failed"}, {"failed", "failed"}, {"time_limit", "failed"},
-        {"memory", "failed"},    {"error", "failed"},    {"input", "refused"}, {"unsupported", "refused"},
+        {"diverged", "wrong"},  {"unsolved", "failed"}, {"failed", "failed"}, {"time_limit", "failed"},
+        {"memory", "failed"},   {"error", "failed"},    {"input", "refused"}, {"unsupported", "refused"},
         {"crashed", "crashed"}, {"hung", "hung"}};
     for (const auto& [status, outcome] : outcomes) {
         run.status = status;
@@ -158,18 +167,21 @@ TEST(Judgement, AVelocityWithoutReferenceIsSaid) {
 }
 
 Json cell(const std::string& method, double value, const std::string& outcome) {
-    return {{"axis", "ratio"}, {"method", method},      {"value", value},
-            {"outcome", outcome}, {"sentence", outcome == "correct" ? "" : "it | says"}};
+    return {{"axis", "ratio"},
+            {"method", method},
+            {"value", value},
+            {"outcome", outcome},
+            {"sentence", outcome == "correct" ? "" : "it | says"}};
 }
 
 bench::ResultSet hand_made() {
     bench::ResultSet set;
     set.axes = {{{"axis", "ratio"}, {"title", "Ratio of masses"}, {"unit", "kg"}}};
-    for (const auto& [method, outcomes] : std::vector<std::pair<std::string, std::vector<std::string>>>{
-             {"good", {"correct", "correct", "correct"}},
-             {"late", {"correct", "failed", "correct"}},
-             {"never", {"wrong", "crashed", "correct"}},
-             {"other", {"refused", "refused", "refused"}}})
+    for (const auto& [method, outcomes] :
+         std::vector<std::pair<std::string, std::vector<std::string>>>{{"good", {"correct", "correct", "correct"}},
+                                                                       {"late", {"correct", "failed", "correct"}},
+                                                                       {"never", {"wrong", "crashed", "correct"}},
+                                                                       {"other", {"refused", "refused", "refused"}}})
         for (std::size_t k = 0; k < 3; ++k) set.cells.push_back(cell(method, std::pow(10.0, k), outcomes[k]));
     return set;
 }
@@ -190,15 +202,20 @@ TEST(Breakdowns, AreFoundInTheAxisOrder) {
 
 TEST(Breakdowns, StandInTheSummary) {
     const std::string text = bench::axes_markdown(hand_made());
-    EXPECT_NE(text.find("6 correct, 0 inaccurate, 3 refused, 1 failed, 1 wrong, 1 crashed, 0 hung, of 12 runs."), std::string::npos) << text;
+    EXPECT_NE(text.find("6 correct, 0 inaccurate, 3 refused, 1 failed, 1 wrong, 1 crashed, 0 hung, of 12 runs."),
+              std::string::npos)
+        << text;
     EXPECT_NE(text.find("#### Ratio of masses (ratio, kg)"), std::string::npos) << text;
-    EXPECT_NE(text.find("| late   |             1 |        10 | failed | it / says (correct again at 100) |"), std::string::npos) << text;
+    EXPECT_NE(text.find("| late   |             1 |        10 | failed | it / says (correct again at 100) |"),
+              std::string::npos)
+        << text;
     EXPECT_NE(text.find("does not"), std::string::npos);
     EXPECT_NE(text.find("Refuse it from the start: other."), std::string::npos) << text;
     EXPECT_TRUE(bench::axes_markdown({}).empty());
 }
 
-// Free fall by implicit Euler ends at −½ g t (t + h): within a bound of g t h of −½ g t² at any step, not within a hundredth of that.
+// Free fall by implicit Euler ends at −½ g t (t + h): within a bound of g t h of −½ g t² at any step, not within a
+// hundredth of that.
 TEST_F(Axes, ASmallSuiteRunsFromEndToEnd) {
     write_falling_body();
     std::ofstream(folder / "empty.yaml") << "step: 0.01\nend: 0.1\nbodies: []\n";
@@ -231,7 +248,8 @@ TEST_F(Axes, ASmallSuiteRunsFromEndToEnd) {
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 10);
 
     // What was done is not done again, and --only keeps one axis.
-    const auto again = bench({"run", file.string(), "-o", (folder / "out").string(), "--only", "fall", "--plugin-path", DELASSUS_TEST_PLUGINS});
+    const auto again = bench({"run", file.string(), "-o", (folder / "out").string(), "--only", "fall", "--plugin-path",
+                              DELASSUS_TEST_PLUGINS});
     ASSERT_EQ(again.exit_code, 0) << again.errors;
     EXPECT_NE(again.errors.find("4 runs were done before"), std::string::npos) << again.errors;
     set = bench::read_results(folder / "out");

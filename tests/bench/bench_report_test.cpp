@@ -27,7 +27,8 @@ protected:
             "timesteppers: [hht]\n"
             "repeats: 1\n"
             "axes:\n"
-            "  - {name: boxes, title: boxes of <b>stone</b>, generate: box_stack, set: {boxes: $(value)}, values: [1, 3],\n"
+            "  - {name: boxes, title: boxes of <b>stone</b>, generate: box_stack, set: {boxes: $(value)}, values: [1, "
+            "3],\n"
             "     bounds: {speed: 1e-6}, reason: they rest, solvers: [apgd, minres]}\n"
             "  - {name: tight, scene: pendulum.yaml, set: {step: $(value)}, values: [0.01], bounds: {speed: 0}}\n"));
         ASSERT_EQ(run.exit_code, 0) << run.errors;
@@ -93,15 +94,17 @@ TEST_F(BenchReport, AxesAreHeatMaps) {
         "const root = document.documentElement, cells = [...document.querySelectorAll('#axis-1 table.heat tbody td')];"
         "root.dataset.cells = cells.map((cell) => cell.className.split(' ')[1]).join(' ');"
         "root.dataset.signs = cells.every((cell) => cell.firstChild.textContent.length === 1);"
-        "root.dataset.columns = [...document.querySelectorAll('#axis-1 table.heat thead th')].slice(1).map((one) => one.textContent).join(' ');"
+        "root.dataset.columns = [...document.querySelectorAll('#axis-1 table.heat thead th')].slice(1).map((one) => "
+        "one.textContent).join(' ');"
         "root.dataset.says = cells[2].title.includes('minres at 1: refused');"
         "root.dataset.beyond = document.querySelector('#axis-2 td.inaccurate').title.includes('bound 0');"
         "root.dataset.stone = document.querySelectorAll('#axis-1 h2 b').length;"
         "root.dataset.colours = new Set(cells.map((cell) => getComputedStyle(cell).backgroundColor)).size;");
     ASSERT_FALSE(run.timed_out);
     const std::string head = run.dom.substr(0, 800);
-    for (const char* fact : {"data-cells=\"correct correct refused refused\"", "data-signs=\"true\"", "data-columns=\"1 3\"",
-                             "data-says=\"true\"", "data-beyond=\"true\"", "data-stone=\"0\"", "data-colours=\"2\""})
+    for (const char* fact :
+         {"data-cells=\"correct correct refused refused\"", "data-signs=\"true\"", "data-columns=\"1 3\"",
+          "data-says=\"true\"", "data-beyond=\"true\"", "data-stone=\"0\"", "data-colours=\"2\""})
         EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
 }
 

@@ -196,7 +196,8 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
                                      plan.suite.left_out.empty() ? "it names no solver" : plan.suite.left_out.front()));
 
     file.add(session_row(plan, tasks, cells, code));
-    for (const auto& problem : tasks.problems) file.add(problem_row(problem.facts, {problem.source, problem.name, problem.family}));
+    for (const auto& problem : tasks.problems)
+        file.add(problem_row(problem.facts, {problem.source, problem.name, problem.family}));
     for (const auto& scene : tasks.scenes)
         file.add({{"kind", "scene"},
                   {"scene", scene.facts.hash},

@@ -226,7 +226,8 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
               }}});
         if (suite.problems.empty() && suite.dumps.empty() && suite.scenes.empty() && suite.axes.empty() &&
             suite.left_out.empty())
-            throw InputError(fmt::format("{} has neither problems nor scenes nor axes: there is nothing to run", file.string()));
+            throw InputError(
+                fmt::format("{} has neither problems nor scenes nor axes: there is nothing to run", file.string()));
     } catch (const YAML::Exception& error) {
         throw InputError(fmt::format("{}: not valid YAML: {}", source.at(error.mark), error.msg));
     }
@@ -247,8 +248,8 @@ void keep_axes(Suite& suite, const std::vector<std::string>& names) {
     for (const auto& axis : suite.axes) known.emplace_back(axis.name);
     for (const auto& name : names)
         if (std::find(known.begin(), known.end(), name) == known.end())
-            throw InputError(fmt::format("{} has no axis \"{}\"{}", suite.file.string(), name,
-                                         nearest_name_hint(name, known)));
+            throw InputError(
+                fmt::format("{} has no axis \"{}\"{}", suite.file.string(), name, nearest_name_hint(name, known)));
     std::erase_if(suite.axes, [&](const SuiteAxis& axis) {
         return std::find(names.begin(), names.end(), axis.name) == names.end();
     });

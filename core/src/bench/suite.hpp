@@ -59,9 +59,9 @@ struct Suite {
     std::vector<std::string> laws = {""};  ///< "" is each problem's own
     std::vector<double> tolerances = {1e-3, 1e-6, 1e-9};
     std::vector<SuiteScene> scenes;
-    std::vector<SuiteTimestepper> timesteppers;     ///< empty: the scene's own
-    std::vector<double> steps;                      ///< s; empty: the scene's own
-    std::vector<std::string> step_solvers = {""};   ///< of scenes; "" is the scene's own, or by need
+    std::vector<SuiteTimestepper> timesteppers;    ///< empty: the scene's own
+    std::vector<double> steps;                     ///< s; empty: the scene's own
+    std::vector<std::string> step_solvers = {""};  ///< of scenes; "" is the scene's own, or by need
     std::vector<SuiteAxis> axes;
     SuiteReferences references;
     int repeats = 3;

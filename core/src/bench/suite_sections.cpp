@@ -81,11 +81,12 @@ void check_generator(const Source& source, const YAML::Node& item, const Problem
     for (const auto& [key, number] : problem.parameters) {
         const auto at = std::find(keys.begin(), keys.end(), key);
         if (at == keys.end())
-            source.refuse(item, fmt::format("{} has no parameter \"{}\"{}", row->name, key, nearest_name_hint(key, keys)));
+            source.refuse(item,
+                          fmt::format("{} has no parameter \"{}\"{}", row->name, key, nearest_name_hint(key, keys)));
         const auto& parameter = row->parameters[static_cast<std::size_t>(at - keys.begin())];
         if (!(number >= parameter.minimum && number <= parameter.maximum))
-            source.refuse(item, fmt::format("{}: {} = {:g} lies outside its range, {:g} to {:g}", row->name, key, number,
-                                            parameter.minimum, parameter.maximum));
+            source.refuse(item, fmt::format("{}: {} = {:g} lies outside its range, {:g} to {:g}", row->name, key,
+                                            number, parameter.minimum, parameter.maximum));
     }
 }
 

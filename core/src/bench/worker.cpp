@@ -135,8 +135,8 @@ void measure(const Channel& channel, const Json& request) {
         write_solution(solution, {}, folder);
     double velocity = std::numeric_limits<double>::quiet_NaN();
     if (const auto folder = request.at("reference").get<std::string>(); !folder.empty())
-        velocity = problem.meter().velocity(
-            solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
+        velocity =
+            problem.meter().velocity(solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
     double speed = 0.0;  // NaN wherever an entry is
     for (const double entry : solution.x) speed = std::isnan(entry) ? entry : std::max(speed, std::abs(entry));
     Json stages = Json::array();
