@@ -137,8 +137,11 @@ Json run_cell(const WorkerSettings& worker, const Suite& suite, const CellTask& 
     try {
         if (bounds_velocity(bounds)) {
             const ProblemFacts facts = describe(worker, request.problem, axis.law);
-            request.reference =
-                find_reference(worker, suite.references, request.problem, facts, facts.law, cache).place;
+            // One that nobody confirms could make a right answer look wrong.
+            const Reference reference =
+                find_reference(worker, suite.references, request.problem, facts, facts.law, cache);
+            if (!reference.row.is_null() && reference.row.value("confirmed", false))
+                request.reference = reference.place;
         }
         run = measure(worker, request);
     } catch (const InputError& error) {  // the problem itself is refused

@@ -30,7 +30,7 @@ void compare(Judgement& judgement, const std::vector<Bound>& bounds) {
         const double figure =
             judgement.measures.contains(bound.measure) ? number_of(judgement.measures.at(bound.measure)) : unknown;
         if (std::isnan(figure) && bound.measure == "velocity") {
-            unjudged = "the velocity was not judged: there is no reference";
+            unjudged = "the velocity was not judged: there is no confirmed reference";
             continue;
         }
         // A bound of 0 is met by 0 only.

@@ -8,6 +8,7 @@
 #include "bench/expression.hpp"
 #include "bench/suite.hpp"
 #include "bench/suite_sections.hpp"
+#include "config/sections.hpp"
 
 namespace delassus::bench {
 
