@@ -79,11 +79,11 @@ void read_bounds(const Source& source, const YAML::Node& node, SuiteAxis& axis, 
         YAML::Node limit = entry.second;
         if (name == "position") {
             YAML::Node at;
-            limit = YAML::Node();
+            limit.reset();
             read_map(source, entry.second, "\"position\"",
                      {{"body", [&](const YAML::Node& n) { axis.body = scalar(source, n, "body"); }},
-                      {"at", [&](const YAML::Node& n) { at = n; }},
-                      {"within", [&](const YAML::Node& n) { limit = n; }}});
+                      {"at", [&](const YAML::Node& n) { at.reset(n); }},
+                      {"within", [&](const YAML::Node& n) { limit.reset(n); }}});
             if (axis.body.empty() || at.IsNull() || limit.IsNull())
                 source.refuse(entry.second, "\"position\" needs \"body\", \"at\" and \"within\"");
             axis.positions = places_of(source, at, axis.values);
