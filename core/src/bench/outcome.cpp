@@ -108,9 +108,8 @@ Judgement judge(const SimulationMeasurement& run, const std::vector<Bound>& boun
     judgement.measures.erase("place");
     if (place && run.watched.contains("place")) {
         const Json& at = run.watched.at("place");
-        double squared = 0.0;
-        for (std::size_t k = 0; k < 3; ++k) squared += std::pow(number_of(at.at(k)) - (*place)[k], 2);
-        judgement.measures["position"] = json_number(std::sqrt(squared));
+        const auto off = [&](std::size_t k) { return number_of(at.at(k)) - (*place)[k]; };
+        judgement.measures["position"] = json_number(std::hypot(off(0), off(1), off(2)));
     }
     if (run.status == "finished") {
         compare(judgement, bounds);

@@ -272,6 +272,9 @@ void simulate(const Channel& channel, const Json& request) {
     const Registry registry = registry_of(request);
     const auto prepare = [&] {
         Scene scene = read_scene(file, overrides_of(request));
+        // A solve longer than the whole run may last is ended, so that the run can say where it was.
+        for (auto& system : scene.systems)
+            if (!system.solver.time_limit) system.solver.time_limit = time_limit;
         channel.send("begin");
         return SceneRun(std::move(scene), registry, time_limit);
     };
