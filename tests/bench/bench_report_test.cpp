@@ -38,7 +38,7 @@ protected:
     /// Opens the page with a script at its end.
     [[nodiscard]] tests::Browsed open(const std::string& script, const std::vector<std::string>& flags = {}) const {
         std::string text = page;
-        text.insert(text.rfind("</body>"), "<script>" + script + "</script>");
+        text.insert(text.rfind("</body>"), "<script>{" + script + "}</script>");
         std::ofstream(folder / "open.html", std::ios::binary) << text;
         auto all = flags;
         all.emplace_back("--disable-gpu");
@@ -67,7 +67,7 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
         "s.name === 'apgd').length;"
         "const root = document.documentElement; root.dataset.before = chart();"
         "const button = [...document.querySelectorAll('#legend button')].find((one) => one.dataset.name === 'apgd');"
-        "const {left, top} = button.getBoundingClientRect();"
+        "button.scrollIntoView(); const {left, top} = button.getBoundingClientRect();"
         "document.elementFromPoint(left + 6, top + 6).dispatchEvent(new MouseEvent('click', {bubbles: true}));"
         "root.dataset.after = chart(); root.dataset.pressed = button.getAttribute('aria-pressed');"
         "button.click(); root.dataset.again = chart();"

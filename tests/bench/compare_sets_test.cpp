@@ -28,7 +28,7 @@ bench::ResultSet set_of(std::vector<Json> solves) {
     bench::ResultSet set;
     set.session = {{"machine", {{"processor", "P"}, {"cores", 2}}},
                    {"settings", {{"time_limit", 1.0}, {"memory_limit", nullptr}, {"max_iterations", 10}}}};
-    set.problems = {{{"problem", "p"}, {"name", "pile"}}};
+    set.problems.push_back(Json{{"problem", "p"}, {"name", "pile"}});
     set.solves = std::move(solves);
     return set;
 }

@@ -70,7 +70,7 @@ Json simulation_row(const std::string& key, const std::string& scene, const Simu
     return {{"kind", "simulation"},
             {"key", key},
             {"scene", scene},
-            {"timestepper", request.timestepper},
+            {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
             {"step", request.step},
             {"solver", request.solver},
             {"status", row.status},

@@ -51,7 +51,7 @@ void add_simulations(Tasks& tasks, const Suite& suite, const std::string& code) 
     for (std::size_t index = 0; index < tasks.scenes.size(); ++index) {
         TaskScene& scene = tasks.scenes[index];
         auto methods = !scene.entry.timesteppers.empty() ? scene.entry.timesteppers : suite.timesteppers;
-        if (methods.empty()) methods.push_back({scene.facts.integrator, {}});
+        if (methods.empty()) methods.push_back({"", {}});
         for (const auto& method : methods) {
             std::vector<double> steps = !scene.entry.steps.empty() ? scene.entry.steps
                                         : !method.steps.empty()    ? method.steps

@@ -31,7 +31,7 @@ struct TaskScene {
 struct SimulationTask {
     std::string key;
     std::size_t scene = 0;    ///< index
-    SimulateRequest request;  ///< timestepper and step never empty; without state and reference
+    SimulateRequest request;  ///< step never 0; without state and reference
 };
 
 struct Tasks {
