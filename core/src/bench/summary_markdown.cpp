@@ -175,10 +175,16 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     const Json& session = results.session;
     const Json& machine = session.at("machine");
     std::string text = fmt::format("## {}\n\n", session.at("suite").at("title").get<std::string>());
-    text += fmt::format("{} runs of solvers on {} problems, {} runs of {} scenes; delassus {}, {}, {}.\n",
-                        results.solves.size(), results.problems.size(), results.simulations.size(),
-                        results.scenes.size(), session.at("delassus").get<std::string>(),
-                        session.at("created").get<std::string>(), machine.at("processor").get<std::string>());
+    std::string what;
+    const auto list = [&](std::size_t runs, const char* of, std::size_t things, const char* named) {
+        if (runs > 0) what += fmt::format("{}{} runs {} {} {}", what.empty() ? "" : ", ", runs, of, things, named);
+    };
+    list(results.solves.size(), "of solvers on", results.problems.size(), "problems");
+    list(results.simulations.size(), "of", results.scenes.size(), "scenes");
+    list(results.cells.size(), "on", results.axes.size(), "axes");
+    text += fmt::format("{}; delassus {}, {}, {}.\n", what.empty() ? "nothing has been run" : what,
+                        session.at("delassus").get<std::string>(), session.at("created").get<std::string>(),
+                        machine.at("processor").get<std::string>());
     if (results.missing > 0)
         text += fmt::format("**Not complete**: {} runs are missing. Run the same command again to go on.\n",
                             results.missing);
