@@ -262,5 +262,24 @@ TEST_F(Axes, ASmallSuiteRunsFromEndToEnd) {
     EXPECT_NE(unknown.errors.find("has no axis \"fal\"; did you mean \"fall\"?"), std::string::npos) << unknown.errors;
 }
 
+// h² K is so large against M there that rounding x alone leaves 1e-6 of ‖Hx‖: no solver's lie, and not solved either.
+TEST_F(Axes, StiffnessBeyondDoublePrecisionIsAFailureWithItsReason) {
+    ASSERT_EQ(
+        run_suite(suite("axes:\n"
+                        "  - {name: stiff, generate: elastic_block, set: {elements: 2, layers: 1, young: $(value)},\n"
+                        "     values: [1e6, 1e14], bounds: {speed: 1}, solvers: [spg, ssn]}\n"))
+            .exit_code,
+        0);
+    const auto set = bench::read_results(folder / "out");
+    ASSERT_EQ(set.cells.size(), 4U);
+    for (const std::size_t k : {0U, 2U}) {
+        EXPECT_EQ(set.cells[k].at("outcome"), "correct") << set.cells[k];
+        EXPECT_EQ(set.cells[k + 1].at("outcome"), "failed") << set.cells[k + 1];
+        EXPECT_EQ(set.cells[k + 1].at("status"), "numerical_failure") << set.cells[k + 1];
+        EXPECT_NE(set.cells[k + 1].at("sentence").get<std::string>().find("rounding x to double precision"),
+                  std::string::npos);
+    }
+}
+
 }  // namespace
 }  // namespace delassus::bench_test
