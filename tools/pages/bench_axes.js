@@ -37,7 +37,7 @@ function heatMap(axis, cells) {
 function boundsText(axis) {
   const names = [...new Set(axis.bounds.flatMap((bounds) => Object.keys(bounds)))];
   return names.map((name) => {
-    const limits = [...new Set(axis.bounds.map((bounds) => bounds[name]))];
+    const limits = [...new Set(axis.bounds.map((bounds) => +bounds[name].toPrecision(3)))];
     return `${spoken(name)} ≤ ${limits.length === 1 ? short(limits[0]) : `${short(limits[0])} … ${short(limits.at(-1))} by value`}`;
   }).join("; ");
 }
