@@ -25,6 +25,7 @@ struct BenchArguments {
     std::string suite;
     fs::path output, cache, folder, before, after;
     std::vector<fs::path> plugin_path;
+    std::vector<std::string> only;
     bool any_machine = false, json = false;
 };
 
@@ -35,6 +36,7 @@ void report(const fs::path& folder) {
     const std::string summary = bench::summary_markdown(results, analysis);
     write_file_atomically(folder / "summary.md", summary);
     write_file_atomically(folder / "results.csv", bench::solves_csv(results));
+    if (!results.cells.empty()) write_file_atomically(folder / "cells.csv", bench::cells_csv(results));
     if (!results.simulations.empty())
         write_file_atomically(folder / "simulations.csv", bench::simulations_csv(results));
     const auto no_page = write_page(folder / "report.html", [&] { return bench::bench_page(results, analysis); });
@@ -48,6 +50,7 @@ int run_bench(const BenchArguments& arguments) {
     const Registry registry(folders);
     bench::RunPlan plan;
     plan.suite = bench::read_suite(bench::find_suite(arguments.suite), registry);
+    if (!arguments.only.empty()) bench::keep_axes(plan.suite, arguments.only);
     plan.output =
         !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
     plan.cache =
@@ -113,6 +116,9 @@ void add_bench(CLI::App& program, Action& action) {
     run->add_option("-o,--output", arguments->output,
                     "Folder for results.jsonl, report.html, summary.md and CSV files [delassus-bench-SUITE]")
         ->type_name("DIR");
+    run->add_option("--only", arguments->only, "Run nothing but the axis of this name; may be given again")
+        ->type_name("AXIS")
+        ->allow_extra_args(false);
     run->add_option("--cache", arguments->cache, "Folder of reference solutions [~/.cache/delassus/references]")
         ->type_name("DIR");
     add_plugin_path(*run, arguments->plugin_path);

@@ -18,14 +18,19 @@ protected:
             GTEST_SKIP() << "built without the chart library, so no page is written";
         std::ofstream(folder / "pendulum.yaml")
             << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/pendulum.yaml");
-        const auto run = run_suite(
-            suite("title: <img src=x onerror=alert(1)>\n"
-                  "problems: [stops, {generate: sphere_pile, set: {contacts: [10, 30, 90]}}]\n"
-                  "solvers: [misbehaving, misbehaving(behaviour=lie), misbehaving(behaviour=crash), apgd, pgs]\n"
-                  "tolerances: [1e-3, 1e-6]\n"
-                  "scenes: [{path: pendulum.yaml, end: 0.1, steps: [0.02, 0.01]}]\n"
-                  "timesteppers: [hht]\n"
-                  "repeats: 1\n"));
+        const auto run = run_suite(suite(
+            "title: <img src=x onerror=alert(1)>\n"
+            "problems: [stops, {generate: sphere_pile, set: {contacts: [10, 30, 90]}}]\n"
+            "solvers: [misbehaving, misbehaving(behaviour=lie), misbehaving(behaviour=crash), apgd, pgs]\n"
+            "tolerances: [1e-3, 1e-6]\n"
+            "scenes: [{path: pendulum.yaml, end: 0.1, steps: [0.02, 0.01]}]\n"
+            "timesteppers: [hht]\n"
+            "repeats: 1\n"
+            "axes:\n"
+            "  - {name: boxes, title: boxes of <b>stone</b>, generate: box_stack, set: {boxes: $(value)}, values: [1, "
+            "3],\n"
+            "     bounds: {speed: 1e-6}, reason: they rest, solvers: [apgd, minres]}\n"
+            "  - {name: tight, scene: pendulum.yaml, set: {step: $(value)}, values: [0.01], bounds: {speed: 0}}\n"));
         ASSERT_EQ(run.exit_code, 0) << run.errors;
         page = content_of(folder / "out" / "report.html");
     }
@@ -49,7 +54,7 @@ TEST_F(BenchReport, IsWholeInOneFile) {
     const auto own = page.find("<script>\n// SPDX", library);
     ASSERT_NE(own, std::string::npos);
     tests::expect_nothing_from_elsewhere(page.substr(0, data) + page.substr(own));
-    for (const char* mark : {"@bench.css@", "@bench.js@", "@bench_scenes.js@", "@data@"})
+    for (const char* mark : {"@bench.css@", "@bench.js@", "@bench_scenes.js@", "@bench_axes.js@", "@data@"})
         EXPECT_EQ(page.find(mark), std::string::npos) << mark;
 }
 
@@ -81,6 +86,26 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
     EXPECT_NE(run.dom.find("collision detection"), std::string::npos);  // the plan of the scene
     EXPECT_EQ(run.dom.find("<img src=\"x\""), std::string::npos);       // names are text, never markup
     EXPECT_NE(run.dom.find("<svg"), std::string::npos);
+}
+
+TEST_F(BenchReport, AxesAreHeatMaps) {
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
+    const auto run = open(
+        "const root = document.documentElement, cells = [...document.querySelectorAll('#axis-1 table.heat tbody td')];"
+        "root.dataset.cells = cells.map((cell) => cell.className.split(' ')[1]).join(' ');"
+        "root.dataset.signs = cells.every((cell) => cell.firstChild.textContent.length === 1);"
+        "root.dataset.columns = [...document.querySelectorAll('#axis-1 table.heat thead th')].slice(1).map((one) => "
+        "one.textContent).join(' ');"
+        "root.dataset.says = cells[2].title.includes('minres at 1: refused');"
+        "root.dataset.beyond = document.querySelector('#axis-2 td.inaccurate').title.includes('bound 0');"
+        "root.dataset.stone = document.querySelectorAll('#axis-1 h2 b').length;"
+        "root.dataset.colours = new Set(cells.map((cell) => getComputedStyle(cell).backgroundColor)).size;");
+    ASSERT_FALSE(run.timed_out);
+    const std::string head = run.dom.substr(0, 800);
+    for (const char* fact :
+         {"data-cells=\"correct correct refused refused\"", "data-signs=\"true\"", "data-columns=\"1 3\"",
+          "data-says=\"true\"", "data-beyond=\"true\"", "data-stone=\"0\"", "data-colours=\"2\""})
+        EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
 }
 
 TEST_F(BenchReport, AScreenshotShowsIt) {

@@ -84,7 +84,7 @@ TEST_F(SuiteTest, MistakesAreNamedWithTheirPlace) {
         {"problems: [stops]\ntimesteppers: [newmarck]\n",
          "line 2: there is no timestepper \"newmarck\"; did you mean \"newmark\"?"},
         {"problems: [stops]\ntimesteppers: [newmark(x=1)]\n", "line 2: newmark has no option \"x\""},
-        {"title: nothing\n", "has neither problems nor scenes"},
+        {"title: nothing\n", "has neither problems nor scenes nor axes"},
         {"problems: [stops\n", "not valid YAML"}};
     for (const auto& [text, sentence] : cases) {
         try {
@@ -105,7 +105,7 @@ TEST_F(SuiteTest, ShippedSuitesCanBeRead) {
         EXPECT_NO_THROW(static_cast<void>(bench::read_suite(bench::find_suite(one.name), registry))) << one.name;
         EXPECT_FALSE(one.title.empty()) << one.description;
     }
-    for (const char* name : {"full", "quick", "scaling"})
+    for (const char* name : {"full", "quick", "scaling", "stability"})
         EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
     EXPECT_THROW(static_cast<void>(bench::find_suite("quikc")), InputError);
 }

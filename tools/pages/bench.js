@@ -9,10 +9,12 @@
     document.title = `${session.suite.title} – Delassus benchmark`;
     at("title").textContent = `Benchmark: ${session.suite.title}`;
     const asked = results.solves.filter((row) => row.cause !== "unsupported");
-    at("summary").textContent = `${session.suite.description}. ` +
-      `${plural(solverLabels.length, "solver")} on ${plural(new Set(results.solves.map((row) => row.problem)).size, "problem")}: ` +
-      `${asked.filter(solvedRow).length} of ${asked.length} runs solved, ${results.solves.length - asked.length} refused; ` +
-      `${plural(results.simulations.length, "run")} of ${plural(results.scenes.length, "scene")}.`;
+    at("summary").textContent = `${session.suite.description}. ` + [
+      results.solves.length === 0 ? "" : `${plural(solverLabels.length, "solver")} on ${plural(new Set(results.solves.map((row) => row.problem)).size, "problem")}: ` +
+        `${asked.filter(solvedRow).length} of ${asked.length} runs solved, ${results.solves.length - asked.length} refused`,
+      results.simulations.length === 0 ? "" : `${plural(results.simulations.length, "run")} of ${plural(results.scenes.length, "scene")}`,
+      results.cells.length === 0 ? "" : `${results.cells.filter((cell) => cell.outcome === "correct").length} of ${plural(results.cells.length, "cell")} correct on ${results.axes.length} axes`,
+    ].filter(Boolean).join("; ") + ".";
     const { settings, machine, build } = session;
     const { ratio, runs } = results.analysis.recording;
     const facts = {
@@ -29,6 +31,10 @@
       warn(`The machine was busy when this began (load ${machine.load.toFixed(1)} on ${plural(machine.cores, "core")}): times are longer than on a quiet one.`);
     if (results.missing > 0) warn(`${results.missing} runs are missing: the benchmark was interrupted. The same command goes on from there.`);
     for (const sentence of session.left_out) warn(`Left out: ${sentence}.`);
+    const wrong = results.cells.filter((cell) => ["wrong", "crashed", "hung"].includes(cell.outcome));
+    if (wrong.length > 0)
+      at("facts").after(element("p", { className: "warning status false_claim", textContent:
+        `Wrong, crashed or hung on an axis: ${[...new Set(wrong.map((cell) => cell.method))].join(", ")}, in ${plural(wrong.length, "cell")}.` }));
     const lies = results.solves.filter((row) => row.cause === "false_claim");
     if (lies.length > 0)
       at("facts").after(element("p", { className: "warning status false_claim", textContent:
@@ -49,6 +55,7 @@
 
   writeHead();
   writeLegend();
+  writeAxes();
   writeClasses();
   writeGrowth();
   writeScenes();

@@ -52,6 +52,10 @@ ChildResult ask(const WorkerSettings& worker, const Json& request, const std::fu
     return run_child(child);
 }
 
+std::string status_of_failure(const std::string& kind) {
+    return kind == "memory" || kind == "input" ? kind : "error";
+}
+
 std::string last_line(std::string text) {
     while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
     const auto begin = text.find_last_of('\n');

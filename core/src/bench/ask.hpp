@@ -20,6 +20,9 @@ inline constexpr double exit_limit = 10.0;
 /// have come. Throws Error if no process can be started.
 ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear);
 
+/// The status of a run whose worker said that it failed: memory, input (bad input, refused with a sentence) or error.
+[[nodiscard]] std::string status_of_failure(const std::string& kind);
+
 /// The last line of what was written to standard error: often the cause.
 [[nodiscard]] std::string last_line(std::string text);
 

@@ -80,4 +80,16 @@ std::string simulations_csv(const ResultSet& results) {
     return text;
 }
 
+std::string cells_csv(const ResultSet& results) {
+    std::string text =
+        "axis,value,method,outcome,status,measure,figure,limit,seconds,peak_memory_bytes,from,sentence\r\n";
+    for (const Json& row : results.cells)
+        text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\r\n", text_in(row, "axis"),
+                            csv_number(number_of(row.at("value"))), text_in(row, "method"), text_in(row, "outcome"),
+                            text_in(row, "status"), text_in(row, "measure"), csv_number(number_of(row.at("figure"))),
+                            csv_number(number_of(row.at("limit"))), csv_number(number_of(row.at("seconds"))),
+                            integer_in(row, "peak_memory"), text_in(row, "from"), text_in(row, "sentence"));
+    return text;
+}
+
 }  // namespace delassus::bench

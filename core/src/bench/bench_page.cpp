@@ -53,6 +53,8 @@ std::string bench_page(const ResultSet& results, const Json& analysis) {
                        {"scenes", results.scenes},
                        {"solves", page_rows(results.solves)},
                        {"simulations", results.simulations},
+                       {"axes", results.axes},
+                       {"cells", results.cells},
                        {"missing", results.missing},
                        {"analysis", analysis}};
     return html_page(page_parts(), "bench.html", text_of(page));

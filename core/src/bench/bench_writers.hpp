@@ -16,6 +16,11 @@ namespace delassus::bench {
 /// simulations.csv: likewise for each run of a scene.
 [[nodiscard]] std::string simulations_csv(const ResultSet& results);
 
+/// cells.csv: likewise for each cell of an axis.
+[[nodiscard]] std::string cells_csv(const ResultSet& results);
+/// The part of summary.md on axes: where each method breaks along each. Empty without cells.
+[[nodiscard]] std::string axes_markdown(const ResultSet& results);
+
 /// report.html, whole in one file. Throws InputError if a part of the page is missing (support/html_page.hpp).
 [[nodiscard]] std::string bench_page(const ResultSet& results, const Json& analysis);
 

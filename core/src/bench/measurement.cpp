@@ -128,6 +128,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
             row.recorded = {row.setup, row.solve};
             row.stages = line.at("stages").get<std::vector<std::string>>();
             row.velocity = number_of(line.at("velocity"));
+            row.speed = number_of(line.at("speed"));
             row.error = errors_of(line.at("error"));
             const Json& last = line.at("last");
             row.curve.push_back({last[0].get<std::int64_t>(), number_of(last[1]), number_of(last[2])});
@@ -136,7 +137,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
                 append(row.message, fmt::format("a repeat ended with {}", line.at("status").get<std::string>()));
             row.repeats.push_back({number_of(line.at("setup")), number_of(line.at("solve"))});
         } else if (event == "failed") {
-            if (row.status.empty()) row.status = line.at("kind") == "memory" ? "memory" : "error";
+            if (row.status.empty()) row.status = status_of_failure(line.at("kind"));
             append(row.message, line.at("message").get<std::string>());
             done = true;
             return exit_limit;

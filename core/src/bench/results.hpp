@@ -37,8 +37,8 @@ struct Measurement {
     std::string label;  ///< "pgs" or "pgs(omega=1.2)"
     std::string solver, version;
     OptionTexts options;  ///< those that were chosen
-    /// The name of a Status, or unsupported (message: the refusal), crashed, hung (killed), memory (killed at its
-    /// limit, or out of memory).
+    /// The name of a Status, or unsupported (message: the refusal), crashed, hung (killed), input (refused as bad
+    /// input), memory (killed at its limit, or out of memory).
     std::string status;
     std::string message;  ///< what a person should know; may be empty
 
@@ -50,6 +50,7 @@ struct Measurement {
     std::vector<std::string> libraries;       ///< files of shared libraries in its process, versions in their names
     std::optional<Errors> error;              ///< of the recorded run's result; empty if it gave none
     double velocity = unknown;                ///< ‖x − x*‖_H / ‖x*‖_H; unknown without a reference
+    double speed = unknown;                   ///< largest entry of |x| of the recorded run's result, m/s or rad/s
     std::int64_t peak_memory = 0;             ///< bytes resident in its process, the problem included
     std::int64_t analyses = 0, factorizations = 0;
     std::vector<CurveSample> curve;  ///< also of a run that did not end

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "bench/rows.hpp"
@@ -67,7 +68,8 @@ ResultSet read_results(const fs::path& folder) {
         throw InputError(fmt::format("{} holds no {}: it is not a folder that `delassus bench run` wrote",
                                      folder.string(), file_name));
     ResultSet set;
-    std::map<std::string, Json> solves, simulations;
+    std::map<std::string, Json> solves, simulations, cells;
+    std::vector<Json> axes;
     for (const Json& row : read_lines(file).rows) {
         const std::string kind = row.at("kind");
         if (kind == "session") set.session = row;
@@ -76,6 +78,8 @@ ResultSet read_results(const fs::path& folder) {
         if (kind == "libraries") replace_or_add(set.libraries, row, {"solver"});
         if (kind == "scene") replace_or_add(set.scenes, row, {"scene"});
         if (kind == "solve") solves[row.at("key")] = row;
+        if (kind == "axis") replace_or_add(axes, row, {"axis"});
+        if (kind == "cell") cells[row.at("key")] = row;
         if (kind == "simulation") simulations[row.at("key")] = row;
     }
     if (set.session.is_null()) throw InputError(fmt::format("{} is empty: nothing has been run yet", file.string()));
@@ -84,10 +88,16 @@ ResultSet read_results(const fs::path& folder) {
             set.solves.push_back(solve->second);
         } else if (const auto simulation = simulations.find(key); simulation != simulations.end()) {
             set.simulations.push_back(simulation->second);
+        } else if (const auto cell = cells.find(key); cell != cells.end()) {
+            set.cells.push_back(cell->second);
         } else {
             ++set.missing;
         }
     }
+    for (const Json& axis : axes)
+        if (std::any_of(set.cells.begin(), set.cells.end(),
+                        [&](const Json& cell) { return cell.at("axis") == axis.at("axis"); }))
+            set.axes.push_back(axis);
     return set;
 }
 

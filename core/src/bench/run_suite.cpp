@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "bench/cells.hpp"
 #include "bench/key.hpp"
 #include "bench/reference.hpp"
 #include "bench/rows.hpp"
@@ -22,11 +23,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Json session_row(const RunPlan& plan, const Tasks& tasks, const std::string& code) {
+Json session_row(const RunPlan& plan, const Tasks& tasks, const std::vector<CellTask>& cells, const std::string& code) {
     const Suite& suite = plan.suite;
     Json keys = Json::array(), solvers = Json::array();
     for (const auto& task : tasks.solves) keys.push_back(task.key);
     for (const auto& task : tasks.simulations) keys.push_back(task.key);
+    for (const auto& task : cells) keys.push_back(task.key);
     for (const auto& solver : suite.solvers) solvers.push_back(label_of(solver));
     return {{"kind", "session"},
             {"format", rows_format},
@@ -57,11 +59,13 @@ Json session_row(const RunPlan& plan, const Tasks& tasks, const std::string& cod
 
 class SuiteRun {
 public:
-    SuiteRun(const RunPlan& plan, const RunListener& listener, const Tasks& tasks, std::string code, ResultsFile& file)
-        : plan_(plan), listener_(listener), tasks_(tasks), code_(std::move(code)), file_(file) {
+    SuiteRun(const RunPlan& plan, const RunListener& listener, const Tasks& tasks, const std::vector<CellTask>& cells,
+             std::string code, ResultsFile& file)
+        : plan_(plan), listener_(listener), tasks_(tasks), cells_(cells), code_(std::move(code)), file_(file) {
         for (const auto& task : tasks.solves) total_ += !file.has(task.key);
         for (const auto& task : tasks.simulations) total_ += !file.has(task.key);
-        counts_.skipped = tasks.solves.size() + tasks.simulations.size() - total_;
+        for (const auto& cell : cells) total_ += !file.has(cell.key);
+        counts_.skipped = tasks.solves.size() + tasks.simulations.size() + cells.size() - total_;
     }
 
     RunCounts run() {
@@ -69,6 +73,8 @@ public:
             if (!stopped() && !file_.has(task.key)) solve(task);
         for (const auto& task : tasks_.simulations)
             if (!stopped() && !file_.has(task.key)) step(task);
+        for (const auto& cell : cells_)
+            if (!stopped() && !file_.has(cell.key)) fill(cell);
         counts_.interrupted = stopped();
         return counts_;
     }
@@ -127,9 +133,19 @@ private:
         ++counts_.done;
     }
 
+    void fill(const CellTask& cell) {
+        const SuiteAxis& axis = plan_.suite.axes[cell.axis];
+        begin(fmt::format("{} = {:g}  {}", axis.title, axis.values[cell.value], cell.method));
+        const Json row = run_cell(plan_.worker, plan_.suite, cell, plan_.cache);
+        if (stopped()) return;
+        file_.add(row);
+        ++counts_.done;
+    }
+
     const RunPlan& plan_;
     const RunListener& listener_;
     const Tasks& tasks_;
+    const std::vector<CellTask>& cells_;
     std::string code_;
     ResultsFile& file_;
     std::size_t total_ = 0;
@@ -174,11 +190,12 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
     ResultsFile file(plan.output);
     add_dumped_problems(plan.worker, plan.output / "problems", plan.suite);
     const Tasks tasks = make_tasks(plan.suite, plan.worker, code);
-    if (tasks.solves.empty() && tasks.simulations.empty())
+    const std::vector<CellTask> cells = make_cells(plan.suite, code);
+    if (tasks.solves.empty() && tasks.simulations.empty() && cells.empty())
         throw InputError(fmt::format("{} asks for no run: {}", plan.suite.file.string(),
                                      plan.suite.left_out.empty() ? "it names no solver" : plan.suite.left_out.front()));
 
-    file.add(session_row(plan, tasks, code));
+    file.add(session_row(plan, tasks, cells, code));
     for (const auto& problem : tasks.problems)
         file.add(problem_row(problem.facts, {problem.source, problem.name, problem.family}));
     for (const auto& scene : tasks.scenes)
@@ -190,7 +207,8 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
                   {"set", Json(scene.entry.source.settings)},
                   {"end", scene.facts.end},
                   {"plan", scene.facts.plan}});
-    return SuiteRun(plan, listener, tasks, code, file).run();
+    for (const auto& axis : plan.suite.axes) file.add(axis_row(axis));
+    return SuiteRun(plan, listener, tasks, cells, code, file).run();
 }
 
 }  // namespace delassus::bench

@@ -80,6 +80,8 @@ SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateReque
     question["solver"] = request.solver;
     question["time_limit"] = request.time_limit;
     question["repeats"] = request.repeats;
+    question["watch"] = request.watch;
+    question["body"] = request.body;
     question["state"] = request.state.string();
     question["reference"] = request.reference.string();
     bool done = false;
@@ -96,8 +98,10 @@ SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateReque
                 row.position = number_of(line.at("error").at("position"));
                 row.velocity = number_of(line.at("error").at("velocity"));
             }
+            row.watched = line.at("watched");
             row.totals = line;
-            for (const char* own : {"event", "status", "message", "setup", "seconds", "error"}) row.totals.erase(own);
+            for (const char* own : {"event", "status", "message", "setup", "seconds", "error", "watched"})
+                row.totals.erase(own);
         } else if (event == "repeat") {
             row.repeats.push_back(number_of(line.at("seconds")));
             const bool first = row.repeats.size() == 1;
@@ -107,7 +111,7 @@ SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateReque
             row.status = "unsupported";
             row.message = line.at("message");
         } else if (event == "failed") {
-            if (row.status.empty()) row.status = line.at("kind") == "memory" ? "memory" : "error";
+            if (row.status.empty()) row.status = status_of_failure(line.at("kind"));
             append(row.message, line.at("message").get<std::string>());
             done = true;
             return exit_limit;

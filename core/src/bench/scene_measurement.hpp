@@ -36,20 +36,23 @@ struct SimulateRequest {
     std::string solver;       ///< "name" or "name(key=value,…)"; empty: the scene's own, or by need
     double time_limit = 0.0;  ///< s of stepping
     int repeats = 1;
+    bool watch = false;               ///< look at every step of the first run, for `watched`
+    std::string body;                 ///< whose place at the end is wanted; empty: none
     std::filesystem::path state;      ///< file for the end's state, to be a reference; may be empty
     std::filesystem::path reference;  ///< such a file, to measure the end against; may be empty
 };
 
 struct SimulationMeasurement {
     /// finished, unsolved (steps missed the solver's tolerance), failed (a step could not be taken), diverged,
-    /// time_limit, unsupported, crashed, hung, memory, cancelled, error.
+    /// time_limit, unsupported, crashed, hung, memory, input (refused as bad input), cancelled, error.
     std::string status;
     std::string message;
     double setup = unknown, seconds = unknown;      ///< s, the least of the repeats
     std::vector<double> repeats;                    ///< s of stepping of each
     double position = unknown, velocity = unknown;  ///< distance of the end from the reference's, relative (docs)
-    Json totals = Json::object();  ///< steps, Newton and solver iterations, energy, drift, penetration, …
-    std::int64_t peak_memory = 0;  ///< bytes resident
+    Json totals = Json::object();   ///< steps, Newton and solver iterations, energy, drift, penetration, …
+    Json watched = Json::object();  ///< measures of scenes (suite_axis.hpp), and "place" of the body
+    std::int64_t peak_memory = 0;   ///< bytes resident
     std::vector<std::string> libraries;
 };
 

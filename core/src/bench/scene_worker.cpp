@@ -52,10 +52,38 @@ struct Extent {
     double displacement = 0.0, speed = 0.0;  // squared while the systems are added up
 };
 
+/// The worst over all steps and systems; what bounds are set on.
+struct Watch {
+    double energy_growth = 0.0, energy_loss = 0.0;  ///< J, against the start
+    double momentum = 0.0, angular_momentum = 0.0;  ///< ‖change‖ since the start
+    double speed = 0.0;                             ///< largest entry of |v|
+    double end_speed = 0.0;                         ///< the same at the end
+
+    /// NaN stays, once it is there.
+    static void raise(double& worst, double value) {
+        if (std::isnan(value) || value > worst) worst = value;
+    }
+    void look(const StepRecord& start, const Simulation& simulation) {
+        const StepRecord& now = simulation.record();
+        const auto change = [](const Vector3& from, const Vector3& to) {
+            return std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+        };
+        raise(energy_growth, now.energy - start.energy);
+        raise(energy_loss, start.energy - now.energy);
+        raise(momentum, change(start.momentum, now.momentum));
+        raise(angular_momentum, change(start.angular_momentum, now.angular_momentum));
+        double largest = 0.0;
+        for (const double entry : simulation.state().v) raise(largest, std::abs(entry));
+        raise(speed, largest);
+        if (simulation.finished()) raise(end_speed, largest);
+    }
+};
+
 struct Run {
     std::string status = "finished", message;
     double setup = 0.0, seconds = 0.0;
     Extent extent;
+    Watch watch;
 };
 
 class SceneRun {
@@ -68,18 +96,20 @@ public:
         time_limit_ = time_limit;
     }
 
-    /// extent: measure it as well, on a clock that stands still.
-    Run run(bool extent) {
+    /// extent, watch: measure them as well, on a clock that stands still.
+    Run run(bool extent, bool watch) {
         std::vector<State> start;
         for (const auto& simulation : simulations_) start.push_back(simulation.state());
         try {
             for (std::size_t i = 0; i < simulations_.size() && run_.status == "finished"; ++i) {
                 Extent own;
+                const StepRecord at_start = simulations_[i].record();
                 while (!simulations_[i].finished()) {
                     const auto begin = Clock::now();
                     simulations_[i].step();
                     run_.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
                     if (extent) widen(own, i, start[i]);
+                    if (watch) run_.watch.look(at_start, simulations_[i]);
                     if (run_.seconds > time_limit_ || interrupted()) {
                         run_.status = interrupted() ? "cancelled" : "time_limit";
                         run_.message = fmt::format("had come to t = {:.6g} s", simulations_[i].state().t);
@@ -96,6 +126,16 @@ public:
         if (run_.status == "finished") judge();
         run_.extent = {std::sqrt(run_.extent.displacement), std::sqrt(run_.extent.speed)};
         return run_;
+    }
+
+    /// Place of the mass centre of a body of the first system that has it, m. Throws InputError if none has.
+    [[nodiscard]] Vector3 place(const std::string& body) const {
+        for (std::size_t i = 0; i < simulations_.size(); ++i) {
+            const MultibodySystem& system = *scene_.systems[i].system;
+            if (const BodyIndex index = system.find_body(body); index != world_body)
+                return system.pose(simulations_[i].state(), index).position;
+        }
+        throw InputError(fmt::format("the scene has no body \"{}\"", body));
     }
 
     [[nodiscard]] const std::vector<Simulation>& simulations() const { return simulations_; }
@@ -194,6 +234,19 @@ Json totals_of(const std::vector<Simulation>& simulations) {
             {"solver_seconds", solver_seconds}};
 }
 
+/// The measures of scenes; totals: those of the run.
+Json watched(const Watch& watch, const Json& totals) {
+    return {{"energy_growth", json_number(watch.energy_growth)},
+            {"energy_loss", json_number(watch.energy_loss)},
+            {"momentum", json_number(watch.momentum)},
+            {"angular_momentum", json_number(watch.angular_momentum)},
+            {"speed", json_number(watch.speed)},
+            {"end_speed", json_number(watch.end_speed)},
+            {"drift", totals.at("drift")},
+            {"penetration", totals.at("penetration")},
+            {"natural", totals.at("natural")}};
+}
+
 }  // namespace
 
 void send_plan(const Channel& channel, const Json& request) {
@@ -219,18 +272,25 @@ void simulate(const Channel& channel, const Json& request) {
     const Registry registry = registry_of(request);
     const auto prepare = [&] {
         Scene scene = read_scene(file, overrides_of(request));
+        // A solve longer than the whole run may last is ended, so that the run can say where it was.
+        for (auto& system : scene.systems)
+            if (!system.solver.time_limit) system.solver.time_limit = time_limit;
         channel.send("begin");
         return SceneRun(std::move(scene), registry, time_limit);
     };
     const auto state_file = request.at("state").get<std::string>();
     try {
         SceneRun first = prepare();
-        const Run run = first.run(!state_file.empty());
+        const auto body = request.at("body").get<std::string>();
+        if (!body.empty()) static_cast<void>(first.place(body));
+        const Run run = first.run(!state_file.empty(), request.at("watch").get<bool>());
         Json answer = totals_of(first.simulations());
         answer["status"] = run.status;
         answer["message"] = run.message;
         answer["setup"] = run.setup;
         answer["seconds"] = run.seconds;
+        answer["watched"] = watched(run.watch, answer);
+        if (!body.empty()) answer["watched"]["place"] = first.place(body);
         const bool complete = run.status == "finished" || run.status == "unsolved";
         if (complete && !state_file.empty()) write_file_atomically(state_file, text_of(first.state()));
         if (const auto reference = request.at("reference").get<std::string>(); complete && !reference.empty())
@@ -239,7 +299,7 @@ void simulate(const Channel& channel, const Json& request) {
         if (!complete) return;
         for (int k = 0; k < request.at("repeats").get<int>() && !interrupted(); ++k) {
             SceneRun again = prepare();
-            const Run repeated = again.run(false);
+            const Run repeated = again.run(false, false);
             channel.send("repeat", {{"setup", repeated.setup}, {"seconds", repeated.seconds}});
         }
     } catch (const Unsupported& refusal) {

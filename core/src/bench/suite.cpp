@@ -8,7 +8,6 @@
 
 #include "bench/suite_sections.hpp"
 #include "config/sections.hpp"
-#include "delassus/timestepper.hpp"
 #include "support/library_location.hpp"
 #include "support/text_file.hpp"
 
@@ -41,27 +40,6 @@ void each(const Source& source, const YAML::Node& list, std::string_view key, co
 
 std::vector<std::string> texts(const Source& source, const YAML::Node& node, const std::string& key) {
     return values_of(source, node, key);
-}
-
-/// "name(key=value)" checked against the table of methods, with the place in the message.
-std::string timestepper_text(const Source& source, const YAML::Node& node, const std::string& name,
-                             const OptionTexts& options) {
-    const auto& table = timesteppers();
-    const auto row =
-        std::find_if(table.begin(), table.end(), [&](const TimestepperInfo& info) { return info.name == name; });
-    std::vector<std::string_view> names;
-    for (const auto& info : table) names.emplace_back(info.name);
-    if (row == table.end())
-        source.refuse(node, fmt::format("there is no timestepper \"{}\"{}", name, nearest_name_hint(name, names)));
-    try {
-        static_cast<void>(resolve_options(name, row->options, options));
-    } catch (const InputError& error) {
-        source.refuse(node, error.what());
-    }
-    SolverConfig same_form;
-    same_form.name = name;
-    same_form.options = options;
-    return label_of(same_form);
 }
 
 std::vector<SuiteTimestepper> read_timesteppers(const Source& source, const YAML::Node& list) {
@@ -225,6 +203,15 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                       suite.step_solvers.push_back(text);
                   });
               }},
+             {"axes",
+              [&](const YAML::Node& n) {
+                  each(source, n, "axes", [&](const YAML::Node& item) {
+                      suite.axes.push_back(read_axis(source, item, registry, suite.left_out));
+                      for (const auto& axis : suite.axes)
+                          if (&axis != &suite.axes.back() && axis.name == suite.axes.back().name)
+                              source.refuse(item, fmt::format("the axis \"{}\" is listed twice", axis.name));
+                  });
+              }},
              {"references", [&](const YAML::Node& n) { read_references(source, n, suite.references); }},
              {"repeats",
               [&](const YAML::Node& n) {
@@ -237,8 +224,10 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                   suite.max_iterations = value<std::int64_t>(source, n, "max_iterations", "a whole number");
                   if (suite.max_iterations < 0) source.refuse(n, "\"max_iterations\" must not be negative");
               }}});
-        if (suite.problems.empty() && suite.dumps.empty() && suite.scenes.empty() && suite.left_out.empty())
-            throw InputError(fmt::format("{} has neither problems nor scenes: there is nothing to run", file.string()));
+        if (suite.problems.empty() && suite.dumps.empty() && suite.scenes.empty() && suite.axes.empty() &&
+            suite.left_out.empty())
+            throw InputError(
+                fmt::format("{} has neither problems nor scenes nor axes: there is nothing to run", file.string()));
     } catch (const YAML::Exception& error) {
         throw InputError(fmt::format("{}: not valid YAML: {}", source.at(error.mark), error.msg));
     }
@@ -247,7 +236,26 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
             suite.solvers.emplace_back();
             suite.solvers.back().name = plugin.name;
         }
+    for (auto& axis : suite.axes) {
+        if (axis.solvers.empty()) axis.solvers = suite.solvers;
+        if (!(axis.time_limit > 0.0)) axis.time_limit = suite.time_limit;
+    }
     return suite;
+}
+
+void keep_axes(Suite& suite, const std::vector<std::string>& names) {
+    std::vector<std::string_view> known;
+    for (const auto& axis : suite.axes) known.emplace_back(axis.name);
+    for (const auto& name : names)
+        if (std::find(known.begin(), known.end(), name) == known.end())
+            throw InputError(
+                fmt::format("{} has no axis \"{}\"{}", suite.file.string(), name, nearest_name_hint(name, known)));
+    std::erase_if(suite.axes, [&](const SuiteAxis& axis) {
+        return std::find(names.begin(), names.end(), axis.name) == names.end();
+    });
+    suite.problems.clear();
+    suite.dumps.clear();
+    suite.scenes.clear();
 }
 
 fs::path suite_folder() {

@@ -8,6 +8,7 @@
 
 #include "bench/measurement.hpp"
 #include "bench/scene_measurement.hpp"
+#include "bench/suite_axis.hpp"
 #include "delassus/registry.hpp"
 
 namespace delassus::bench {
@@ -61,6 +62,7 @@ struct Suite {
     std::vector<SuiteTimestepper> timesteppers;    ///< empty: the scene's own
     std::vector<double> steps;                     ///< s; empty: the scene's own
     std::vector<std::string> step_solvers = {""};  ///< of scenes; "" is the scene's own, or by need
+    std::vector<SuiteAxis> axes;
     SuiteReferences references;
     int repeats = 3;
     double time_limit = 10.0;   ///< s of the solver's own time, or of stepping, for each run
@@ -72,6 +74,9 @@ struct Suite {
 /// Reads the suite; folders are listed and sweeps expanded, nothing is loaded or run. Throws InputError with file,
 /// line, key and the nearest valid key.
 [[nodiscard]] Suite read_suite(const std::filesystem::path& file, const Registry& registry);
+
+/// Leaves of the suite only the axes of those names. Throws InputError for a name that none has.
+void keep_axes(Suite& suite, const std::vector<std::string>& names);
 
 struct ShippedSuite {
     std::string name, title, description;

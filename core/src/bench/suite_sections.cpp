@@ -7,6 +7,7 @@
 
 #include "config/sections.hpp"
 #include "delassus/generate.hpp"
+#include "delassus/timestepper.hpp"
 
 namespace delassus::bench {
 
@@ -26,30 +27,6 @@ double number_of(const Source& source, const YAML::Node& node, const std::string
     if (error != std::errc{} || end != text.data() + text.size())
         source.refuse(node, fmt::format("parameter \"{}\" is \"{}\"; it must be a number", key, text));
     return number;
-}
-
-/// Refuses a kind, a key or a value that the generator does not take; nothing is generated.
-void check_generator(const Source& source, const YAML::Node& item, const ProblemSource& problem) {
-    const auto table = generators();
-    std::vector<std::string_view> names;
-    for (const auto& generator : table) names.push_back(generator.name);
-    const auto row = std::find_if(table.begin(), table.end(),
-                                  [&](const Generator& generator) { return generator.name == problem.generator; });
-    if (row == table.end())
-        source.refuse(item, fmt::format("there is no generator \"{}\"{}", problem.generator,
-                                        nearest_name_hint(problem.generator, names)));
-    std::vector<std::string_view> keys;
-    for (const auto& parameter : row->parameters) keys.push_back(parameter.key);
-    for (const auto& [key, number] : problem.parameters) {
-        const auto at = std::find(keys.begin(), keys.end(), key);
-        if (at == keys.end())
-            source.refuse(item,
-                          fmt::format("{} has no parameter \"{}\"{}", row->name, key, nearest_name_hint(key, keys)));
-        const auto& parameter = row->parameters[static_cast<std::size_t>(at - keys.begin())];
-        if (!(number >= parameter.minimum && number <= parameter.maximum))
-            source.refuse(item, fmt::format("{}: {} = {:g} lies outside its range, {:g} to {:g}", row->name, key,
-                                            number, parameter.minimum, parameter.maximum));
-    }
 }
 
 void add_generated(const Source& source, const YAML::Node& item, const std::string& kind, const std::string& family,
@@ -88,6 +65,49 @@ fs::path suite_path(const Source& source, const std::string& text) {
     const char* value = std::getenv(text.substr(1, slash == std::string::npos ? slash : slash - 1).c_str());
     if (!value || !*value) return {};
     return slash == std::string::npos ? fs::path(value) : fs::path(value) / text.substr(slash + 1);
+}
+
+void check_generator(const Source& source, const YAML::Node& item, const ProblemSource& problem) {
+    const auto table = generators();
+    std::vector<std::string_view> names;
+    for (const auto& generator : table) names.push_back(generator.name);
+    const auto row = std::find_if(table.begin(), table.end(),
+                                  [&](const Generator& generator) { return generator.name == problem.generator; });
+    if (row == table.end())
+        source.refuse(item, fmt::format("there is no generator \"{}\"{}", problem.generator,
+                                        nearest_name_hint(problem.generator, names)));
+    std::vector<std::string_view> keys;
+    for (const auto& parameter : row->parameters) keys.push_back(parameter.key);
+    for (const auto& [key, number] : problem.parameters) {
+        const auto at = std::find(keys.begin(), keys.end(), key);
+        if (at == keys.end())
+            source.refuse(item,
+                          fmt::format("{} has no parameter \"{}\"{}", row->name, key, nearest_name_hint(key, keys)));
+        const auto& parameter = row->parameters[static_cast<std::size_t>(at - keys.begin())];
+        if (!(number >= parameter.minimum && number <= parameter.maximum))
+            source.refuse(item, fmt::format("{}: {} = {:g} lies outside its range, {:g} to {:g}", row->name, key,
+                                            number, parameter.minimum, parameter.maximum));
+    }
+}
+
+std::string timestepper_text(const Source& source, const YAML::Node& node, const std::string& name,
+                             const OptionTexts& options) {
+    const auto& table = timesteppers();
+    const auto row =
+        std::find_if(table.begin(), table.end(), [&](const TimestepperInfo& info) { return info.name == name; });
+    std::vector<std::string_view> names;
+    for (const auto& info : table) names.emplace_back(info.name);
+    if (row == table.end())
+        source.refuse(node, fmt::format("there is no timestepper \"{}\"{}", name, nearest_name_hint(name, names)));
+    try {
+        static_cast<void>(resolve_options(name, row->options, options));
+    } catch (const InputError& error) {
+        source.refuse(node, error.what());
+    }
+    SolverConfig same_form;
+    same_form.name = name;
+    same_form.options = options;
+    return label_of(same_form);
 }
 
 void read_problem_item(const Source& source, const YAML::Node& item, Suite& suite) {

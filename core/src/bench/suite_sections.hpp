@@ -11,6 +11,13 @@ namespace delassus::bench {
 /// not set.
 [[nodiscard]] std::filesystem::path suite_path(const Source& source, const std::string& text);
 
+/// Refuses a kind, a key or a value that the generator does not take; nothing is generated.
+void check_generator(const Source& source, const YAML::Node& item, const ProblemSource& problem);
+
+/// "name(key=value)" checked against the table of methods, with the place in the message.
+[[nodiscard]] std::string timestepper_text(const Source& source, const YAML::Node& node, const std::string& name,
+                                           const OptionTexts& options);
+
 /// Adds what an item of "problems" stands for.
 void read_problem_item(const Source& source, const YAML::Node& item, Suite& suite);
 

@@ -7,6 +7,7 @@
 
 #include "bench/analysis.hpp"
 #include "bench/bench_writers.hpp"
+#include "bench/markdown_table.hpp"
 
 namespace delassus::bench {
 
@@ -22,39 +23,6 @@ std::string seconds_text(double value) {
 std::string error_text(const Json& value) {
     return value.is_number() ? fmt::format("{:.1e}", value.get<double>()) : "—";
 }
-
-/// A Markdown table with columns padded, so that it is a table on a terminal too.
-class Table {
-public:
-    explicit Table(std::vector<std::string> head) : rows_{std::move(head)} {}
-    void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
-    [[nodiscard]] std::string text() const {
-        std::vector<std::size_t> widths(rows_.front().size(), 3);
-        for (const auto& row : rows_)
-            for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(row[i]));
-        std::string text;
-        for (std::size_t r = 0; r < rows_.size(); ++r) {
-            for (std::size_t i = 0; i < widths.size(); ++i) {
-                const std::string padding(widths[i] - width_of(rows_[r][i]), ' ');
-                text += i == 0 ? "| " + rows_[r][i] + padding + " |" : " " + padding + rows_[r][i] + " |";
-            }
-            text += '\n';
-            if (r > 0) continue;
-            for (std::size_t i = 0; i < widths.size(); ++i)
-                text += i == 0 ? "|:" + std::string(widths[i] + 1, '-') + "|" : std::string(widths[i] + 1, '-') + ":|";
-            text += '\n';
-        }
-        return text;
-    }
-
-private:
-    /// Characters of UTF-8.
-    static std::size_t width_of(const std::string& text) {
-        return static_cast<std::size_t>(std::count_if(
-            text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-    }
-    std::vector<std::vector<std::string>> rows_;
-};
 
 std::string name_of_hash(const std::vector<Json>& rows, const char* key, const Json& hash) {
     for (const Json& row : rows)
@@ -93,7 +61,7 @@ std::string class_text(const Json& one) {
     }
     std::stable_sort(order.begin(), order.end(),
                      [&](const auto& a, const auto& b) { return means.at(a) < means.at(b); });
-    Table table(head);
+    MarkdownTable table(head);
     std::string refused;
     for (const auto& label : order) {
         if (means.at(label) >= 1e9) {
@@ -117,7 +85,7 @@ std::string fastest_text(const ResultSet& results) {
     double tightest = 1.0;
     for (const auto& tolerance : results.session.at("settings").at("tolerances"))
         tightest = std::min(tightest, tolerance.get<double>());
-    Table table({"problem", "rows", "law", "fastest", "time", "natural", "velocity", "iterations"});
+    MarkdownTable table({"problem", "rows", "law", "fastest", "time", "natural", "velocity", "iterations"});
     std::map<std::string, const Json*> best;
     std::vector<std::pair<std::string, const Json*>> asked;
     for (const Json& row : results.solves) {
@@ -168,7 +136,7 @@ std::string failures_text(const Json& analysis) {
 }
 
 std::string scaling_text(const Json& analysis) {
-    Table table({"family", "law", "solver", "tolerance", "cost grows as size^", "sizes"});
+    MarkdownTable table({"family", "law", "solver", "tolerance", "cost grows as size^", "sizes"});
     int count = 0;
     for (const Json& one : analysis.at("scaling")) {
         if (one.at("fit").is_null()) continue;
@@ -184,7 +152,7 @@ std::string scaling_text(const Json& analysis) {
 
 std::string stepping_text(const ResultSet& results, const Json& analysis) {
     if (results.simulations.empty()) return {};
-    Table table({"scene", "timestepper", "step s", "error", "time", "steps", "order", "ended"});
+    MarkdownTable table({"scene", "timestepper", "step s", "error", "time", "steps", "order", "ended"});
     for (const Json& row : results.simulations) {
         std::string order = "—";
         for (const Json& one : analysis.at("orders"))
@@ -207,10 +175,16 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     const Json& session = results.session;
     const Json& machine = session.at("machine");
     std::string text = fmt::format("## {}\n\n", session.at("suite").at("title").get<std::string>());
-    text += fmt::format("{} runs of solvers on {} problems, {} runs of {} scenes; delassus {}, {}, {}.\n",
-                        results.solves.size(), results.problems.size(), results.simulations.size(),
-                        results.scenes.size(), session.at("delassus").get<std::string>(),
-                        session.at("created").get<std::string>(), machine.at("processor").get<std::string>());
+    std::string what;
+    const auto list = [&](std::size_t runs, const char* of, std::size_t things, const char* named) {
+        if (runs > 0) what += fmt::format("{}{} runs {} {} {}", what.empty() ? "" : ", ", runs, of, things, named);
+    };
+    list(results.solves.size(), "of solvers on", results.problems.size(), "problems");
+    list(results.simulations.size(), "of", results.scenes.size(), "scenes");
+    list(results.cells.size(), "on", results.axes.size(), "axes");
+    text += fmt::format("{}; delassus {}, {}, {}.\n", what.empty() ? "nothing has been run" : what,
+                        session.at("delassus").get<std::string>(), session.at("created").get<std::string>(),
+                        machine.at("processor").get<std::string>());
     if (results.missing > 0)
         text += fmt::format("**Not complete**: {} runs are missing. Run the same command again to go on.\n",
                             results.missing);
@@ -219,6 +193,7 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
             fmt::format("The machine was busy when this began (load {:.1f}): times are longer than on a quiet one.\n",
                         machine.at("load").get<double>());
     text += '\n';
+    text += axes_markdown(results);
     for (const Json& one : analysis.at("classes"))
         if (one.at("name") != "all") text += class_text(one);
     text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) + stepping_text(results, analysis);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -136,6 +137,8 @@ void measure(const Channel& channel, const Json& request) {
     if (const auto folder = request.at("reference").get<std::string>(); !folder.empty())
         velocity =
             problem.meter().velocity(solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
+    double speed = 0.0;  // NaN wherever an entry is
+    for (const double entry : solution.x) speed = std::isnan(entry) ? entry : std::max(speed, std::abs(entry));
     Json stages = Json::array();
     for (const StageReport& stage : report.stages) stages.push_back(stage.solver);
     const CurveSample last = report.curve.empty() ? CurveSample{} : report.curve.back();
@@ -150,6 +153,7 @@ void measure(const Channel& channel, const Json& request) {
                               {"factorizations", report.factorizations},
                               {"error", json_of(report.error)},
                               {"velocity", json_number(velocity)},
+                              {"speed", json_number(speed)},
                               {"stages", stages},
                               {"last", {last.iteration, json_number(last.seconds), json_number(last.natural)}}});
 
