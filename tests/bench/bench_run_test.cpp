@@ -41,6 +41,18 @@ protected:
     }
 };
 
+TEST_F(BenchRun, LawsAreForProblemsWithFriction) {
+    const auto run =
+        run_suite(suite("problems: [stops, friction]\nsolvers: [pgs]\nlaws: [associated, coulomb]\n"
+                        "tolerances: [1e-3]\nrepeats: 1\nreferences: none\n"));
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    const auto set = results();
+    std::map<std::string, int> runs;
+    for (const Json& row : set.solves) ++runs[row.at("problem").get<std::string>()];
+    EXPECT_EQ(runs.at(set.problems.at(0).at("problem")), 1);
+    EXPECT_EQ(runs.at(set.problems.at(1).at("problem")), 2);
+}
+
 TEST_F(BenchRun, EveryFailureIsARowWithItsCause) {
     const auto run =
         run_suite(suite("problems: [stops, friction]\n"

@@ -33,16 +33,19 @@ std::string unique_name(const std::string& name, const std::vector<TaskProblem>&
 
 void add_solves(Tasks& tasks, const Suite& suite, const std::string& code) {
     for (std::size_t p = 0; p < tasks.problems.size(); ++p) {
+        const ProblemFacts& facts = tasks.problems[p].facts;
+        const bool friction = std::any_of(facts.cones.begin(), facts.cones.end(),
+                                          [](const auto& cone) { return cone.first == name_of(ConeKind::Friction); });
         std::set<std::string> laws;
         for (const auto& chosen : suite.laws) {
-            const std::string law = chosen.empty() ? tasks.problems[p].facts.law : chosen;
+            const std::string law = chosen.empty() || !friction ? facts.law : chosen;
             if (!laws.insert(law).second) continue;
             for (std::size_t s = 0; s < suite.solvers.size(); ++s)
                 for (const double tolerance : suite.tolerances)
-                    tasks.solves.push_back({key_of_run({"solve", tasks.problems[p].facts.hash, law,
-                                                        label_of(suite.solvers[s]), digits(tolerance)},
-                                                       suite, code),
-                                            p, s, law, tolerance});
+                    tasks.solves.push_back(
+                        {key_of_run({"solve", facts.hash, law, label_of(suite.solvers[s]), digits(tolerance)}, suite,
+                                    code),
+                         p, s, law, tolerance});
         }
     }
 }
