@@ -31,41 +31,28 @@ protected:
     }
 };
 
+Problem moving_pile(double mu) {
+    return generate("sphere_pile", {{"contacts", 60}, {"layers", 3}, {"speed", 1.0}, {"mu", mu}});
+}
+
 TEST_F(Siconos, GivesTheVelocitiesOfPgs) {
-    SpherePileParameters pile;
-    pile.contacts = 60;
-    pile.layers = 3;
-    pile.speed = 1.0;
-    pile.mu = 0.3;
-    expect_velocities_of_pgs(generate_sphere_pile(pile));
-    expect_velocities_of_pgs(generate_sphere_pile(pile), {{"scaling", "false"}});
-    expect_velocities_of_pgs(generate_sphere_pile(pile), {{"local_solver", "projection"}});
+    expect_velocities_of_pgs(moving_pile(0.3));
+    expect_velocities_of_pgs(moving_pile(0.3), {{"scaling", "false"}});
+    expect_velocities_of_pgs(moving_pile(0.3), {{"local_solver", "projection"}});
 }
 
 TEST_F(Siconos, TakesRowsWithoutFriction) {
-    SpherePileParameters pile;
-    pile.contacts = 60;
-    pile.layers = 3;
-    pile.speed = 1.0;
-    pile.mu = 0.0;
-    expect_velocities_of_pgs(generate_sphere_pile(pile));
+    expect_velocities_of_pgs(moving_pile(0.0));
 }
 
 TEST_F(Siconos, TakesFiniteElements) {
-    ElasticBlockParameters block;
-    block.elements = 2;
-    block.layers = 2;
-    expect_velocities_of_pgs(generate_elastic_block(block));
+    expect_velocities_of_pgs(generate("elastic_block", {{"elements", 2}, {"layers", 2}}));
 }
 
-// One top sphere on four, under a Newton method and ADMM: what works on compressed columns.
+// Few contacts, under a Newton method and ADMM: what works on compressed columns.
 TEST_F(Siconos, FactoringMethodsAgreeToo) {
-    SpherePileParameters pile;
-    pile.contacts = 8;
-    pile.layers = 2;
-    pile.speed = 0.2;
-    for (const char* method : {"nsn_ac", "admm"})
-        expect_velocities_of_pgs(generate_sphere_pile(pile), {{"method", method}});
+    const Problem pile = generate("sphere_pile", {{"contacts", 8}, {"layers", 2}, {"speed", 0.2}});
+    for (const char* method : {"nsn_ac", "admm"}) expect_velocities_of_pgs(pile, {{"method", method}});
 }
 
 TEST_F(Siconos, RefusesTheAssociatedLaw) {
