@@ -104,10 +104,10 @@ int inspect(const InspectArguments& arguments) {
     const Problem& problem = prepared.problem();
     const Registry registry(absolute(arguments.plugin_path));
     const auto capable = registry.capable(prepared.needs());
-    const auto rank = estimate_rank(problem);
 
     std::optional<Qualification> qualification;
     if (arguments.qualification) qualification = qualify(problem, registry);
+    const auto rank = qualification ? qualification->rank : estimate_rank(problem);
 
     std::map<std::string, ConeCount> cones;
     for (const Cone& cone : problem.cones) {

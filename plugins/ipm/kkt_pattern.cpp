@@ -2,6 +2,8 @@
 // The symbolic part of the linear system: blocks, form, pattern, and where each value goes.
 #include <algorithm>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "kkt_system.hpp"
 
@@ -21,26 +23,35 @@ void KktSystem::analyze(const sdk::ProblemView& problem) {
     n_ = problem.n;
     m_ = problem.m;
     find_blocks(problem);
-    form_ = settings_.form;
-    if (n_ == 0) {
-        form_ = Form::Reduced;
-    } else if (couples_groups_) {
-        form_ = Form::Augmented;
-    } else if (form_ == Form::Automatic) {
+    form_ = n_ == 0 ? Form::Reduced : couples_groups_ ? Form::Augmented : settings_.form;
+    std::optional<sdk::SparseFactor> tried;
+    if (form_ == Form::Automatic) {
         form_ = Form::Normal;
-        const sdk::SparseColumns normal = pattern(problem, Form::Normal);
+        matrix_ = pattern(problem, Form::Normal);
         const double stored = static_cast<double>(problem.H.nonZeros() + problem.D.nonZeros() + n_ + m_);
-        if (static_cast<double>(normal.nonZeros()) > 8.0 * stored) {
-            sdk::SparseFactor trial;
-            trial.analyze(normal, n_);
-            const double fill = trial.entries();
-            trial.analyze(pattern(problem, Form::Augmented), n_);
-            if (trial.entries() < fill) form_ = Form::Augmented;
+        if (static_cast<double>(matrix_.nonZeros()) > 8.0 * stored) {
+            sdk::SparseColumns augmented = pattern(problem, Form::Augmented);
+            sdk::SparseFactor by_augmented;
+            tried.emplace().analyze(matrix_, n_);
+            by_augmented.analyze(augmented, n_);
+            if (by_augmented.entries() < tried->entries()) {
+                form_ = Form::Augmented;
+                matrix_ = std::move(augmented);
+                tried = std::move(by_augmented);
+            }
         }
+    } else {
+        matrix_ = pattern(problem, form_);
     }
-    matrix_ = pattern(problem, form_);
     find_places(problem);
-    if (factor_.analyze(matrix_, form_ == Form::Augmented ? n_ : matrix_.rows())) ++analyses_;
+    const Eigen::Index positive = form_ == Form::Augmented ? n_ : matrix_.rows();
+    if (factor_.has_analyzed(matrix_, positive)) return;
+    if (tried) {
+        factor_ = std::move(*tried);
+    } else {
+        factor_.analyze(matrix_, positive);
+    }
+    ++analyses_;
 }
 
 void KktSystem::find_blocks(const sdk::ProblemView& problem) {

@@ -42,6 +42,12 @@ public:
     [[nodiscard]] double natural(const sdk::ProblemView& problem, const sdk::Vector& lambda,
                                  sdk::Vector& velocity) const;
 
+    /// x = H⁻¹(a + Dᵀλ); n. λ: m.
+    template <class Lambda>
+    [[nodiscard]] sdk::Vector velocity(const sdk::ProblemView& problem, const Lambda& lambda) const {
+        return operator_.velocity(problem, lambda);
+    }
+
 private:
     struct Free {
         void operator()(NumericsMatrix* matrix) const;

@@ -171,8 +171,7 @@ Outcome Siconos::solve(const ProblemView& problem, const Request& request, Mutab
         visit = static_cast<std::int64_t>(std::ceil(method_.growth * static_cast<double>(visit)));
     }
     lambda = monitor.best().size() == problem.m ? monitor.best() : start;
-    (void)contacts_.natural(problem, lambda, velocity);
-    x = velocity;
+    x = contacts_.velocity(problem, lambda);
     return monitor.outcome();
 }
 

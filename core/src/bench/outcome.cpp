@@ -66,12 +66,16 @@ void show(Judgement& judgement, const char* measure) {
     judgement.figure = number_of(judgement.measures.at(measure));
 }
 
-bool refusal(const std::string& status) {
-    return status == "unsupported" || status == "input";
-}
-
-std::string sentence_of(const std::string& status, const std::string& message) {
-    return message.empty() ? spoken(status) : fmt::format("{}: {}", spoken(status), message);
+/// For a run that did not claim a result: what it did instead. wrong: the status of a claim that the core refutes.
+void explain(Judgement& judgement, const std::string& status, const std::string& message, const char* wrong) {
+    const bool refused = status == "unsupported" || status == "input";
+    judgement.outcome = refused                                   ? "refused"
+                        : status == wrong                         ? "wrong"
+                        : status == "crashed" || status == "hung" ? status
+                                                                  : "failed";
+    judgement.sentence = refused           ? message
+                         : message.empty() ? spoken(status)
+                                           : fmt::format("{}: {}", spoken(status), message);
 }
 
 }  // namespace
@@ -92,11 +96,7 @@ Judgement judge(const Measurement& run, const std::vector<Bound>& bounds) {
         }
         return judgement;
     }
-    judgement.outcome = refusal(run.status)                               ? "refused"
-                        : run.status == "false_claim"                     ? "wrong"
-                        : run.status == "crashed" || run.status == "hung" ? run.status
-                                                                          : "failed";
-    judgement.sentence = refusal(run.status) ? run.message : sentence_of(run.status, run.message);
+    explain(judgement, run.status, run.message, "false_claim");
     show(judgement, "natural");
     return judgement;
 }
@@ -116,11 +116,7 @@ Judgement judge(const SimulationMeasurement& run, const std::vector<Bound>& boun
         return judgement;
     }
     // "diverged" is said by who measures: the run itself took the state for good.
-    judgement.outcome = refusal(run.status)                               ? "refused"
-                        : run.status == "diverged"                        ? "wrong"
-                        : run.status == "crashed" || run.status == "hung" ? run.status
-                                                                          : "failed";
-    judgement.sentence = refusal(run.status) ? run.message : sentence_of(run.status, run.message);
+    explain(judgement, run.status, run.message, "diverged");
     if (run.status == "unsolved") show(judgement, "natural");
     return judgement;
 }

@@ -34,6 +34,9 @@ public:
     /// negative (a quasi-definite matrix). False where the pattern is the one analysed last: then nothing is done.
     bool analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive);
 
+    /// Whether the last analysis was of this pattern with so many positive pivots.
+    [[nodiscard]] bool has_analyzed(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) const;
+
     /// matrix: as analysed, with values. False if a pivot has the wrong sign, or is not finite.
     [[nodiscard]] bool factorize(const Eigen::Ref<const SparseColumns>& matrix);
 
@@ -192,13 +195,17 @@ inline std::vector<std::int32_t> SparseFactor::minimum_degree(const Eigen::Ref<c
     return position;
 }
 
+inline bool SparseFactor::has_analyzed(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) const {
+    const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
+    return size_ == matrix.rows() && positive_ == positive &&
+           std::equal(analyzed_start_.begin(), analyzed_start_.end(), start, start + matrix.cols() + 1) &&
+           std::equal(analyzed_row_.begin(), analyzed_row_.end(), row, row + matrix.nonZeros());
+}
+
 inline bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
     constexpr Eigen::Index smallest_to_dissect = 1000;
+    if (has_analyzed(matrix, positive)) return false;
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
-    if (size_ == matrix.rows() && positive_ == positive &&
-        std::equal(analyzed_start_.begin(), analyzed_start_.end(), start, start + matrix.cols() + 1) &&
-        std::equal(analyzed_row_.begin(), analyzed_row_.end(), row, row + matrix.nonZeros()))
-        return false;
     analyze(matrix, positive, minimum_degree(matrix));
     // Dissection is worth its time where the fill is large.
     if (entries_ >= 10.0 * static_cast<double>(matrix.nonZeros()) && size_ >= smallest_to_dissect) {
