@@ -180,7 +180,8 @@ TEST_P(PlanAgrees, WithWhatTheRunLoads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, PlanAgrees,
-                         testing::Values("pendulum", "slider_crank", "heavy_top", "bouncing_ball", "box_on_incline"));
+                         testing::Values("pendulum", "slider_crank", "heavy_top", "bouncing_ball", "box_on_incline"),
+                         [](const auto& chosen) { return std::string(chosen.param); });
 
 TEST(Plan, SaysWhatIsLeftOutAndWhy) {
     const auto pendulum = run_command("plan " + scene("pendulum"));

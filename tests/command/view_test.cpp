@@ -223,7 +223,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ViewPlayed,
                          ::testing::Values(std::tuple("pendulum", "--end 2 --every 20", 2.0),
                                            std::tuple("sphere_pile", "--end 0.1 --every 5", 0.1),
                                            std::tuple("elastic_block", "--end 0.05 --every 5", 0.05),
-                                           std::tuple("box_on_incline", "--end 0.1 --every 5", 0.1)));
+                                           std::tuple("box_on_incline", "--end 0.1 --every 5", 0.1)),
+                         [](const auto& chosen) { return std::string(std::get<0>(chosen.param)); });
 
 TEST_F(ViewBrowsed, WithoutWebGLThereAreASentenceAndThePlots) {
     if (!has_browser()) GTEST_SKIP() << "chromium is not installed";
