@@ -2,7 +2,7 @@
 // A section for each problem and law: error against time, and the table of its runs.
 "use strict";
 
-// Along the solve, the least-tolerance run's curve; at the end, a point for each tolerance.
+// Along the solve, the curve of the run to the tightest tolerance; at the end, a point for each tolerance.
 const views = [
   { label: "natural error along the solve", measure: "natural", curve: true },
   { label: "natural error at the end", measure: "natural", curve: false },
@@ -32,10 +32,9 @@ const valueOf = (point) => point.value || point;
 
 function problemOption(rows, title, view, logarithmic) {
   const names = [...new Set(rows.map((row) => row.label))];
-  const tightest = Math.min(...rows.map((row) => row.tolerance));
   const all = names.map((name) => {
-    const own = rows.filter((row) => row.label === name);
-    return [name, view.curve ? own.filter((row) => row.tolerance === tightest).flatMap(curveOf) : endsOf(own, view.measure), own];
+    const own = rows.filter((row) => row.label === name); // one of them has samples, of the tightest tolerance it was run to
+    return [name, view.curve ? own.flatMap(curveOf) : endsOf(own, view.measure), own];
   }).filter(([, data]) => data.length > 0);
   const values = all.flatMap(([, data]) => data.map(valueOf));
   const time = decades(values.map((value) => value[0]));
@@ -47,7 +46,7 @@ function problemOption(rows, title, view, logarithmic) {
     yAxis: { ...logAxis(view.measure + " error", 46), ...decades([...values.map((value) => value[1]), ...tolerances]) },
     series: [
       ...all.filter(([name]) => !hidden.has(name)).map(([name, data, own]) => {
-        const end = own.find((row) => row.tolerance === tightest);
+        const end = own.find((row) => row.curve.samples.length > 0);
         return lineSeries(name, data, view.curve ? {
           showSymbol: true, symbolSize: 3,
           endLabel: { show: true, formatter: end && end.cause ? `${name}: ${spoken(end.cause)}` : name, color: colourOf(name), fontSize: 11 },
@@ -110,7 +109,7 @@ function writeProblems() {
       axis.textContent = logarithmic ? "linear time" : "logarithmic time";
       draw();
     } });
-    const notes = taken.filter((row) => row.message).map((row) =>
+    const notes = taken.filter((row) => row.message && !skippedRow(row)).map((row) =>
       element("li", {}, element("b", { textContent: `${row.label}, ${short(row.tolerance)}: ` }), row.message));
     const made = section(`problem-${++number}`, title,
       element("p", { className: "facts", textContent:

@@ -104,8 +104,7 @@ ResultSet read_results(const fs::path& folder) {
 ResultsFile::ResultsFile(const fs::path& folder) : file_(folder / file_name) {
     if (!fs::exists(file_)) return;
     const Lines lines = read_lines(file_);
-    for (const Json& row : lines.rows)
-        if (row.contains("key")) keys_[row.at("key")] = true;
+    for (const Json& row : lines.rows) note(row);
     std::error_code failure;
     fs::resize_file(file_, lines.complete, failure);
     if (failure) throw InputError(fmt::format("{} cannot be written: {}", file_.string(), failure.message()));
@@ -115,7 +114,12 @@ void ResultsFile::add(const Json& row) {
     std::ofstream stream(file_, std::ios::binary | std::ios::app);
     stream << text_of(row) << '\n' << std::flush;
     if (!stream) throw InputError(fmt::format("{} cannot be written", file_.string()));
-    if (row.contains("key")) keys_[row.at("key")] = true;
+    note(row);
+}
+
+void ResultsFile::note(const Json& row) {
+    if (row.contains("key"))
+        ends_[row.at("key")] = {row.value("status", ""), row.value("cause", ""), row.contains("skipped_after")};
 }
 
 }  // namespace delassus::bench

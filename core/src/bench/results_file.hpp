@@ -26,6 +26,12 @@ struct ResultSet {
 /// incomplete is dropped.
 [[nodiscard]] ResultSet read_results(const std::filesystem::path& folder);
 
+/// How the run of a solver ended, as its row says.
+struct RunEnd {
+    std::string status, cause;  ///< cause: empty if solved
+    bool skipped = false;       ///< it was not run, as it had failed at a looser tolerance
+};
+
 /// Appends rows; a row is in the file when add() returns.
 class ResultsFile {
 public:
@@ -33,12 +39,16 @@ public:
     /// file of another format or version.
     explicit ResultsFile(const std::filesystem::path& folder);
 
-    [[nodiscard]] bool has(const std::string& key) const { return keys_.contains(key); }
+    [[nodiscard]] bool has(const std::string& key) const { return ends_.contains(key); }
+    /// Of the last row with that key, which there must be.
+    [[nodiscard]] const RunEnd& end_of(const std::string& key) const { return ends_.at(key); }
     void add(const Json& row);
 
 private:
+    void note(const Json& row);
+
     std::filesystem::path file_;
-    std::map<std::string, bool> keys_;
+    std::map<std::string, RunEnd> ends_;
 };
 
 }  // namespace delassus::bench

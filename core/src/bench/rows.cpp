@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/rows.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 
 namespace delassus::bench {
@@ -62,6 +65,22 @@ Json solve_row(const std::string& key, const std::string& problem, const std::st
     json.update(json_of(row));
     json["seconds"]["recorded"] = {json_number(row.recorded.setup), json_number(row.recorded.solve)};
     json["stages"] = row.stages;
+    return json;
+}
+
+Json skipped_row(const std::string& key, const std::string& problem, const std::string& law, double tolerance,
+                 const SolverConfig& solver, const RunEnd& end, double looser) {
+    Measurement row;
+    row.label = label_of(solver);
+    row.solver = solver.name;
+    row.options = solver.options;
+    row.status = end.status;
+    std::string spoken = end.status;
+    std::replace(spoken.begin(), spoken.end(), '_', ' ');
+    row.message = fmt::format("not run: ended with {} at {:g} already", spoken, looser);
+    Json json = solve_row(key, problem, law, tolerance, row);
+    json["cause"] = end.cause;
+    json["skipped_after"] = looser;
     return json;
 }
 

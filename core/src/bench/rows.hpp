@@ -6,6 +6,7 @@
 
 #include "bench/json_text.hpp"
 #include "bench/results.hpp"
+#include "bench/results_file.hpp"
 #include "bench/scene_measurement.hpp"
 #include "bench/suite.hpp"
 
@@ -29,6 +30,9 @@ inline constexpr int rows_version = 1;
 /// tolerance: what was asked for. problem: its hash.
 [[nodiscard]] Json solve_row(const std::string& key, const std::string& problem, const std::string& law,
                              double tolerance, const Measurement& row);
+/// The row of a run that was left out, as the same solver with the same options ended that way at a looser tolerance.
+[[nodiscard]] Json skipped_row(const std::string& key, const std::string& problem, const std::string& law,
+                               double tolerance, const SolverConfig& solver, const RunEnd& end, double looser);
 [[nodiscard]] Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
                                   const SimulationMeasurement& row);
 

@@ -182,7 +182,16 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                       each(source, n, "laws", [&](const YAML::Node& l) { suite.laws.push_back(law_text(source, l)); });
                   }
               }},
-             {"tolerances", [&](const YAML::Node& n) { suite.tolerances = positive_list(source, n, "tolerances"); }},
+             {"tolerances",
+              [&](const YAML::Node& n) {
+                  auto& tolerances = suite.tolerances = positive_list(source, n, "tolerances");
+                  std::sort(tolerances.rbegin(), tolerances.rend());
+                  tolerances.erase(std::unique(tolerances.begin(), tolerances.end()), tolerances.end());
+              }},
+             {"skip_after_failure",
+              [&](const YAML::Node& n) {
+                  suite.skip_after_failure = value<bool>(source, n, "skip_after_failure", "true or false");
+              }},
              {"scenes",
               [&](const YAML::Node& n) {
                   each(source, n, "scenes",

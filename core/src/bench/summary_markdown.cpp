@@ -118,8 +118,10 @@ std::string failures_text(const Json& analysis) {
     for (const Json& failure : analysis.at("failures")) {
         if (failure.at("cause") == "unsupported") continue;
         auto& text = causes[failure.at("cause")];
-        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", failure.at("solver").get<std::string>(),
-                            failure.at("count").get<int>());
+        const int skipped = failure.at("skipped");
+        text += fmt::format("{}{} ({}{})", text.empty() ? "" : ", ", failure.at("solver").get<std::string>(),
+                            failure.at("count").get<int>(),
+                            skipped > 0 ? fmt::format(", {} of them not run", skipped) : "");
     }
     if (causes.empty()) return {};
     std::string text = "### Failures (runs)\n\n";
