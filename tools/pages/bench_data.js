@@ -89,12 +89,9 @@ function section(id, title, ...children) {
   return made;
 }
 
-// Buttons of which one is pressed; choose is called with its index.
-function choice(labels, choose) {
-  const buttons = labels.map((textContent, k) => element("button", { type: "button", textContent, onclick: () => {
-    buttons.forEach((button, other) => button.setAttribute("aria-pressed", String(other === k)));
-    choose(k);
-  } }));
-  buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(k === 0)));
-  return buttons;
+// A box to choose one of the texts in; choose is called with its index.
+function selectBox(label, texts, chosen, choose) {
+  const box = element("select", { ariaLabel: label, onchange: () => choose(box.selectedIndex) }, ...texts.map((textContent) => element("option", { textContent })));
+  box.selectedIndex = chosen;
+  return box;
 }

@@ -52,6 +52,7 @@ function writeClasses() {
       grid.append(element("div", {}, element("h4", { textContent: `to ${short(at.tolerance)}, ${at.solved_by_any} of ${at.problems} solved by one at least` }), place));
       addChart(place, () => profileOption(at, title));
     }
+    writePair(one, made);
     if (grid.children.length === 0) made.append(element("p", { textContent: "No solver solved any of them." }));
   }
 }

@@ -5,8 +5,14 @@
 // Along the solve, the curve of the run to the tightest tolerance; at the end, a point for each tolerance.
 const views = [
   { label: "natural error along the solve", measure: "natural", curve: true },
-  { label: "natural error at the end", measure: "natural", curve: false },
-  { label: "velocity error at the end", measure: "velocity", curve: false },
+  ...[
+    ["natural", "natural error"],
+    ["velocity", "velocity error, in the norm of the kinetic energy,"],
+    ["dual", "penetration and sliding against the cones (dual)"],
+    ["cone", "reactions beyond the friction cones (cone)"],
+    ["gap", "energy that contacts give or take (gap)"],
+    ["balance", "momentum balance"],
+  ].map(([measure, label]) => ({ label: `${label} at the end`, measure, curve: false })),
 ];
 
 function curveOf(row) {
@@ -43,7 +49,7 @@ function problemOption(rows, title, view, logarithmic) {
   return {
     ...baseOption(`${view.label} against time on ${title}`),
     xAxis: { ...(logarithmic ? { ...logAxis("solver’s own time [s]"), ...time, minorTick: { show: true } } : { ...linearAxis("solver’s own time [s]"), min: 0, max: last }) },
-    yAxis: { ...logAxis(view.measure + " error", 46), ...decades([...values.map((value) => value[1]), ...tolerances]) },
+    yAxis: { ...logAxis(`${view.measure} error`, 46), ...decades([...values.map((value) => value[1]), ...tolerances]) },
     series: [
       ...all.filter(([name]) => !hidden.has(name)).map(([name, data, own]) => {
         const end = own.find((row) => row.curve.samples.length > 0);
@@ -115,7 +121,7 @@ function writeProblems() {
       element("p", { className: "facts", textContent:
         `n = ${whole(problem.n)}, m = ${whole(problem.m)}; ${cones ? `cones: ${cones}; ` : ""}law ${law}, H ${problem.structure}; content ${hash}; ${problem.from}` }));
     if (available.length > 0) {
-      made.append(element("div", { className: "tools" }, ...choice(available.map((one) => one.label), (k) => { view = k; draw(); }), axis), place);
+      made.append(element("div", { className: "tools" }, selectBox("error measure", available.map((one) => one.label), 0, (k) => { view = k; draw(); }), axis), place);
       addChart(place, () => problemOption(taken, title, available[view], logarithmic));
     }
     made.append(element("p", { className: "facts", textContent:

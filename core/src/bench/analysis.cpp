@@ -97,7 +97,8 @@ Json analyse_class(const std::string& name, const Rows& rows, const Json& settin
     Json tolerances = Json::array();
     for (const auto& tolerance : settings.at("tolerances"))
         tolerances.push_back(analyse_tolerance(rows, tolerance.get<double>(), settings.at("time_limit").get<double>()));
-    return {{"name", name}, {"problems", distinct(rows, problem_of).size()}, {"tolerances", tolerances}};
+    const auto members = distinct(rows, problem_of);
+    return {{"name", name}, {"problems", members.size()}, {"members", members}, {"tolerances", tolerances}};
 }
 
 Json fit_json(const std::vector<double>& x, const std::vector<double>& y) {

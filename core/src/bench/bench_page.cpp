@@ -54,6 +54,7 @@ std::string bench_page(const ResultSet& results, const Json& analysis) {
                        {"scenes", results.scenes},
                        {"solves", page_rows(results.solves)},
                        {"simulations", results.simulations},
+                       {"leaving_out", results.leaving_out},
                        {"axes", results.axes},
                        {"cells", results.cells},
                        {"missing", results.missing},

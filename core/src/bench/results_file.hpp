@@ -18,7 +18,7 @@ struct ResultSet {
     std::vector<Json> problems, references, libraries;  ///< of all sessions, the last of the same name
     std::vector<Json> scenes;                           ///< with their plans
     std::vector<Json> axes;                             ///< that the session's cells are of
-    std::vector<Json> solves, simulations, cells;       ///< in the order of the session's keys
+    std::vector<Json> solves, simulations, leaving_out, cells;  ///< in the order of the session's keys
     std::size_t missing = 0;                            ///< keys without a row: the session was interrupted
 };
 

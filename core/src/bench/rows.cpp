@@ -84,15 +84,10 @@ Json skipped_row(const std::string& key, const std::string& problem, const std::
     return json;
 }
 
-Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
-                    const SimulationMeasurement& row) {
-    return {{"kind", "simulation"},
-            {"key", key},
-            {"scene", scene},
-            {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
-            {"step", request.step},
-            {"solver", request.solver},
-            {"status", row.status},
+namespace {
+
+Json json_of(const SimulationMeasurement& row) {
+    return {{"status", row.status},
             {"cause", cause_of(row)},
             {"message", row.message},
             {"seconds",
@@ -100,6 +95,40 @@ Json simulation_row(const std::string& key, const std::string& scene, const Simu
             {"error", {{"position", json_number(row.position)}, {"velocity", json_number(row.velocity)}}},
             {"totals", row.totals},
             {"peak_memory", row.peak_memory}};
+}
+
+}  // namespace
+
+Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
+                    const SimulationMeasurement& row) {
+    Json json = {{"kind", "simulation"},
+                 {"key", key},
+                 {"scene", scene},
+                 {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
+                 {"step", request.step},
+                 {"solver", request.solver}};
+    json.update(json_of(row));
+    return json;
+}
+
+Json leaving_out_row(const std::string& key, const SuiteScene& scene, const SceneFacts& facts,
+                     const SimulationMeasurement& as_is, const SimulationMeasurement& forced) {
+    Json row = {{"kind", "leaving_out"},
+                {"key", key},
+                {"scene", facts.hash},
+                {"name", scene.name},
+                {"title", facts.title},
+                {"file", std::filesystem::absolute(scene.source.file).lexically_normal().string()},
+                {"set", Json(scene.source.settings)},
+                {"end", facts.end},
+                {"left_out", Json::array()}};
+    for (const Json& system : facts.plan)
+        for (const Json& line : system.at("left_out")) row["left_out"].push_back(line);
+    for (const auto& [name, run] : {std::pair("as_is", &as_is), std::pair("forced", &forced)}) {
+        row[name] = json_of(*run);
+        row[name]["libraries"] = run->libraries;
+    }
+    return row;
 }
 
 }  // namespace delassus::bench

@@ -11,6 +11,7 @@
 #include "bench/reference.hpp"
 #include "bench/rows.hpp"
 #include "bench/scene_dumps.hpp"
+#include "bench/scratch_folder.hpp"
 #include "bench/tasks.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
@@ -37,6 +38,7 @@ Json session_row(const RunPlan& plan, const Tasks& tasks, const std::vector<Cell
     Json keys = Json::array(), solvers = Json::array();
     for (const auto& task : tasks.solves) keys.push_back(task.key);
     for (const auto& task : tasks.simulations) keys.push_back(task.key);
+    for (const auto& task : tasks.leaving_out) keys.push_back(task.key);
     for (const auto& task : cells) keys.push_back(task.key);
     for (const auto& solver : suite.solvers) solvers.push_back(label_of(solver));
     return {{"kind", "session"},
@@ -74,8 +76,10 @@ public:
         : plan_(plan), listener_(listener), tasks_(tasks), cells_(cells), code_(std::move(code)), file_(file) {
         for (const auto& task : tasks.solves) total_ += !done(task);
         for (const auto& task : tasks.simulations) total_ += !file.has(task.key);
+        for (const auto& task : tasks.leaving_out) total_ += !file.has(task.key);
         for (const auto& cell : cells) total_ += !file.has(cell.key);
-        counts_.skipped = tasks.solves.size() + tasks.simulations.size() + cells.size() - total_;
+        counts_.skipped =
+            tasks.solves.size() + tasks.simulations.size() + tasks.leaving_out.size() + cells.size() - total_;
     }
 
     RunCounts run() {
@@ -85,6 +89,8 @@ public:
         }
         for (const auto& task : tasks_.simulations)
             if (!stopped() && !file_.has(task.key)) step(task);
+        for (const auto& task : tasks_.leaving_out)
+            if (!stopped() && !file_.has(task.key)) leave_out(task);
         for (const auto& cell : cells_)
             if (!stopped() && !file_.has(cell.key)) fill(cell);
         counts_.interrupted = stopped();
@@ -170,6 +176,26 @@ private:
         ++counts_.done;
     }
 
+    void leave_out(const LeavingOutTask& task) {
+        const ScratchFolder scratch;
+        SimulateRequest request;
+        request.scene = task.entry.source;
+        request.time_limit = plan_.suite.time_limit;
+        request.repeats = plan_.suite.repeats;
+        request.state = scratch.path() / "state.json";
+        begin(task.entry.name + "  as it is");
+        const SimulationMeasurement as_is = simulate(plan_.worker, request);
+        if (stopped()) return;
+        begin(task.entry.name + "  nothing left out");
+        request.scene.forced = true;
+        if (std::filesystem::exists(request.state)) request.reference = request.state;
+        request.state.clear();
+        const SimulationMeasurement forced = simulate(plan_.worker, request);
+        if (stopped()) return;
+        file_.add(leaving_out_row(task.key, task.entry, task.facts, as_is, forced));
+        ++counts_.done;
+    }
+
     void fill(const CellTask& cell) {
         const SuiteAxis& axis = plan_.suite.axes[cell.axis];
         begin(fmt::format("{} = {:g}  {}", axis.title, axis.values[cell.value], cell.method));
@@ -228,7 +254,7 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
     add_dumped_problems(plan.worker, plan.output / "problems", plan.suite);
     const Tasks tasks = make_tasks(plan.suite, plan.worker, code);
     const std::vector<CellTask> cells = make_cells(plan.suite, code);
-    if (tasks.solves.empty() && tasks.simulations.empty() && cells.empty())
+    if (tasks.solves.empty() && tasks.simulations.empty() && tasks.leaving_out.empty() && cells.empty())
         throw InputError(fmt::format("{} asks for no run: {}", plan.suite.file.string(),
                                      plan.suite.left_out.empty() ? "it names no solver" : plan.suite.left_out.front()));
 

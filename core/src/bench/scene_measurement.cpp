@@ -17,6 +17,7 @@ Json scene_fields(const char* task, const WorkerSettings& worker, const SceneSou
                    {"scene", std::filesystem::absolute(scene.file).string()},
                    {"settings", Json(scene.settings)},
                    {"end", scene.end},
+                   {"forced", scene.forced},
                    {"plugin_path", Json::array()}};
     for (const auto& folder : worker.plugin_path) fields["plugin_path"].push_back(folder.string());
     return fields;
