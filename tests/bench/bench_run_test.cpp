@@ -138,13 +138,13 @@ TEST_F(BenchRun, WhatFailedIsNotRunToATighterTolerance) {
 }
 
 TEST_F(BenchRun, LeavingOutIsMeasured) {
-    for (const char* scene : {"pendulum", "box_on_incline"})
+    for (const char* scene : {"pendulum", "bouncing_ball"})
         std::ofstream(folder / (std::string(scene) + ".yaml"))
             << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes" / (std::string(scene) + ".yaml"));
     const auto run = run_suite(
         suite("leaving_out:\n"
               "  - {path: pendulum.yaml, end: 0.2}\n"
-              "  - {path: box_on_incline.yaml, name: ice, end: 0.1, set: {materials.wood.friction: 0}}\n"
+              "  - {path: bouncing_ball.yaml, end: 0.6}\n"
               "repeats: 1\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = results();
@@ -160,12 +160,12 @@ TEST_F(BenchRun, LeavingOutIsMeasured) {
         EXPECT_LT(row.at("forced").at("error").at("position"), 1e-5) << row;  // the same physics
         EXPECT_TRUE(has(row.at("forced"), "delassus_collision"));
     }
-    const Json &pendulum = set.leaving_out[0], &ice = set.leaving_out[1];
+    const Json &pendulum = set.leaving_out[0], &ball = set.leaving_out[1];
     EXPECT_FALSE(has(pendulum.at("as_is"), "delassus_collision"));
     EXPECT_FALSE(pendulum.at("left_out").empty());
-    EXPECT_GT(ice.at("as_is").at("totals").at("most_rows"), 0);
-    EXPECT_EQ(ice.at("forced").at("totals").at("most_rows").get<int>(),
-              3 * ice.at("as_is").at("totals").at("most_rows").get<int>());
+    EXPECT_GT(ball.at("as_is").at("totals").at("most_rows"), 0);
+    EXPECT_EQ(ball.at("forced").at("totals").at("most_rows").get<int>(),
+              3 * ball.at("as_is").at("totals").at("most_rows").get<int>());
     EXPECT_NE(run.output.find("What leaving out saves"), std::string::npos);
     // Nothing of it is run again.
     EXPECT_NE(run_suite(folder / "suite.yaml").errors.find("2 runs were done before"), std::string::npos);
