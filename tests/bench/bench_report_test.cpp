@@ -93,26 +93,29 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
 
 TEST_F(BenchReport, TwoSolversAreChosen) {
     if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
-    // By hand: two against each other on three problems, of which one has 2 s and 1 s, one 1 s and none, one none and none.
+    // By hand: two against each other on three problems, of which one has 2 s and 1 s, one 1 s and none, one none and
+    // none.
     const auto run = open(
         "const root = document.documentElement, made = document.querySelector('#class-associated .pair');"
-        "const row = (problem, label, time) => ({problem, law: '', label, cause: time ? '' : 'stalled', seconds: {setup: 0, solve: time}});"
-        "const pairs = pairTimes([row('a', 'x', 2), row('a', 'y', 1), row('b', 'x', 1), row('b', 'y', null), row('c', 'x', null),"
+        "const row = (problem, label, time) => ({problem, law: '', label, cause: time ? '' : 'stalled', seconds: "
+        "{setup: 0, solve: time}});"
+        "const pairs = pairTimes([row('a', 'x', 2), row('a', 'y', 1), row('b', 'x', 1), row('b', 'y', null), row('c', "
+        "'x', null),"
         "row('c', 'y', null)], 'x', 'y');"
         "root.dataset.pairs = pairs.length; root.dataset.x = ratiosOf(pairs, 'x', 'y').join(' ');"
         "root.dataset.y = ratiosOf(pairs, 'y', 'x').join(' '); root.dataset.says = pairText(pairs, 'x', 'y');"
         "const place = made.querySelector('.chart'); place.chart.draw();"
         "const names = () => place.chart.chart.getOption().series.map((one) => one.name).sort().join(' ');"
         "const [one, other] = made.querySelectorAll('select'); root.dataset.first = names();"
-        "const choose = (box, name) => { box.selectedIndex = [...box.options].findIndex((option) => option.textContent === name);"
+        "const choose = (box, name) => { box.selectedIndex = [...box.options].findIndex((option) => option.textContent "
+        "=== name);"
         "box.dispatchEvent(new Event('change')); }; choose(one, 'pgs'); choose(other, 'apgd');"
         "root.dataset.chosen = names(); root.dataset.caption = made.querySelector('h4').textContent;");
     ASSERT_FALSE(run.timed_out);
     const std::string head = run.dom.substr(0, 1200);
-    for (const char* fact :
-         {"data-pairs=\"2\"", "data-x=\"1 2\"", "data-y=\"1\"", "x is faster on 0, y on 1",
-          "ratio of their times is 2.00. Only x solves 1, only y 0.", "data-chosen=\"apgd pgs\"", "data-first=\"",
-          "data-caption=\"pgs against apgd, to 1e-6\""})
+    for (const char* fact : {"data-pairs=\"2\"", "data-x=\"1 2\"", "data-y=\"1\"", "x is faster on 0, y on 1",
+                             "ratio of their times is 2.00. Only x solves 1, only y 0.", "data-chosen=\"apgd pgs\"",
+                             "data-first=\"", "data-caption=\"pgs against apgd, to 1e-6\""})
         EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
 }
 
@@ -121,14 +124,15 @@ TEST_F(BenchReport, ShowsWhatLeavingOutSaves) {
     const auto run = open(
         "const root = document.documentElement, made = document.querySelector('#leaving-out');"
         "made.querySelectorAll('.chart').forEach((place) => place.chart.draw());"
-        "root.dataset.bars = [...made.querySelectorAll('.chart')].map((place) => place.chart.chart.getOption().series.flatMap((one) => "
+        "root.dataset.bars = [...made.querySelectorAll('.chart')].map((place) => "
+        "place.chart.chart.getOption().series.flatMap((one) => "
         "one.data.map(({value}) => value > 0)).join(' ')).join('; ');"
         "root.dataset.cells = made.querySelectorAll('tbody td').length;"
         "root.dataset.more = made.textContent.includes('delassus_collision');");
     ASSERT_FALSE(run.timed_out);
     const std::string head = run.dom.substr(0, 800);
-    for (const char* fact : {"data-bars=\"true true; true true; true true; true true\"", "data-cells=\"10\"",
-                             "data-more=\"true\""})
+    for (const char* fact :
+         {"data-bars=\"true true; true true; true true; true true\"", "data-cells=\"10\"", "data-more=\"true\""})
         EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
 }
 

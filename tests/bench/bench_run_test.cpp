@@ -141,18 +141,17 @@ TEST_F(BenchRun, LeavingOutIsMeasured) {
     for (const char* scene : {"pendulum", "bouncing_ball"})
         std::ofstream(folder / (std::string(scene) + ".yaml"))
             << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes" / (std::string(scene) + ".yaml"));
-    const auto run = run_suite(
-        suite("leaving_out:\n"
-              "  - {path: pendulum.yaml, end: 0.2}\n"
-              "  - {path: bouncing_ball.yaml, end: 0.6}\n"
-              "repeats: 1\n"));
+    const auto run =
+        run_suite(suite("leaving_out:\n"
+                        "  - {path: pendulum.yaml, end: 0.2}\n"
+                        "  - {path: bouncing_ball.yaml, end: 0.6}\n"
+                        "repeats: 1\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = results();
     ASSERT_EQ(set.leaving_out.size(), 2U);
     const auto has = [](const Json& side, const std::string& part) {
-        return std::any_of(side.at("libraries").begin(), side.at("libraries").end(), [&](const Json& file) {
-            return file.get<std::string>().find(part) != std::string::npos;
-        });
+        return std::any_of(side.at("libraries").begin(), side.at("libraries").end(),
+                           [&](const Json& file) { return file.get<std::string>().find(part) != std::string::npos; });
     };
     for (const Json& row : set.leaving_out) {
         EXPECT_EQ(row.at("as_is").at("status"), "finished") << row;

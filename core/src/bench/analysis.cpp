@@ -202,7 +202,8 @@ Json count_failures(const Rows& rows) {
     }
     Json list = Json::array();
     for (const auto& [what, count] : counts)
-        list.push_back({{"solver", what.first}, {"cause", what.second}, {"count", count.all}, {"skipped", count.skipped}});
+        list.push_back(
+            {{"solver", what.first}, {"cause", what.second}, {"count", count.all}, {"skipped", count.skipped}});
     return list;
 }
 

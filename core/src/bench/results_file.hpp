@@ -14,12 +14,12 @@ namespace delassus::bench {
 /// What a results file holds, as of its last session: rows that this session did not ask for are left out, and of rows
 /// with the same key the last counts.
 struct ResultSet {
-    Json session;                                       ///< the last; null if the file holds none
-    std::vector<Json> problems, references, libraries;  ///< of all sessions, the last of the same name
-    std::vector<Json> scenes;                           ///< with their plans
-    std::vector<Json> axes;                             ///< that the session's cells are of
+    Json session;                                               ///< the last; null if the file holds none
+    std::vector<Json> problems, references, libraries;          ///< of all sessions, the last of the same name
+    std::vector<Json> scenes;                                   ///< with their plans
+    std::vector<Json> axes;                                     ///< that the session's cells are of
     std::vector<Json> solves, simulations, leaving_out, cells;  ///< in the order of the session's keys
-    std::size_t missing = 0;                            ///< keys without a row: the session was interrupted
+    std::size_t missing = 0;                                    ///< keys without a row: the session was interrupted
 };
 
 /// Throws InputError if the folder has no results.jsonl, or one of another format or version. A last line that is

@@ -101,12 +101,10 @@ Json json_of(const SimulationMeasurement& row) {
 
 Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
                     const SimulationMeasurement& row) {
-    Json json = {{"kind", "simulation"},
-                 {"key", key},
-                 {"scene", scene},
-                 {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
-                 {"step", request.step},
-                 {"solver", request.solver}};
+    Json json = {
+        {"kind", "simulation"}, {"key", key},
+        {"scene", scene},       {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
+        {"step", request.step}, {"solver", request.solver}};
     json.update(json_of(row));
     return json;
 }

@@ -98,8 +98,7 @@ SuiteScene read_scene_item(const Source& source, const YAML::Node& item, bool ti
             {"set", [&](const YAML::Node& n) { scene.source.settings = read_options(source, n); }},
             {"end", [&](const YAML::Node& n) { scene.source.end = positive(source, n, "end"); }}};
         if (timesteppers) {
-            keys.emplace_back("steps",
-                              [&](const YAML::Node& n) { scene.steps = positive_list(source, n, "steps"); });
+            keys.emplace_back("steps", [&](const YAML::Node& n) { scene.steps = positive_list(source, n, "steps"); });
             keys.emplace_back("timesteppers",
                               [&](const YAML::Node& n) { scene.timesteppers = read_timesteppers(source, n); });
             keys.emplace_back("reference", [&](const YAML::Node& n) {
@@ -244,8 +243,7 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                   if (suite.max_iterations < 0) source.refuse(n, "\"max_iterations\" must not be negative");
               }}});
         if (suite.problems.empty() && suite.dumps.empty() && suite.scenes.empty() && suite.axes.empty() &&
-            suite.leaving_out.empty() &&
-            suite.left_out.empty())
+            suite.leaving_out.empty() && suite.left_out.empty())
             throw InputError(
                 fmt::format("{} has neither problems nor scenes nor axes: there is nothing to run", file.string()));
     } catch (const YAML::Exception& error) {

@@ -56,7 +56,7 @@ struct Suite {
     std::vector<SuiteProblem> problems;
     std::vector<SuiteDump> dumps;
     std::vector<SolverConfig> solvers;
-    std::vector<std::string> laws = {""};  ///< "" is each problem's own
+    std::vector<std::string> laws = {""};                 ///< "" is each problem's own
     std::vector<double> tolerances = {1e-3, 1e-6, 1e-9};  ///< the loosest first
     bool skip_after_failure = true;  ///< a solver that failed on a problem is not run on it to a tighter tolerance
     std::vector<SuiteScene> scenes;

@@ -196,7 +196,8 @@ std::string leaving_out_text(const ResultSet& results) {
                    std::to_string(forced.at("libraries").size()), error_text(forced.at("error").at("position"))});
     }
     return "### What leaving out saves\n\nEach scene as it is, and \"forced\": with nothing left out (`leave_out: "
-           "false`). Time of stepping, most rows of a problem, peak memory and libraries of the process, and by how much "
+           "false`). Time of stepping, most rows of a problem, peak memory and libraries of the process, and by how "
+           "much "
            "the ends of the two runs differ.\n\n" +
            table.text() + "\n";
 }
@@ -229,8 +230,8 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     text += axes_markdown(results);
     for (const Json& one : analysis.at("classes"))
         if (one.at("name") != "all") text += class_text(one);
-    text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) + stepping_text(results, analysis) +
-            leaving_out_text(results);
+    text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) +
+            stepping_text(results, analysis) + leaving_out_text(results);
     if (!results.solves.empty())
         text += fmt::format(
             "Mean: shifted geometric mean of setup and solve (shift {:g} s) over the problems that any solver solved; "

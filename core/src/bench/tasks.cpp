@@ -101,8 +101,7 @@ Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::st
     for (const auto& scene : suite.scenes) tasks.scenes.push_back({scene, describe_scene(worker, scene.source), 0.0});
     for (const auto& scene : suite.leaving_out) {
         SceneFacts facts = describe_scene(worker, scene.source);
-        const std::string key =
-            key_of_run({"leaving out", facts.hash, digits(facts.end)}, suite, code);
+        const std::string key = key_of_run({"leaving out", facts.hash, digits(facts.end)}, suite, code);
         tasks.leaving_out.push_back({key, scene, std::move(facts)});
     }
     add_solves(tasks, suite, code);

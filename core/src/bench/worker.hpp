@@ -18,7 +18,8 @@
 //       repeat    status, setup, solve: a run without recording
 //   {"do": "plan", "scene", "settings", "end", "forced", "plugin_path"}
 //       plan      systems: what the scene needs and what is left out
-//   {"do": "simulate", "scene", "settings", "end", "forced", "timestepper", "step", "solver", "repeats", "plugin_path", "state",
+//   {"do": "simulate", "scene", "settings", "end", "forced", "timestepper", "step", "solver", "repeats", "plugin_path",
+//   "state",
 //    "reference"}
 //       scene     hash, title, step, end
 //       refused   message

@@ -75,8 +75,7 @@ void StepSolver::leave_nothing_out() {
     self.leaves_out = false;
     self.also_needs = DELASSUS_CAN_H_DEFINITE;
     if (self.config.name == auto_name)
-        self.also_needs |=
-            DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
+        self.also_needs |= DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
 }
 
 // The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as

@@ -20,9 +20,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
         {"leave_out",
-         [this](const YAML::Node& n) {
-             result_.leave_out = value<bool>(source_, n, "leave_out", "true or false");
-         }},
+         [this](const YAML::Node& n) { result_.leave_out = value<bool>(source_, n, "leave_out", "true or false"); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
     for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
                              "cables", "beams", "joints", "motors", "springs", "bushings", "loads", "keep_apart"})
