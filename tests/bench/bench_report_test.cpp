@@ -25,6 +25,7 @@ protected:
             "tolerances: [1e-3, 1e-6]\n"
             "scenes: [{path: pendulum.yaml, end: 0.1, steps: [0.02, 0.01]}]\n"
             "timesteppers: [hht]\n"
+            "leaving_out: [{path: pendulum.yaml, end: 0.1}]\n"
             "repeats: 1\n"
             "axes:\n"
             "  - {name: boxes, title: boxes of <b>stone</b>, generate: box_stack, set: {boxes: $(value)}, values: [1, "
@@ -71,13 +72,15 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
         "document.elementFromPoint(left + 6, top + 6).dispatchEvent(new MouseEvent('click', {bubbles: true}));"
         "root.dataset.after = chart(); root.dataset.pressed = button.getAttribute('aria-pressed');"
         "button.click(); root.dataset.again = chart();"
-        "[...document.querySelectorAll('#problem-2 .tools button')].find((one) => "
-        "one.textContent.startsWith('velocity')).click();"
-        "root.dataset.axis = document.querySelector('#problem-2 .chart').chart.chart.getOption().yAxis[0].name;");
+        "const box = document.querySelector('#problem-2 .tools select'); const axis = (begin) => {"
+        "box.selectedIndex = [...box.options].findIndex((one) => one.textContent.startsWith(begin));"
+        "box.dispatchEvent(new Event('change'));"
+        "return document.querySelector('#problem-2 .chart').chart.chart.getOption().yAxis[0].name; };"
+        "root.dataset.axis = axis('velocity'); root.dataset.dual = axis('penetration');");
     ASSERT_FALSE(run.timed_out);
     const std::string head = run.dom.substr(0, 600);
     for (const char* fact : {"data-before=\"1\"", "data-after=\"0\"", "data-pressed=\"false\"", "data-again=\"1\"",
-                             "data-axis=\"velocity error\""})
+                             "data-axis=\"velocity error\"", "data-dual=\"dual error\""})
         EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
     EXPECT_NE(run.dom.find("<tr class=\"lie\">"), std::string::npos);  // a false claim is a red row
     EXPECT_NE(run.dom.find("<span class=\"status false_claim\">false claim</span>"), std::string::npos);
@@ -86,6 +89,51 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
     EXPECT_NE(run.dom.find("collision detection"), std::string::npos);  // the plan of the scene
     EXPECT_EQ(run.dom.find("<img src=\"x\""), std::string::npos);       // names are text, never markup
     EXPECT_NE(run.dom.find("<svg"), std::string::npos);
+}
+
+TEST_F(BenchReport, TwoSolversAreChosen) {
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
+    // By hand: two against each other on three problems, of which one has 2 s and 1 s, one 1 s and none, one none and
+    // none.
+    const auto run = open(
+        "const root = document.documentElement, made = document.querySelector('#class-associated .pair');"
+        "const row = (problem, label, time) => ({problem, law: '', label, cause: time ? '' : 'stalled', seconds: "
+        "{setup: 0, solve: time}});"
+        "const pairs = pairTimes([row('a', 'x', 2), row('a', 'y', 1), row('b', 'x', 1), row('b', 'y', null), row('c', "
+        "'x', null),"
+        "row('c', 'y', null)], 'x', 'y');"
+        "root.dataset.pairs = pairs.length; root.dataset.x = ratiosOf(pairs, 'x', 'y').join(' ');"
+        "root.dataset.y = ratiosOf(pairs, 'y', 'x').join(' '); root.dataset.says = pairText(pairs, 'x', 'y');"
+        "const place = made.querySelector('.chart'); place.chart.draw();"
+        "const names = () => place.chart.chart.getOption().series.map((one) => one.name).sort().join(' ');"
+        "const [one, other] = made.querySelectorAll('select'); root.dataset.first = names();"
+        "const choose = (box, name) => { box.selectedIndex = [...box.options].findIndex((option) => option.textContent "
+        "=== name);"
+        "box.dispatchEvent(new Event('change')); }; choose(one, 'pgs'); choose(other, 'apgd');"
+        "root.dataset.chosen = names(); root.dataset.caption = made.querySelector('h4').textContent;");
+    ASSERT_FALSE(run.timed_out);
+    const std::string head = run.dom.substr(0, 1200);
+    for (const char* fact : {"data-pairs=\"2\"", "data-x=\"1 2\"", "data-y=\"1\"", "x is faster on 0, y on 1",
+                             "ratio of their times is 2.00. Only x solves 1, only y 0.", "data-chosen=\"apgd pgs\"",
+                             "data-first=\"", "data-caption=\"pgs against apgd, to 1e-6\""})
+        EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
+}
+
+TEST_F(BenchReport, ShowsWhatLeavingOutSaves) {
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
+    const auto run = open(
+        "const root = document.documentElement, made = document.querySelector('#leaving-out');"
+        "made.querySelectorAll('.chart').forEach((place) => place.chart.draw());"
+        "root.dataset.bars = [...made.querySelectorAll('.chart')].map((place) => "
+        "place.chart.chart.getOption().series.flatMap((one) => "
+        "one.data.map(({value}) => value > 0)).join(' ')).join('; ');"
+        "root.dataset.cells = made.querySelectorAll('tbody td').length;"
+        "root.dataset.more = made.textContent.includes('delassus_collision');");
+    ASSERT_FALSE(run.timed_out);
+    const std::string head = run.dom.substr(0, 800);
+    for (const char* fact :
+         {"data-bars=\"true true; true true; true true; true true\"", "data-cells=\"10\"", "data-more=\"true\""})
+        EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
 }
 
 TEST_F(BenchReport, AxesAreHeatMaps) {

@@ -95,6 +95,81 @@ TEST_F(BenchRun, EveryFailureIsARowWithItsCause) {
     EXPECT_NE(set.libraries.at(0).at("files").dump().find("libdelassus.so.0."), std::string::npos);
 }
 
+TEST_F(BenchRun, WhatFailedIsNotRunToATighterTolerance) {
+    const std::string text =
+        "problems: [stops, friction]\n"
+        "solvers:\n"
+        "  - {name: misbehaving, behaviour: [slow, crash, lie]}\n"
+        "tolerances: [1e-9, 1e-3, 1e-6]\n"
+        "time_limit: 0.3\n"
+        "repeats: 1\n"
+        "references: none\n";
+    ASSERT_EQ(run_suite(suite(text)).exit_code, 0);
+    auto set = results();
+    ASSERT_EQ(set.solves.size(), 18U);
+    const auto row = [&](std::size_t problem, const std::string& behaviour, double tolerance) {
+        for (const Json& one : set.solves)
+            if (one.at("problem") == set.problems.at(problem).at("problem") && one.at("tolerance") == tolerance &&
+                one.at("options").at("behaviour") == behaviour)
+                return one;
+        return Json();
+    };
+    EXPECT_FALSE(row(0, "slow", 1e-3).contains("skipped_after"));
+    for (const double tolerance : {1e-6, 1e-9}) {
+        const Json slow = row(0, "slow", tolerance);
+        EXPECT_EQ(slow.at("cause"), "time_limit");
+        EXPECT_EQ(slow.at("skipped_after"), 1e-3);
+        EXPECT_EQ(slow.at("message"), "not run: ended with time limit at 0.001 already");
+        EXPECT_TRUE(slow.at("error").is_null());
+        EXPECT_EQ(row(1, "slow", tolerance).at("cause"), "unsupported");  // refused once, whatever the tolerance
+        EXPECT_TRUE(row(1, "slow", tolerance).contains("skipped_after"));
+        for (const char* defect : {"crash", "lie"})  // each is looked at
+            EXPECT_FALSE(row(0, defect, tolerance).contains("skipped_after"));
+    }
+    EXPECT_NE(content_of(folder / "out" / "summary.md").find("misbehaving(behaviour=slow) (3, 2 of them not run)"),
+              std::string::npos);
+
+    // A suite that leaves none out runs those that were; the others are kept.
+    ASSERT_EQ(run_suite(suite(text + "skip_after_failure: false\n")).exit_code, 0);
+    set = results();
+    EXPECT_EQ(lines("solve"), 18U + 8U);
+    EXPECT_FALSE(row(0, "slow", 1e-9).contains("skipped_after"));
+    EXPECT_EQ(row(0, "slow", 1e-9).at("cause"), "time_limit");
+}
+
+TEST_F(BenchRun, LeavingOutIsMeasured) {
+    for (const char* scene : {"pendulum", "bouncing_ball"})
+        std::ofstream(folder / (std::string(scene) + ".yaml"))
+            << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes" / (std::string(scene) + ".yaml"));
+    const auto run =
+        run_suite(suite("leaving_out:\n"
+                        "  - {path: pendulum.yaml, end: 0.2}\n"
+                        "  - {path: bouncing_ball.yaml, end: 0.6}\n"
+                        "repeats: 1\n"));
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    const auto set = results();
+    ASSERT_EQ(set.leaving_out.size(), 2U);
+    const auto has = [](const Json& side, const std::string& part) {
+        return std::any_of(side.at("libraries").begin(), side.at("libraries").end(),
+                           [&](const Json& file) { return file.get<std::string>().find(part) != std::string::npos; });
+    };
+    for (const Json& row : set.leaving_out) {
+        EXPECT_EQ(row.at("as_is").at("status"), "finished") << row;
+        EXPECT_EQ(row.at("forced").at("status"), "finished") << row;
+        EXPECT_LT(row.at("forced").at("error").at("position"), 1e-5) << row;  // the same physics
+        EXPECT_TRUE(has(row.at("forced"), "delassus_collision"));
+    }
+    const Json &pendulum = set.leaving_out[0], &ball = set.leaving_out[1];
+    EXPECT_FALSE(has(pendulum.at("as_is"), "delassus_collision"));
+    EXPECT_FALSE(pendulum.at("left_out").empty());
+    EXPECT_GT(ball.at("as_is").at("totals").at("most_rows"), 0);
+    EXPECT_EQ(ball.at("forced").at("totals").at("most_rows").get<int>(),
+              3 * ball.at("as_is").at("totals").at("most_rows").get<int>());
+    EXPECT_NE(run.output.find("What leaving out saves"), std::string::npos);
+    // Nothing of it is run again.
+    EXPECT_NE(run_suite(folder / "suite.yaml").errors.find("2 runs were done before"), std::string::npos);
+}
+
 TEST_F(BenchRun, MemoryBeyondTheLimitIsKilledAndSaid) {
 #if defined(__SANITIZE_ADDRESS__)
     GTEST_SKIP() << "the address sanitizer itself takes more memory than the limit";

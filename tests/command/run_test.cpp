@@ -225,6 +225,29 @@ TEST(Plan, FreeBodyNeedsNoSolver) {
               (std::set<std::string>{"delassus_trajectory.so", "libhdf5"}));
 }
 
+class NothingLeftOut : public testing::TestWithParam<const char*> {};
+
+TEST_P(NothingLeftOut, LoadsWhatTheSceneCouldDoWithout) {
+    const auto plan =
+        Json::parse(run_command("plan --json --set leave_out=false " + scene(GetParam())).out).at("systems")[0];
+    std::set<std::string> planned = {"libfcl"};
+    for (const auto& library : plan.at("libraries")) planned.insert(library.get<std::string>());
+    EXPECT_TRUE(planned.contains("delassus_collision.so"));
+    EXPECT_EQ(plan.at("solvers").size(), 1U) << plan;
+    for (const auto& line : plan.at("left_out"))
+        for (const char* what : {"factorisation of H", "collision detection", "a solver", "2 of 3 rows"})
+            EXPECT_FALSE(line.at("what").get<std::string>().starts_with(what)) << line;
+    EXPECT_EQ(mapped("run --set leave_out=false " + scene(GetParam()) + " --end 0.05"), planned);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, NothingLeftOut, testing::Values("pendulum", "heavy_top", "bouncing_ball"));
+
+TEST(Run, LeaveOutIsTrueOrFalse) {
+    const auto run = run_command("run --set leave_out=perhaps " + scene("pendulum"));
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_NE(run.err.find("\"leave_out\" must be true or false"), std::string::npos) << run.err;
+}
+
 TEST(LeaveOut, SolvingAProblemMapsNeitherHdf5NorFcl) {
     EXPECT_EQ(mapped("solve " + example("box_stack") + " --solver apgd"), std::set<std::string>{"apgd.so"});
 }

@@ -62,6 +62,35 @@ TEST_F(StepSolverTest, CallsNoPluginWithoutRows) {
     EXPECT_TRUE(solver.loaded().empty());
 }
 
+TEST_F(StepSolverTest, LeavesNothingOutWhereThatIsAskedFor) {
+    BoxStackParameters parameters;
+    const Problem one = generate_box_stack(parameters);
+    const Problem both = beside(one, one);
+    StepSolver apart(registry, config("admm")), whole(registry, config("admm"));
+    whole.leave_nothing_out();
+    const auto parts = whole.parts(both);
+    ASSERT_EQ(parts.size(), 1U);
+    EXPECT_EQ(parts[0].structure, Structure::Definite);
+    EXPECT_EQ(apart.parts(both).size(), 2U);
+    Solution expected, solution;
+    ASSERT_TRUE(apart.solve(both, expected, false));
+    ASSERT_TRUE(whole.solve(both, solution, false));
+    EXPECT_EQ(whole.effort().plugin_solves, 1);
+    for (std::size_t i = 0; i < expected.x.size(); ++i) EXPECT_NEAR(solution.x[i], expected.x[i], 1e-8);
+
+    // auto takes a solver for cones, also where there is no row.
+    StepSolver general(registry, {});
+    general.leave_nothing_out();
+    Problem free;
+    free.H = tests::diagonal_matrix({2.0, 4.0});
+    free.a = {2.0, 8.0};
+    ASSERT_TRUE(general.solve(free, solution, false));
+    EXPECT_NEAR(solution.x[0], 1.0, 1e-12);
+    EXPECT_NEAR(solution.x[1], 2.0, 1e-12);
+    EXPECT_EQ(general.effort().plugin_solves, 1);
+    EXPECT_NE(general.parts(free)[0].needs & DELASSUS_CAN_FRICTION, 0U);
+}
+
 TEST_F(StepSolverTest, SolvesSeparateStacksApart) {
     BoxStackParameters parameters;
     const Problem one = generate_box_stack(parameters);

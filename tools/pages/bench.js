@@ -13,6 +13,7 @@
       results.solves.length === 0 ? "" : `${plural(solverLabels.length, "solver")} on ${plural(new Set(results.solves.map((row) => row.problem)).size, "problem")}: ` +
         `${asked.filter(solvedRow).length} of ${asked.length} runs solved, ${results.solves.length - asked.length} refused`,
       results.simulations.length === 0 ? "" : `${plural(results.simulations.length, "run")} of ${plural(results.scenes.length, "scene")}`,
+      results.leaving_out.length === 0 ? "" : `${plural(results.leaving_out.length, "scene")} with and without leaving out`,
       results.cells.length === 0 ? "" : `${results.cells.filter((cell) => cell.outcome === "correct").length} of ${plural(results.cells.length, "cell")} correct on ${results.axes.length} axes`,
     ].filter(Boolean).join("; ") + ".";
     const { settings, machine, build } = session;
@@ -59,6 +60,7 @@
   writeClasses();
   writeGrowth();
   writeScenes();
+  writeLeavingOut();
   writeProblems();
   writeFailures();
   writeReferences();

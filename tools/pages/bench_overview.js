@@ -52,6 +52,7 @@ function writeClasses() {
       grid.append(element("div", {}, element("h4", { textContent: `to ${short(at.tolerance)}, ${at.solved_by_any} of ${at.problems} solved by one at least` }), place));
       addChart(place, () => profileOption(at, title));
     }
+    writePair(one, made);
     if (grid.children.length === 0) made.append(element("p", { textContent: "No solver solved any of them." }));
   }
 }
@@ -93,17 +94,19 @@ function writeGrowth() {
 }
 
 function writeFailures() {
-  const failed = results.solves.filter((row) => row.cause && row.cause !== "unsupported")
+  const failed = results.solves.filter((row) => row.cause && row.cause !== "unsupported" && !skippedRow(row))
     .sort((a, b) => Number(b.cause === "false_claim") - Number(a.cause === "false_claim"));
   const causes = [...new Set(results.analysis.failures.map(({ cause }) => cause))].sort();
   const names = [...new Set(results.analysis.failures.map(({ solver }) => solver))];
   if (names.length === 0) return;
-  const count = (solver, cause) => results.analysis.failures.find((one) => one.solver === solver && one.cause === cause)?.count ?? "";
+  const find = (solver, cause) => results.analysis.failures.find((one) => one.solver === solver && one.cause === cause);
+  const count = (solver, cause) => find(solver, cause)?.count ?? "";
+  const counted = (one) => (one ? `${one.count}${one.skipped ? ` (${one.skipped} not run)` : ""}` : "");
   section("failures", "Failures",
     table(["solver", ...causes.map(spoken)], names.map((name) => ({
       className: count(name, "false_claim") ? "lie" : "",
-      cells: [[swatch(name), name], ...causes.map((cause) => String(count(name, cause)))] }))),
-    element("details", {}, element("summary", { textContent: `each of the ${failed.length} that are not refusals` }),
+      cells: [[swatch(name), name], ...causes.map((cause) => counted(find(name, cause)))] }))),
+    element("details", {}, element("summary", { textContent: `each of the ${failed.length} that were run and are not refusals` }),
       table(["solver", "problem", "cause", "asked for", "natural", "message"], failed.map((row) => ({
         className: row.cause === "false_claim" ? "lie" : "",
         cells: [row.label, `${problemOf[row.problem].name} (${row.law})`, statusMark(row), short(row.tolerance), error(row.error && row.error.natural),

@@ -2,11 +2,17 @@
 // A section for each problem and law: error against time, and the table of its runs.
 "use strict";
 
-// Along the solve, the least-tolerance run's curve; at the end, a point for each tolerance.
+// Along the solve, the curve of the run to the tightest tolerance; at the end, a point for each tolerance.
 const views = [
   { label: "natural error along the solve", measure: "natural", curve: true },
-  { label: "natural error at the end", measure: "natural", curve: false },
-  { label: "velocity error at the end", measure: "velocity", curve: false },
+  ...[
+    ["natural", "natural error"],
+    ["velocity", "velocity error, in the norm of the kinetic energy,"],
+    ["dual", "penetration and sliding against the cones (dual)"],
+    ["cone", "reactions beyond the friction cones (cone)"],
+    ["gap", "energy that contacts give or take (gap)"],
+    ["balance", "momentum balance"],
+  ].map(([measure, label]) => ({ label: `${label} at the end`, measure, curve: false })),
 ];
 
 function curveOf(row) {
@@ -32,10 +38,9 @@ const valueOf = (point) => point.value || point;
 
 function problemOption(rows, title, view, logarithmic) {
   const names = [...new Set(rows.map((row) => row.label))];
-  const tightest = Math.min(...rows.map((row) => row.tolerance));
   const all = names.map((name) => {
-    const own = rows.filter((row) => row.label === name);
-    return [name, view.curve ? own.filter((row) => row.tolerance === tightest).flatMap(curveOf) : endsOf(own, view.measure), own];
+    const own = rows.filter((row) => row.label === name); // one of them has samples, of the tightest tolerance it was run to
+    return [name, view.curve ? own.flatMap(curveOf) : endsOf(own, view.measure), own];
   }).filter(([, data]) => data.length > 0);
   const values = all.flatMap(([, data]) => data.map(valueOf));
   const time = decades(values.map((value) => value[0]));
@@ -44,10 +49,10 @@ function problemOption(rows, title, view, logarithmic) {
   return {
     ...baseOption(`${view.label} against time on ${title}`),
     xAxis: { ...(logarithmic ? { ...logAxis("solver’s own time [s]"), ...time, minorTick: { show: true } } : { ...linearAxis("solver’s own time [s]"), min: 0, max: last }) },
-    yAxis: { ...logAxis(view.measure + " error", 46), ...decades([...values.map((value) => value[1]), ...tolerances]) },
+    yAxis: { ...logAxis(`${view.measure} error`, 46), ...decades([...values.map((value) => value[1]), ...tolerances]) },
     series: [
       ...all.filter(([name]) => !hidden.has(name)).map(([name, data, own]) => {
-        const end = own.find((row) => row.tolerance === tightest);
+        const end = own.find((row) => row.curve.samples.length > 0);
         return lineSeries(name, data, view.curve ? {
           showSymbol: true, symbolSize: 3,
           endLabel: { show: true, formatter: end && end.cause ? `${name}: ${spoken(end.cause)}` : name, color: colourOf(name), fontSize: 11 },
@@ -110,13 +115,13 @@ function writeProblems() {
       axis.textContent = logarithmic ? "linear time" : "logarithmic time";
       draw();
     } });
-    const notes = taken.filter((row) => row.message).map((row) =>
+    const notes = taken.filter((row) => row.message && !skippedRow(row)).map((row) =>
       element("li", {}, element("b", { textContent: `${row.label}, ${short(row.tolerance)}: ` }), row.message));
     const made = section(`problem-${++number}`, title,
       element("p", { className: "facts", textContent:
         `n = ${whole(problem.n)}, m = ${whole(problem.m)}; ${cones ? `cones: ${cones}; ` : ""}law ${law}, H ${problem.structure}; content ${hash}; ${problem.from}` }));
     if (available.length > 0) {
-      made.append(element("div", { className: "tools" }, ...choice(available.map((one) => one.label), (k) => { view = k; draw(); }), axis), place);
+      made.append(element("div", { className: "tools" }, selectBox("error measure", available.map((one) => one.label), 0, (k) => { view = k; draw(); }), axis), place);
       addChart(place, () => problemOption(taken, title, available[view], logarithmic));
     }
     made.append(element("p", { className: "facts", textContent:

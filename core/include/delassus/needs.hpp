@@ -14,7 +14,7 @@
 
 namespace delassus {
 
-/// What H was found to be. Detected from its values, never declared.
+/// What H was found to be. Detected from its values, never declared; at most taken for a more general one.
 enum class Structure {
     Reduced,       ///< n = 0
     Diagonal,      ///< positive diagonal
@@ -40,7 +40,10 @@ class PreparedProblem {
 public:
     /// Throws InputError if the problem is not valid. Factors H once if it is neither diagonal nor block-diagonal, to
     /// learn whether it is definite.
-    DELASSUS_API explicit PreparedProblem(Problem problem);
+    ///
+    /// also_needs: DELASSUS_CAN_* bits that the problem is to have beyond its own, as one of a more general kind: of
+    /// cones, and H_DEFINITE, with which a diagonal or block-diagonal H counts as sparse and is factorised.
+    DELASSUS_API explicit PreparedProblem(Problem problem, std::uint64_t also_needs = 0);
     DELASSUS_API ~PreparedProblem();
     DELASSUS_API PreparedProblem(PreparedProblem&&) noexcept;
     DELASSUS_API PreparedProblem& operator=(PreparedProblem&&) noexcept;

@@ -64,6 +64,7 @@ struct SceneSystem {
     std::vector<std::int32_t> shape_material;     ///< of each of system->shapes()
     std::vector<std::array<BodyIndex, 2>> apart;  ///< pairs of bodies that never touch, the smaller index first
     std::vector<LeftOut> left_out;
+    bool leave_out = true;  ///< what the scene does not need; false: solved as if it needed everything
     bool surfaces_read = false, tetrahedra_read = false;  ///< from files: which modules the scene has loaded
 };
 
@@ -83,6 +84,7 @@ struct SceneOverrides {
     std::string integrator;           ///< likewise
     std::optional<double> step, end;  ///< s, for every system; a step takes the place of a tolerance
     std::optional<double> tolerance;  ///< for every system, in place of a fixed step
+    std::optional<bool> leave_out;    ///< for every system
 };
 
 /// Reads the whole scene and builds its systems. Throws InputError with file, line, key and the nearest valid key.

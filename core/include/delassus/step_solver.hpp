@@ -39,6 +39,11 @@ public:
     StepSolver(const StepSolver&) = delete;
     StepSolver& operator=(const StepSolver&) = delete;
 
+    /// Has every problem solved whole, with H factorised as a sparse matrix, problems without rows too, and with `auto`
+    /// by a solver that takes cones of every kind: what leaving out saves can be measured against that. Call it before
+    /// the first solve.
+    DELASSUS_API void leave_nothing_out();
+
     /// Solves the problem of a step. solution: the start if warm_start, then the result. Throws Unsupported if the
     /// configured solver cannot take the problem, InputError if the problem is not valid. A solve that does not reach
     /// its tolerance is counted in effort() and in the answer; the best iterate is in solution.
@@ -57,7 +62,7 @@ public:
         std::uint64_t needs = 0;                    ///< DELASSUS_CAN_* bits
     };
     /// The parts that solve() would make of the problem, in its order; nothing is loaded and nothing solved. Parts
-    /// with m = 0 go to no plugin.
+    /// with m = 0 go to no plugin, unless nothing is left out.
     [[nodiscard]] DELASSUS_API std::vector<Part> parts(const Problem& problem) const;
     /// The name of the plugin that takes problems with these needs: the configured one, whatever it can, or the one
     /// that `auto` starts with; empty if there is none.

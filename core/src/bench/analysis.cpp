@@ -97,7 +97,8 @@ Json analyse_class(const std::string& name, const Rows& rows, const Json& settin
     Json tolerances = Json::array();
     for (const auto& tolerance : settings.at("tolerances"))
         tolerances.push_back(analyse_tolerance(rows, tolerance.get<double>(), settings.at("time_limit").get<double>()));
-    return {{"name", name}, {"problems", distinct(rows, problem_of).size()}, {"tolerances", tolerances}};
+    const auto members = distinct(rows, problem_of);
+    return {{"name", name}, {"problems", members.size()}, {"members", members}, {"tolerances", tolerances}};
 }
 
 Json fit_json(const std::vector<double>& x, const std::vector<double>& y) {
@@ -187,14 +188,22 @@ Json analyse_orders(const std::vector<Json>& simulations, const std::vector<Json
     return list;
 }
 
-/// How often each solver failed for which cause, the worst first.
+/// How often each solver failed for which cause, and how many of those runs were left out.
 Json count_failures(const Rows& rows) {
-    std::map<std::pair<std::string, std::string>, int> counts;
-    for (const Json* row : rows)
-        if (!solved(*row)) ++counts[{row->at("label"), row->at("cause")}];
+    struct Count {
+        int all = 0, skipped = 0;
+    };
+    std::map<std::pair<std::string, std::string>, Count> counts;
+    for (const Json* row : rows) {
+        if (solved(*row)) continue;
+        Count& count = counts[{row->at("label"), row->at("cause")}];
+        ++count.all;
+        count.skipped += row->contains("skipped_after");
+    }
     Json list = Json::array();
     for (const auto& [what, count] : counts)
-        list.push_back({{"solver", what.first}, {"cause", what.second}, {"count", count}});
+        list.push_back(
+            {{"solver", what.first}, {"cause", what.second}, {"count", count.all}, {"skipped", count.skipped}});
     return list;
 }
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/ask.hpp"
 
+#include <fmt/format.h>
+
 #include <string_view>
+
+#include "delassus/error.hpp"
 
 namespace delassus::bench {
 
@@ -50,6 +54,60 @@ ChildResult ask(const WorkerSettings& worker, const Json& request, const std::fu
         return allowed;
     };
     return run_child(child);
+}
+
+void ask_for_facts(const WorkerSettings& worker, const Json& request, const std::string& what,
+                   const std::function<void(const std::string& event, const Json& line)>& hear) {
+    std::string failure;
+    bool done = false;
+    const auto child = ask(worker, request, [&](const Json& line) {
+        const std::string event = line.at("event");
+        if (event == "failed") {
+            failure = line.at("message");
+        } else {
+            hear(event, line);
+        }
+        done = done || event == "done";
+        return loading_limit;
+    });
+    if (!failure.empty()) throw InputError(failure);
+    if (child.cancelled) throw Error("interrupted while reading " + what);
+    if (done) return;
+    const auto line = last_line(child.errors);
+    throw InputError(
+        fmt::format("{} could not be read: the process that read it ended{}", what, line.empty() ? "" : ": " + line));
+}
+
+void judge_end(std::string& status, std::string& message, const ChildResult& child, const WorkerSettings& worker,
+               double time_limit, bool done, const std::string& reached) {
+    const bool complete = !status.empty() && done;
+    const std::string where = reached.empty() ? "" : " " + reached;
+    std::string ended, sentence;
+    if (child.over_memory) {
+        ended = "memory";
+        sentence = fmt::format("took more than its {} MiB{}; killed", worker.resident_limit >> 20, where);
+    } else if (child.timed_out) {
+        ended = "hung";
+        sentence = complete ? "did not end after its last run and was killed"
+                            : fmt::format("gave no sign for {:.3g} s (time limit and grace){}; killed",
+                                          time_limit + grace_of(time_limit), where);
+    } else if (child.cancelled) {
+        if (!status.empty()) return;
+        ended = "cancelled";
+        sentence = "interrupted" + where;
+    } else if (child.signal != 0 || !done) {
+        ended = "crashed";
+        sentence =
+            (child.signal != 0 ? signal_name(child.signal)
+                               : fmt::format("left its process with exit code {}", child.exit_code.value_or(0))) +
+            (done ? " when its process ended" : where);
+        if (const auto line = last_line(child.errors); !line.empty()) sentence += ": " + line;
+    } else {
+        return;
+    }
+    append(message, sentence);
+    // A result that was complete stays one, and says what happened afterwards.
+    if (!complete || child.over_memory) status = ended;
 }
 
 std::string status_of_failure(const std::string& kind) {

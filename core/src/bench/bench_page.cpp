@@ -24,18 +24,19 @@ Json thinned(const Json& samples) {
     return kept;
 }
 
-/// The rows, curves thinned and kept only at the tightest tolerance of each solver on each problem.
+/// The rows, curves thinned and kept only at the tightest tolerance that each solver was run to on each problem.
 std::vector<Json> page_rows(std::vector<Json> rows) {
     const auto run_of = [](const Json& row) { return Json{row.at("problem"), row.at("law"), row.at("label")}.dump(); };
     std::map<std::string, double> tightest;
     for (const Json& row : rows) {
+        if (row.contains("skipped_after")) continue;
         const auto tolerance = row.at("tolerance").get<double>();
         const auto [entry, added] = tightest.emplace(run_of(row), tolerance);
         if (!added) entry->second = std::min(entry->second, tolerance);
     }
     for (Json& row : rows) {
         Json& samples = row["curve"]["samples"];
-        const bool shown = row.at("tolerance").get<double>() == tightest.at(run_of(row));
+        const bool shown = !row.contains("skipped_after") && row.at("tolerance") == tightest.at(run_of(row));
         samples = shown ? thinned(samples) : Json::array();
     }
     return rows;
@@ -53,6 +54,7 @@ std::string bench_page(const ResultSet& results, const Json& analysis) {
                        {"scenes", results.scenes},
                        {"solves", page_rows(results.solves)},
                        {"simulations", results.simulations},
+                       {"leaving_out", results.leaving_out},
                        {"axes", results.axes},
                        {"cells", results.cells},
                        {"missing", results.missing},

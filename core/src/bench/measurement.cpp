@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "bench/ask.hpp"
-#include "delassus/error.hpp"
 
 namespace delassus::bench {
 
@@ -24,37 +23,6 @@ std::string reached(const Measurement& row) {
     const CurveSample& last = row.curve.back();
     return fmt::format("after iteration {}, natural error {:.2e}, {:.3g} s", last.iteration, last.natural,
                        last.seconds);
-}
-
-/// How the process ended, where that tells more than what it said.
-void judge_end(Measurement& row, const ChildResult& child, double time_limit, std::uint64_t resident_limit, bool done) {
-    const bool has_result = !row.status.empty();
-    std::string sentence;
-    std::string status;
-    if (child.over_memory) {
-        status = "memory";
-        sentence = fmt::format("took more than its {} MiB {}; killed", resident_limit >> 20, reached(row));
-    } else if (child.timed_out) {
-        status = "hung";
-        sentence = has_result && done ? "did not end after its last run and was killed"
-                                      : fmt::format("gave no sign for {:.3g} s (time limit and grace) {}; killed",
-                                                    time_limit + grace_of(time_limit), reached(row));
-    } else if (child.cancelled && !has_result) {
-        row.status = "cancelled";
-        row.message = "interrupted " + reached(row);
-        return;
-    } else if (child.signal != 0 && !child.cancelled) {
-        status = "crashed";
-        sentence = fmt::format("{} {}", signal_name(child.signal), done ? "when its process ended" : reached(row));
-    } else if (!done && !child.cancelled) {
-        status = "crashed";
-        sentence = fmt::format("left its process with exit code {} {}", child.exit_code.value_or(0), reached(row));
-    }
-    if (status.empty()) return;
-    if (const auto line = last_line(child.errors); !line.empty() && status == "crashed") sentence += ": " + line;
-    append(row.message, sentence);
-    // A result that was complete stays one, and says what happened afterwards.
-    if (!has_result || !done || child.over_memory) row.status = status;
 }
 
 }  // namespace
@@ -151,7 +119,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
         return loading_limit;
     };
     const ChildResult child = ask(worker, question, hear);
-    judge_end(row, child, settings.time_limit, worker.resident_limit, done);
+    judge_end(row.status, row.message, child, worker, settings.time_limit, done, reached(row));
     row.peak_memory = child.peak_memory;
     for (const Repeat& repeat : row.repeats) {
         const bool first = &repeat == &row.repeats.front();
@@ -163,22 +131,13 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
 
 ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem, const std::string& law) {
     ProblemFacts facts;
-    std::string failure;
-    bool done = false;
-    const auto child = ask(worker, problem_fields("describe", problem, law), [&](const Json& line) {
-        const std::string event = line.at("event");
-        if (event == "problem") {
-            facts = {line.at("name"), line.at("law"),   line.at("structure"), line.at("n"), line.at("m"), {},
-                     line.at("hash"), line.at("source")};
-            for (const auto& [kind, count] : line.at("cones").items()) facts.cones.emplace_back(kind, count);
-        }
-        if (event == "failed") failure = line.at("message");
-        done = done || event == "done";
-        return loading_limit;
-    });
-    if (!failure.empty()) throw InputError(failure);
-    if (child.cancelled) throw Error("interrupted while reading " + problem.text());
-    if (!done) throw InputError(fmt::format("{} could not be read: the process that read it ended", problem.text()));
+    ask_for_facts(worker, problem_fields("describe", problem, law), problem.text(),
+                  [&](const std::string& event, const Json& line) {
+                      if (event != "problem") return;
+                      facts = {line.at("name"), line.at("law"),   line.at("structure"), line.at("n"), line.at("m"), {},
+                               line.at("hash"), line.at("source")};
+                      for (const auto& [kind, count] : line.at("cones").items()) facts.cones.emplace_back(kind, count);
+                  });
     return facts;
 }
 

@@ -68,7 +68,7 @@ ResultSet read_results(const fs::path& folder) {
         throw InputError(fmt::format("{} holds no {}: it is not a folder that `delassus bench run` wrote",
                                      folder.string(), file_name));
     ResultSet set;
-    std::map<std::string, Json> solves, simulations, cells;
+    std::map<std::string, Json> solves, simulations, leaving_out, cells;
     std::vector<Json> axes;
     for (const Json& row : read_lines(file).rows) {
         const std::string kind = row.at("kind");
@@ -81,6 +81,7 @@ ResultSet read_results(const fs::path& folder) {
         if (kind == "axis") replace_or_add(axes, row, {"axis"});
         if (kind == "cell") cells[row.at("key")] = row;
         if (kind == "simulation") simulations[row.at("key")] = row;
+        if (kind == "leaving_out") leaving_out[row.at("key")] = row;
     }
     if (set.session.is_null()) throw InputError(fmt::format("{} is empty: nothing has been run yet", file.string()));
     for (const auto& key : set.session.at("keys")) {
@@ -88,6 +89,8 @@ ResultSet read_results(const fs::path& folder) {
             set.solves.push_back(solve->second);
         } else if (const auto simulation = simulations.find(key); simulation != simulations.end()) {
             set.simulations.push_back(simulation->second);
+        } else if (const auto scene = leaving_out.find(key); scene != leaving_out.end()) {
+            set.leaving_out.push_back(scene->second);
         } else if (const auto cell = cells.find(key); cell != cells.end()) {
             set.cells.push_back(cell->second);
         } else {
@@ -104,8 +107,7 @@ ResultSet read_results(const fs::path& folder) {
 ResultsFile::ResultsFile(const fs::path& folder) : file_(folder / file_name) {
     if (!fs::exists(file_)) return;
     const Lines lines = read_lines(file_);
-    for (const Json& row : lines.rows)
-        if (row.contains("key")) keys_[row.at("key")] = true;
+    for (const Json& row : lines.rows) note(row);
     std::error_code failure;
     fs::resize_file(file_, lines.complete, failure);
     if (failure) throw InputError(fmt::format("{} cannot be written: {}", file_.string(), failure.message()));
@@ -115,7 +117,12 @@ void ResultsFile::add(const Json& row) {
     std::ofstream stream(file_, std::ios::binary | std::ios::app);
     stream << text_of(row) << '\n' << std::flush;
     if (!stream) throw InputError(fmt::format("{} cannot be written", file_.string()));
-    if (row.contains("key")) keys_[row.at("key")] = true;
+    note(row);
+}
+
+void ResultsFile::note(const Json& row) {
+    if (row.contains("key"))
+        ends_[row.at("key")] = {row.value("status", ""), row.value("cause", ""), row.contains("skipped_after")};
 }
 
 }  // namespace delassus::bench

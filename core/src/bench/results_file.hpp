@@ -14,17 +14,23 @@ namespace delassus::bench {
 /// What a results file holds, as of its last session: rows that this session did not ask for are left out, and of rows
 /// with the same key the last counts.
 struct ResultSet {
-    Json session;                                       ///< the last; null if the file holds none
-    std::vector<Json> problems, references, libraries;  ///< of all sessions, the last of the same name
-    std::vector<Json> scenes;                           ///< with their plans
-    std::vector<Json> axes;                             ///< that the session's cells are of
-    std::vector<Json> solves, simulations, cells;       ///< in the order of the session's keys
-    std::size_t missing = 0;                            ///< keys without a row: the session was interrupted
+    Json session;                                               ///< the last; null if the file holds none
+    std::vector<Json> problems, references, libraries;          ///< of all sessions, the last of the same name
+    std::vector<Json> scenes;                                   ///< with their plans
+    std::vector<Json> axes;                                     ///< that the session's cells are of
+    std::vector<Json> solves, simulations, leaving_out, cells;  ///< in the order of the session's keys
+    std::size_t missing = 0;                                    ///< keys without a row: the session was interrupted
 };
 
 /// Throws InputError if the folder has no results.jsonl, or one of another format or version. A last line that is
 /// incomplete is dropped.
 [[nodiscard]] ResultSet read_results(const std::filesystem::path& folder);
+
+/// How the run of a solver ended, as its row says.
+struct RunEnd {
+    std::string status, cause;  ///< cause: empty if solved
+    bool skipped = false;       ///< it was not run, as it had failed at a looser tolerance
+};
 
 /// Appends rows; a row is in the file when add() returns.
 class ResultsFile {
@@ -33,12 +39,16 @@ public:
     /// file of another format or version.
     explicit ResultsFile(const std::filesystem::path& folder);
 
-    [[nodiscard]] bool has(const std::string& key) const { return keys_.contains(key); }
+    [[nodiscard]] bool has(const std::string& key) const { return ends_.contains(key); }
+    /// Of the last row with that key, which there must be.
+    [[nodiscard]] const RunEnd& end_of(const std::string& key) const { return ends_.at(key); }
     void add(const Json& row);
 
 private:
+    void note(const Json& row);
+
     std::filesystem::path file_;
-    std::map<std::string, bool> keys_;
+    std::map<std::string, RunEnd> ends_;
 };
 
 }  // namespace delassus::bench

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/rows.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 
 namespace delassus::bench {
@@ -65,15 +68,26 @@ Json solve_row(const std::string& key, const std::string& problem, const std::st
     return json;
 }
 
-Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
-                    const SimulationMeasurement& row) {
-    return {{"kind", "simulation"},
-            {"key", key},
-            {"scene", scene},
-            {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
-            {"step", request.step},
-            {"solver", request.solver},
-            {"status", row.status},
+Json skipped_row(const std::string& key, const std::string& problem, const std::string& law, double tolerance,
+                 const SolverConfig& solver, const RunEnd& end, double looser) {
+    Measurement row;
+    row.label = label_of(solver);
+    row.solver = solver.name;
+    row.options = solver.options;
+    row.status = end.status;
+    std::string spoken = end.status;
+    std::replace(spoken.begin(), spoken.end(), '_', ' ');
+    row.message = fmt::format("not run: ended with {} at {:g} already", spoken, looser);
+    Json json = solve_row(key, problem, law, tolerance, row);
+    json["cause"] = end.cause;
+    json["skipped_after"] = looser;
+    return json;
+}
+
+namespace {
+
+Json json_of(const SimulationMeasurement& row) {
+    return {{"status", row.status},
             {"cause", cause_of(row)},
             {"message", row.message},
             {"seconds",
@@ -81,6 +95,38 @@ Json simulation_row(const std::string& key, const std::string& scene, const Simu
             {"error", {{"position", json_number(row.position)}, {"velocity", json_number(row.velocity)}}},
             {"totals", row.totals},
             {"peak_memory", row.peak_memory}};
+}
+
+}  // namespace
+
+Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
+                    const SimulationMeasurement& row) {
+    Json json = {
+        {"kind", "simulation"}, {"key", key},
+        {"scene", scene},       {"timestepper", request.timestepper.empty() ? "the scene's own" : request.timestepper},
+        {"step", request.step}, {"solver", request.solver}};
+    json.update(json_of(row));
+    return json;
+}
+
+Json leaving_out_row(const std::string& key, const SuiteScene& scene, const SceneFacts& facts,
+                     const SimulationMeasurement& as_is, const SimulationMeasurement& forced) {
+    Json row = {{"kind", "leaving_out"},
+                {"key", key},
+                {"scene", facts.hash},
+                {"name", scene.name},
+                {"title", facts.title},
+                {"file", std::filesystem::absolute(scene.source.file).lexically_normal().string()},
+                {"set", Json(scene.source.settings)},
+                {"end", facts.end},
+                {"left_out", Json::array()}};
+    for (const Json& system : facts.plan)
+        for (const Json& line : system.at("left_out")) row["left_out"].push_back(line);
+    for (const auto& [name, run] : {std::pair("as_is", &as_is), std::pair("forced", &forced)}) {
+        row[name] = json_of(*run);
+        row[name]["libraries"] = run->libraries;
+    }
+    return row;
 }
 
 }  // namespace delassus::bench

@@ -6,6 +6,7 @@
 
 #include "bench/json_text.hpp"
 #include "bench/results.hpp"
+#include "bench/results_file.hpp"
 #include "bench/scene_measurement.hpp"
 #include "bench/suite.hpp"
 
@@ -29,6 +30,13 @@ inline constexpr int rows_version = 1;
 /// tolerance: what was asked for. problem: its hash.
 [[nodiscard]] Json solve_row(const std::string& key, const std::string& problem, const std::string& law,
                              double tolerance, const Measurement& row);
+/// The row of a run that was left out, as the same solver with the same options ended that way at a looser tolerance.
+[[nodiscard]] Json skipped_row(const std::string& key, const std::string& problem, const std::string& law,
+                               double tolerance, const SolverConfig& solver, const RunEnd& end, double looser);
+/// as_is, forced: of the scene as it is, and of the same with nothing left out, whose end is compared with the
+/// former's.
+[[nodiscard]] Json leaving_out_row(const std::string& key, const SuiteScene& scene, const SceneFacts& facts,
+                                   const SimulationMeasurement& as_is, const SimulationMeasurement& forced);
 [[nodiscard]] Json simulation_row(const std::string& key, const std::string& scene, const SimulateRequest& request,
                                   const SimulationMeasurement& row);
 

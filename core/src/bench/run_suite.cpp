@@ -11,9 +11,11 @@
 #include "bench/reference.hpp"
 #include "bench/rows.hpp"
 #include "bench/scene_dumps.hpp"
+#include "bench/scratch_folder.hpp"
 #include "bench/tasks.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
+#include "solver/auto_solver.hpp"
 #include "support/library_location.hpp"
 #include "support/text_file.hpp"
 
@@ -23,11 +25,20 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// Whether a solver that ended for this cause is taken to do so at every tighter tolerance. Crashes, false claims and
+/// errors are defects: each is run, to be seen.
+bool fails_again(const std::string& cause) {
+    static const std::set<std::string> causes = {"unsupported", "iteration_limit", "time_limit", "memory",
+                                                 "diverged",    "stalled",         "infeasible", "numerical_failure"};
+    return causes.contains(cause);
+}
+
 Json session_row(const RunPlan& plan, const Tasks& tasks, const std::vector<CellTask>& cells, const std::string& code) {
     const Suite& suite = plan.suite;
     Json keys = Json::array(), solvers = Json::array();
     for (const auto& task : tasks.solves) keys.push_back(task.key);
     for (const auto& task : tasks.simulations) keys.push_back(task.key);
+    for (const auto& task : tasks.leaving_out) keys.push_back(task.key);
     for (const auto& task : cells) keys.push_back(task.key);
     for (const auto& solver : suite.solvers) solvers.push_back(label_of(solver));
     return {{"kind", "session"},
@@ -51,7 +62,8 @@ Json session_row(const RunPlan& plan, const Tasks& tasks, const std::vector<Cell
               {"time_limit", suite.time_limit},
               {"memory_limit", suite.memory_limit > 0.0 ? Json(suite.memory_limit) : Json(nullptr)},
               {"max_iterations", suite.max_iterations},
-              {"repeats", suite.repeats}}},
+              {"repeats", suite.repeats},
+              {"skip_after_failure", suite.skip_after_failure}}},
             {"solvers", solvers},
             {"left_out", suite.left_out},
             {"keys", keys}};
@@ -62,17 +74,23 @@ public:
     SuiteRun(const RunPlan& plan, const RunListener& listener, const Tasks& tasks, const std::vector<CellTask>& cells,
              std::string code, ResultsFile& file)
         : plan_(plan), listener_(listener), tasks_(tasks), cells_(cells), code_(std::move(code)), file_(file) {
-        for (const auto& task : tasks.solves) total_ += !file.has(task.key);
+        for (const auto& task : tasks.solves) total_ += !done(task);
         for (const auto& task : tasks.simulations) total_ += !file.has(task.key);
+        for (const auto& task : tasks.leaving_out) total_ += !file.has(task.key);
         for (const auto& cell : cells) total_ += !file.has(cell.key);
-        counts_.skipped = tasks.solves.size() + tasks.simulations.size() + cells.size() - total_;
+        counts_.skipped =
+            tasks.solves.size() + tasks.simulations.size() + tasks.leaving_out.size() + cells.size() - total_;
     }
 
     RunCounts run() {
-        for (const auto& task : tasks_.solves)
-            if (!stopped() && !file_.has(task.key)) solve(task);
+        for (const auto& task : tasks_.solves) {
+            if (stopped()) break;
+            if (!done(task) && !skip(task)) solve(task);
+        }
         for (const auto& task : tasks_.simulations)
             if (!stopped() && !file_.has(task.key)) step(task);
+        for (const auto& task : tasks_.leaving_out)
+            if (!stopped() && !file_.has(task.key)) leave_out(task);
         for (const auto& cell : cells_)
             if (!stopped() && !file_.has(cell.key)) fill(cell);
         counts_.interrupted = stopped();
@@ -84,6 +102,31 @@ private:
 
     void begin(const std::string& what) const {
         if (listener_.on_begin) listener_.on_begin(what, counts_.done + 1, total_);
+    }
+
+    /// A row that says that its run was left out does not stand for it in a suite that leaves none out.
+    [[nodiscard]] bool done(const SolveTask& task) const {
+        return file_.has(task.key) && (plan_.suite.skip_after_failure || !file_.end_of(task.key).skipped);
+    }
+
+    /// Tasks of a problem, a law and a solver follow one another, the loosest tolerance first, so that the one that
+    /// tells is the one before. Of a chain of those left out, the looser one that did run is named.
+    bool skip(const SolveTask& task) {
+        if (!plan_.suite.skip_after_failure) return false;
+        const auto index = static_cast<std::size_t>(&task - tasks_.solves.data());
+        const SolverConfig& solver = plan_.suite.solvers[task.solver];
+        if (solver.name == auto_name) return false;  // another tolerance may be another solver
+        const SolveTask* before = nullptr;
+        for (std::size_t k = index; k-- > 0 && !before;) {
+            const SolveTask& other = tasks_.solves[k];
+            if (other.problem != task.problem || other.law != task.law || other.solver != task.solver) break;
+            if (file_.has(other.key) && !file_.end_of(other.key).skipped) before = &other;
+        }
+        if (!before || !fails_again(file_.end_of(before->key).cause)) return false;
+        file_.add(skipped_row(task.key, tasks_.problems[task.problem].facts.hash, task.law, task.tolerance, solver,
+                              file_.end_of(before->key), before->tolerance));
+        ++counts_.done;
+        return true;
     }
 
     void solve(const SolveTask& task) {
@@ -130,6 +173,26 @@ private:
         const SimulationMeasurement row = simulate(plan_.worker, request);
         if (stopped()) return;
         file_.add(simulation_row(task.key, scene.facts.hash, request, row));
+        ++counts_.done;
+    }
+
+    void leave_out(const LeavingOutTask& task) {
+        const ScratchFolder scratch;
+        SimulateRequest request;
+        request.scene = task.entry.source;
+        request.time_limit = plan_.suite.time_limit;
+        request.repeats = plan_.suite.repeats;
+        request.state = scratch.path() / "state.json";
+        begin(task.entry.name + "  as it is");
+        const SimulationMeasurement as_is = simulate(plan_.worker, request);
+        if (stopped()) return;
+        begin(task.entry.name + "  nothing left out");
+        request.scene.forced = true;
+        if (std::filesystem::exists(request.state)) request.reference = request.state;
+        request.state.clear();
+        const SimulationMeasurement forced = simulate(plan_.worker, request);
+        if (stopped()) return;
+        file_.add(leaving_out_row(task.key, task.entry, task.facts, as_is, forced));
         ++counts_.done;
     }
 
@@ -191,7 +254,7 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
     add_dumped_problems(plan.worker, plan.output / "problems", plan.suite);
     const Tasks tasks = make_tasks(plan.suite, plan.worker, code);
     const std::vector<CellTask> cells = make_cells(plan.suite, code);
-    if (tasks.solves.empty() && tasks.simulations.empty() && cells.empty())
+    if (tasks.solves.empty() && tasks.simulations.empty() && tasks.leaving_out.empty() && cells.empty())
         throw InputError(fmt::format("{} asks for no run: {}", plan.suite.file.string(),
                                      plan.suite.left_out.empty() ? "it names no solver" : plan.suite.left_out.front()));
 

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/scene_measurement.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "bench/ask.hpp"
-#include "delassus/error.hpp"
 
 namespace delassus::bench {
 
@@ -17,58 +14,28 @@ Json scene_fields(const char* task, const WorkerSettings& worker, const SceneSou
                    {"scene", std::filesystem::absolute(scene.file).string()},
                    {"settings", Json(scene.settings)},
                    {"end", scene.end},
+                   {"forced", scene.forced},
                    {"plugin_path", Json::array()}};
     for (const auto& folder : worker.plugin_path) fields["plugin_path"].push_back(folder.string());
     return fields;
-}
-
-/// How the process ended, where that tells more than what it said.
-void judge_end(SimulationMeasurement& row, const ChildResult& child, const WorkerSettings& worker, bool done) {
-    if (child.over_memory) {
-        row.status = "memory";
-        append(row.message, fmt::format("took more than its {} MiB", worker.resident_limit >> 20));
-    } else if (child.timed_out) {
-        row.status = "hung";
-        append(row.message, "gave no sign beyond its time limit and was killed");
-    } else if (child.cancelled) {
-        row.status = "cancelled";
-    } else if (child.signal != 0 || !done) {
-        row.status = "crashed";
-        append(row.message, child.signal != 0 ? signal_name(child.signal)
-                                              : fmt::format("left with exit code {}", child.exit_code.value_or(0)));
-        if (const auto line = last_line(child.errors); !line.empty()) append(row.message, line);
-    }
 }
 
 }  // namespace
 
 SceneFacts describe_scene(const WorkerSettings& worker, const SceneSource& scene) {
     SceneFacts facts;
-    std::string failure;
-    bool done = false;
-    const auto child = ask(worker, scene_fields("plan", worker, scene), [&](const Json& line) {
-        const std::string event = line.at("event");
-        if (event == "scene") {
-            facts.hash = line.at("hash");
-            facts.title = line.at("title");
-            facts.step = line.at("step");
-            facts.end = line.at("end");
-            facts.integrator = line.at("integrator");
-        } else if (event == "plan") {
-            facts.plan = line.at("systems");
-        } else if (event == "failed") {
-            failure = line.at("message");
-        }
-        done = done || event == "done";
-        return loading_limit;
-    });
-    if (!failure.empty()) throw InputError(failure);
-    if (child.cancelled) throw Error("interrupted while reading " + scene.file.string());
-    if (!done) {
-        const auto line = last_line(child.errors);
-        throw InputError(fmt::format("{} could not be planned: the process that did ended{}", scene.file.string(),
-                                     line.empty() ? "" : ": " + line));
-    }
+    ask_for_facts(worker, scene_fields("plan", worker, scene), scene.file.string(),
+                  [&](const std::string& event, const Json& line) {
+                      if (event == "scene") {
+                          facts.hash = line.at("hash");
+                          facts.title = line.at("title");
+                          facts.step = line.at("step");
+                          facts.end = line.at("end");
+                          facts.integrator = line.at("integrator");
+                      } else if (event == "plan") {
+                          facts.plan = line.at("systems");
+                      }
+                  });
     return facts;
 }
 
@@ -122,7 +89,7 @@ SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateReque
         }
         return loading_limit;
     });
-    judge_end(row, child, worker, done);
+    judge_end(row.status, row.message, child, worker, request.time_limit, done, {});
     row.peak_memory = child.peak_memory;
     return row;
 }

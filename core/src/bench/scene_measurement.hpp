@@ -18,6 +18,7 @@ struct SceneSource {
     std::filesystem::path file;
     std::map<std::string, std::string> settings;  ///< paths of keys to values in YAML, as `delassus run --set`
     double end = -1.0;                            ///< s; negative: the file's
+    bool forced = false;                          ///< solved as if the scene needed everything: `leave_out: false`
 };
 
 /// What a scene is before it runs.
@@ -50,7 +51,7 @@ struct SimulationMeasurement {
     double setup = unknown, seconds = unknown;      ///< s, the least of the repeats
     std::vector<double> repeats;                    ///< s of stepping of each
     double position = unknown, velocity = unknown;  ///< distance of the end from the reference's, relative (docs)
-    Json totals = Json::object();   ///< steps, Newton and solver iterations, energy, drift, penetration, …
+    Json totals = Json::object();   ///< steps, most rows of a problem, iterations, energy, drift, penetration, …
     Json watched = Json::object();  ///< measures of scenes (suite_axis.hpp), and "place" of the body
     std::int64_t peak_memory = 0;   ///< bytes resident
     std::vector<std::string> libraries;

@@ -35,6 +35,7 @@ SceneOverrides overrides_of(const Json& request) {
     overrides.integrator = request.value("timestepper", std::string());
     if (request.value("step", 0.0) > 0.0) overrides.step = request.at("step").get<double>();
     if (request.value("end", -1.0) >= 0.0) overrides.end = request.at("end").get<double>();
+    if (request.value("forced", false)) overrides.leave_out = false;
     return overrides;
 }
 
@@ -140,6 +141,13 @@ public:
 
     [[nodiscard]] const std::vector<Simulation>& simulations() const { return simulations_; }
 
+    /// Has run() look for the largest number of rows of a problem.
+    void count_rows() {
+        for (auto& simulation : simulations_)
+            simulation.solver().on_problem = [this](const Problem& problem) { rows_ = std::max(rows_, problem.m()); };
+    }
+    [[nodiscard]] std::int32_t rows() const { return rows_; }
+
     /// The systems' states at the end, with the extents.
     [[nodiscard]] Json state() const {
         Json systems = Json::array();
@@ -202,6 +210,7 @@ private:
     std::vector<Simulation> simulations_;
     Run run_;
     double time_limit_ = 0.0;
+    std::int32_t rows_ = 0;
 };
 
 /// Sums and extremes over the systems.
@@ -283,8 +292,10 @@ void simulate(const Channel& channel, const Json& request) {
         SceneRun first = prepare();
         const auto body = request.at("body").get<std::string>();
         if (!body.empty()) static_cast<void>(first.place(body));
+        first.count_rows();
         const Run run = first.run(!state_file.empty(), request.at("watch").get<bool>());
         Json answer = totals_of(first.simulations());
+        answer["most_rows"] = first.rows();
         answer["status"] = run.status;
         answer["message"] = run.message;
         answer["setup"] = run.setup;

@@ -86,30 +86,33 @@ void read_references(const Source& source, const YAML::Node& node, SuiteReferenc
               {"time_limit", [&](const YAML::Node& n) { references.time_limit = positive(source, n, "time_limit"); }}});
 }
 
-SuiteScene read_scene_item(const Source& source, const YAML::Node& item) {
+/// timesteppers: whether the scene is for comparing them, and has keys for that.
+SuiteScene read_scene_item(const Source& source, const YAML::Node& item, bool timesteppers) {
     SuiteScene scene;
     if (item.IsScalar()) {
         scene.source.file = suite_path(source, item.Scalar());
     } else {
-        read_map(
-            source, item, "a scene of the suite",
-            {{"path", [&](const YAML::Node& n) { scene.source.file = suite_path(source, scalar(source, n, "path")); }},
-             {"name", [&](const YAML::Node& n) { scene.name = scalar(source, n, "name"); }},
-             {"set", [&](const YAML::Node& n) { scene.source.settings = read_options(source, n); }},
-             {"end", [&](const YAML::Node& n) { scene.source.end = positive(source, n, "end"); }},
-             {"steps", [&](const YAML::Node& n) { scene.steps = positive_list(source, n, "steps"); }},
-             {"timesteppers", [&](const YAML::Node& n) { scene.timesteppers = read_timesteppers(source, n); }},
-             {"reference", [&](const YAML::Node& n) {
-                  read_map(
-                      source, n, "\"reference\"",
-                      {{"timestepper",
-                        [&](const YAML::Node& t) {
-                            const auto [name, options] =
-                                parse_name_with_options(scalar(source, t, "timestepper"), "timestepper");
-                            scene.reference_timestepper = timestepper_text(source, t, name, options);
-                        }},
-                       {"step", [&](const YAML::Node& t) { scene.reference_step = positive(source, t, "step"); }}});
-              }}});
+        std::vector<std::pair<std::string_view, Handler>> keys = {
+            {"path", [&](const YAML::Node& n) { scene.source.file = suite_path(source, scalar(source, n, "path")); }},
+            {"name", [&](const YAML::Node& n) { scene.name = scalar(source, n, "name"); }},
+            {"set", [&](const YAML::Node& n) { scene.source.settings = read_options(source, n); }},
+            {"end", [&](const YAML::Node& n) { scene.source.end = positive(source, n, "end"); }}};
+        if (timesteppers) {
+            keys.emplace_back("steps", [&](const YAML::Node& n) { scene.steps = positive_list(source, n, "steps"); });
+            keys.emplace_back("timesteppers",
+                              [&](const YAML::Node& n) { scene.timesteppers = read_timesteppers(source, n); });
+            keys.emplace_back("reference", [&](const YAML::Node& n) {
+                read_map(source, n, "\"reference\"",
+                         {{"timestepper",
+                           [&](const YAML::Node& t) {
+                               const auto [name, options] =
+                                   parse_name_with_options(scalar(source, t, "timestepper"), "timestepper");
+                               scene.reference_timestepper = timestepper_text(source, t, name, options);
+                           }},
+                          {"step", [&](const YAML::Node& t) { scene.reference_step = positive(source, t, "step"); }}});
+            });
+        }
+        read_map(source, item, "a scene of the suite", keys);
     }
     if (scene.source.file.empty()) source.refuse(item, "a scene of the suite needs its \"path\"");
     if (!fs::is_regular_file(scene.source.file))
@@ -182,11 +185,26 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                       each(source, n, "laws", [&](const YAML::Node& l) { suite.laws.push_back(law_text(source, l)); });
                   }
               }},
-             {"tolerances", [&](const YAML::Node& n) { suite.tolerances = positive_list(source, n, "tolerances"); }},
+             {"tolerances",
+              [&](const YAML::Node& n) {
+                  auto& tolerances = suite.tolerances = positive_list(source, n, "tolerances");
+                  std::sort(tolerances.rbegin(), tolerances.rend());
+                  tolerances.erase(std::unique(tolerances.begin(), tolerances.end()), tolerances.end());
+              }},
+             {"skip_after_failure",
+              [&](const YAML::Node& n) {
+                  suite.skip_after_failure = value<bool>(source, n, "skip_after_failure", "true or false");
+              }},
              {"scenes",
               [&](const YAML::Node& n) {
                   each(source, n, "scenes",
-                       [&](const YAML::Node& item) { suite.scenes.push_back(read_scene_item(source, item)); });
+                       [&](const YAML::Node& item) { suite.scenes.push_back(read_scene_item(source, item, true)); });
+              }},
+             {"leaving_out",
+              [&](const YAML::Node& n) {
+                  each(source, n, "leaving_out", [&](const YAML::Node& item) {
+                      suite.leaving_out.push_back(read_scene_item(source, item, false));
+                  });
               }},
              {"timesteppers", [&](const YAML::Node& n) { suite.timesteppers = read_timesteppers(source, n); }},
              {"steps", [&](const YAML::Node& n) { suite.steps = positive_list(source, n, "steps"); }},
@@ -225,7 +243,7 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                   if (suite.max_iterations < 0) source.refuse(n, "\"max_iterations\" must not be negative");
               }}});
         if (suite.problems.empty() && suite.dumps.empty() && suite.scenes.empty() && suite.axes.empty() &&
-            suite.left_out.empty())
+            suite.leaving_out.empty() && suite.left_out.empty())
             throw InputError(
                 fmt::format("{} has neither problems nor scenes nor axes: there is nothing to run", file.string()));
     } catch (const YAML::Exception& error) {
@@ -256,6 +274,7 @@ void keep_axes(Suite& suite, const std::vector<std::string>& names) {
     suite.problems.clear();
     suite.dumps.clear();
     suite.scenes.clear();
+    suite.leaving_out.clear();
 }
 
 fs::path suite_folder() {

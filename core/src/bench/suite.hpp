@@ -56,9 +56,11 @@ struct Suite {
     std::vector<SuiteProblem> problems;
     std::vector<SuiteDump> dumps;
     std::vector<SolverConfig> solvers;
-    std::vector<std::string> laws = {""};  ///< "" is each problem's own
-    std::vector<double> tolerances = {1e-3, 1e-6, 1e-9};
+    std::vector<std::string> laws = {""};                 ///< "" is each problem's own
+    std::vector<double> tolerances = {1e-3, 1e-6, 1e-9};  ///< the loosest first
+    bool skip_after_failure = true;  ///< a solver that failed on a problem is not run on it to a tighter tolerance
     std::vector<SuiteScene> scenes;
+    std::vector<SuiteScene> leaving_out;           ///< run as they are, and with nothing left out
     std::vector<SuiteTimestepper> timesteppers;    ///< empty: the scene's own
     std::vector<double> steps;                     ///< s; empty: the scene's own
     std::vector<std::string> step_solvers = {""};  ///< of scenes; "" is the scene's own, or by need

@@ -118,8 +118,10 @@ std::string failures_text(const Json& analysis) {
     for (const Json& failure : analysis.at("failures")) {
         if (failure.at("cause") == "unsupported") continue;
         auto& text = causes[failure.at("cause")];
-        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", failure.at("solver").get<std::string>(),
-                            failure.at("count").get<int>());
+        const int skipped = failure.at("skipped");
+        text += fmt::format("{}{} ({}{})", text.empty() ? "" : ", ", failure.at("solver").get<std::string>(),
+                            failure.at("count").get<int>(),
+                            skipped > 0 ? fmt::format(", {} of them not run", skipped) : "");
     }
     if (causes.empty()) return {};
     std::string text = "### Failures (runs)\n\n";
@@ -169,6 +171,37 @@ std::string stepping_text(const ResultSet& results, const Json& analysis) {
     return "### Timesteppers: error of the trajectory's end\n\n" + table.text() + "\n";
 }
 
+std::string leaving_out_text(const ResultSet& results) {
+    if (results.leaving_out.empty()) return {};
+    MarkdownTable table({"scene", "time", "forced", "ratio", "rows", "forced", "MiB", "forced", "libraries", "forced",
+                         "ends differ by"});
+    for (const Json& row : results.leaving_out) {
+        const Json &own = row.at("as_is"), &forced = row.at("forced");
+        const auto failed = [](const Json& run) { return !run.at("cause").get<std::string>().empty(); };
+        const auto time = [&](const Json& run) {
+            const double seconds = number_of(run.at("seconds").at("stepping"));
+            return failed(run) ? run.at("cause").get<std::string>() : seconds_text(seconds);
+        };
+        const auto rows = [](const Json& run) {
+            return run.at("totals").contains("most_rows") ? run.at("totals").at("most_rows").dump() : "—";
+        };
+        const auto mebibytes = [](const Json& run) {
+            return fmt::format("{:.1f}", run.at("peak_memory").get<double>() / 1048576.0);
+        };
+        const double ratio =
+            number_of(forced.at("seconds").at("stepping")) / number_of(own.at("seconds").at("stepping"));
+        table.add({row.at("name"), time(own), time(forced),
+                   failed(own) || failed(forced) || std::isnan(ratio) ? "—" : fmt::format("{:.2f}", ratio), rows(own),
+                   rows(forced), mebibytes(own), mebibytes(forced), std::to_string(own.at("libraries").size()),
+                   std::to_string(forced.at("libraries").size()), error_text(forced.at("error").at("position"))});
+    }
+    return "### What leaving out saves\n\nEach scene as it is, and \"forced\": with nothing left out (`leave_out: "
+           "false`). Time of stepping, most rows of a problem, peak memory and libraries of the process, and by how "
+           "much "
+           "the ends of the two runs differ.\n\n" +
+           table.text() + "\n";
+}
+
 }  // namespace
 
 std::string summary_markdown(const ResultSet& results, const Json& analysis) {
@@ -181,6 +214,7 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     };
     list(results.solves.size(), "of solvers on", results.problems.size(), "problems");
     list(results.simulations.size(), "of", results.scenes.size(), "scenes");
+    list(2 * results.leaving_out.size(), "of", results.leaving_out.size(), "scenes with and without leaving out");
     list(results.cells.size(), "on", results.axes.size(), "axes");
     text += fmt::format("{}; delassus {}, {}, {}.\n", what.empty() ? "nothing has been run" : what,
                         session.at("delassus").get<std::string>(), session.at("created").get<std::string>(),
@@ -196,7 +230,8 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     text += axes_markdown(results);
     for (const Json& one : analysis.at("classes"))
         if (one.at("name") != "all") text += class_text(one);
-    text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) + stepping_text(results, analysis);
+    text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) +
+            stepping_text(results, analysis) + leaving_out_text(results);
     if (!results.solves.empty())
         text += fmt::format(
             "Mean: shifted geometric mean of setup and solve (shift {:g} s) over the problems that any solver solved; "

@@ -99,6 +99,11 @@ Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::st
         tasks.problems.push_back({problem.source, name, problem.family, std::move(facts)});
     }
     for (const auto& scene : suite.scenes) tasks.scenes.push_back({scene, describe_scene(worker, scene.source), 0.0});
+    for (const auto& scene : suite.leaving_out) {
+        SceneFacts facts = describe_scene(worker, scene.source);
+        const std::string key = key_of_run({"leaving out", facts.hash, digits(facts.end)}, suite, code);
+        tasks.leaving_out.push_back({key, scene, std::move(facts)});
+    }
     add_solves(tasks, suite, code);
     add_simulations(tasks, suite, code);
     return tasks;

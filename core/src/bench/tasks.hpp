@@ -34,11 +34,19 @@ struct SimulationTask {
     SimulateRequest request;  ///< step never 0; without state and reference
 };
 
+/// A scene as it is, and with nothing left out.
+struct LeavingOutTask {
+    std::string key;
+    SuiteScene entry;
+    SceneFacts facts;
+};
+
 struct Tasks {
     std::vector<TaskProblem> problems;  ///< each content once, whatever names it has
     std::vector<SolveTask> solves;      ///< by problem, law, solver, tolerance
     std::vector<TaskScene> scenes;
     std::vector<SimulationTask> simulations;  ///< by scene, timestepper, solver, step
+    std::vector<LeavingOutTask> leaving_out;
 };
 
 /// Reads every problem and plans every scene in processes of their own. code: hash of the program. Throws InputError.

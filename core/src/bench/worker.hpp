@@ -16,10 +16,10 @@
 //       sample    iteration, seconds, natural: as the recorded run goes
 //       recorded  the report of the run with the curve; x and λ are in the folder `solution` then
 //       repeat    status, setup, solve: a run without recording
-//   {"do": "plan", "scene", "settings", "plugin_path"}
+//   {"do": "plan", "scene", "settings", "end", "forced", "plugin_path"}
 //       plan      systems: what the scene needs and what is left out
-//   {"do": "simulate", "scene", "settings", "end", "timestepper", "step", "solver", "repeats", "plugin_path", "state",
-//    "reference"}
+//   {"do": "simulate", "scene", "settings", "end", "forced", "timestepper", "step", "solver", "repeats", "plugin_path",
+//    "state", "reference"}
 //       scene     hash, title, step, end
 //       refused   message
 //       begin     a run begins

@@ -54,6 +54,8 @@ struct StepSolver::Implementation {
     static constexpr std::size_t most_instances = 64;
 
     const Registry& registry;
+    bool leaves_out = true;
+    std::uint64_t also_needs = 0;  ///< of every problem, where nothing is left out
     SolverConfig config;
     SolveSettings settings;
     std::vector<Solver> solvers;  // instances by the number of the part
@@ -67,6 +69,14 @@ struct StepSolver::Implementation {
 StepSolver::StepSolver(const Registry& registry, SolverConfig config)
     : implementation_(std::make_unique<Implementation>(registry, std::move(config))) {}
 StepSolver::~StepSolver() = default;
+
+void StepSolver::leave_nothing_out() {
+    auto& self = *implementation_;
+    self.leaves_out = false;
+    self.also_needs = DELASSUS_CAN_H_DEFINITE;
+    if (self.config.name == auto_name)
+        self.also_needs |= DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
+}
 
 // The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as
 // long as bodies keep their neighbours, the k-th of the next, and what was prepared and analysed for it is used again.
@@ -82,7 +92,7 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
-    if (m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
+    if (!self.leaves_out || m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
 
     self.islands.find(problem);
     const auto list = self.islands.list();
@@ -112,13 +122,13 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
     auto& kept = parts[number].prepared;
     const Law law = config.law.value_or(problem.law);
     if (!kept) {
-        kept.emplace(problem);
+        kept.emplace(problem, also_needs);
     } else {
         kept->renew(problem);
     }
     if (law != problem.law) kept->set_law(law);
     const PreparedProblem& prepared = *kept;
-    if (problem.m() == 0) {
+    if (leaves_out && problem.m() == 0) {
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
                               structure == Structure::Definite || structure == Structure::Reduced;
@@ -150,11 +160,11 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
     const auto part_of = [this](const Problem& part) {
-        PreparedProblem prepared(part);
+        PreparedProblem prepared(part, implementation_->also_needs);
         if (const auto law = implementation_->config.law) prepared.set_law(*law);
         return Part{part.n(), part.m(), prepared.structure(), prepared.needs()};
     };
-    if (problem.m() == 0 || problem.E.rows > 0) return {part_of(problem)};
+    if (!implementation_->leaves_out || problem.m() == 0 || problem.E.rows > 0) return {part_of(problem)};
     Islands islands;
     islands.find(problem);
     std::vector<Part> result;

@@ -247,6 +247,11 @@ void MultibodySystem::keep_apart(BodyIndex first, BodyIndex second) {
     self.apart.insert(std::minmax(first, second));
 }
 
+void MultibodySystem::leave_nothing_out() {
+    implementation_->must_not_be_finished();
+    implementation_->leaves_out = false;
+}
+
 void MultibodySystem::finish() {
     auto& self = *implementation_;
     self.must_not_be_finished();

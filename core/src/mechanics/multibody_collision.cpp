@@ -69,7 +69,10 @@ void MultibodySystem::Implementation::make_detector() {
     const bool moves = std::any_of(setup.shapes.begin(), setup.shapes.end(), [&](const Shape& shape) {
         return shape.body >= 0 && !setup.fixed[static_cast<std::size_t>(shape.body)];
     });
-    if (!moves || setup.shapes.size() < 2) return;
+    if (!moves || setup.shapes.size() < 2) {
+        if (!leaves_out) static_cast<void>(make_collision_detector({}));
+        return;
+    }
     if (envelope == 0.0) envelope = envelope_for(setup.shapes);
     detector = make_collision_detector(std::move(setup));
 }

@@ -40,6 +40,7 @@ struct MultibodySystem::Implementation {
     std::int32_t n = 0, position_size = 0, m = 0;
     bool gyroscopic = false;  // a moving body whose moments differ
     std::unique_ptr<CollisionDetector> detector;
+    bool leaves_out = true;  ///< what no contact needs
 
     // ---- Work space of the call that runs ----
     mutable mechanics::Placements at;

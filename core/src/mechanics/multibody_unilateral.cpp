@@ -171,7 +171,7 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
         const auto key = key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), contact.feature);
         put_row(normal);
         rows.end_row(contact.gap);
-        if (material.friction == 0.0) {
+        if (material.friction == 0.0 && leaves_out) {
             rows.end_block(Cone::nonnegative(1), key, material.restitution);
             continue;
         }

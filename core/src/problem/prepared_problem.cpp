@@ -49,8 +49,9 @@ std::uint64_t need_of(Law law) {
 
 PreparedProblem::PreparedProblem() : implementation_(std::make_unique<Implementation>()) {}
 
-PreparedProblem::PreparedProblem(Problem problem) : PreparedProblem() {
+PreparedProblem::PreparedProblem(Problem problem, std::uint64_t also_needs) : PreparedProblem() {
     auto& self = *implementation_;
+    self.also_needs = also_needs;
     self.problem = std::move(problem);
     const auto n = self.problem.n();
     const auto m = self.problem.m();
@@ -109,6 +110,7 @@ PreparedProblem PreparedProblem::with_law(Law law) const {
     to.problem = from.problem;
     to.problem.law = law;
     to.structure = from.structure;
+    to.also_needs = from.also_needs;
     to.mobility = from.mobility;
     to.redundancy = from.redundancy;
     to.lay_out();
@@ -128,7 +130,7 @@ const ErrorMeter& PreparedProblem::meter() const {
 void PreparedProblem::renew(const Problem& other) {
     auto& self = *implementation_;
     if (!self.same_places_of_H(other)) {
-        *this = PreparedProblem(other);
+        *this = PreparedProblem(other, self.also_needs);
         return;
     }
     const bool new_places = !self.same_places_of_rows(other);
@@ -259,6 +261,8 @@ void PreparedProblem::Implementation::point_to_arrays() {
 void PreparedProblem::Implementation::detect_structure() {
     const Structure before = structure;
     structure = structure_by_pattern(problem.H, blocks);
+    if ((also_needs & DELASSUS_CAN_H_DEFINITE) && (structure == Structure::Diagonal || structure == Structure::Blocks))
+        structure = Structure::Definite;
     std::shared_ptr<Mobility> candidate = std::move(mobility);
     mobility.reset();
     if (structure == Structure::Unsymmetric) return;
@@ -282,6 +286,7 @@ void PreparedProblem::Implementation::detect_structure() {
 
 void PreparedProblem::Implementation::derive_needs(bool new_places) {
     raw.needs = need_of(structure);
+    raw.needs |= also_needs & (DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION);
     for (const auto& cone : cones) raw.needs |= sdk::operations_of(cone).capability;
     set_law_needs();
     if (raw.n > 0 && problem.E.entries() > 0) raw.needs |= DELASSUS_CAN_COMPLIANCE;

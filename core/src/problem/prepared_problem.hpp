@@ -14,6 +14,7 @@ namespace delassus {
 struct PreparedProblem::Implementation {
     Problem problem;
     Structure structure = Structure::Reduced;
+    std::uint64_t also_needs = 0;
     BlockPartition blocks;
     std::vector<delassus_cone> cones;
     delassus_problem raw{};

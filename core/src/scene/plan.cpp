@@ -88,6 +88,9 @@ private:
     std::vector<Pair> pairs_;
 };
 
+/// The reason where a scene asks for it.
+constexpr const char* everything = "leave_out is false: as if the scene needed everything";
+
 class Planner {
 public:
     Planner(SceneSystem& system, const Registry& registry)
@@ -105,6 +108,7 @@ public:
         contacts();
         matrix();
         solvers();
+        if (!system_.leave_out) keep("one problem", everything);
         plan_.left_out.insert(plan_.left_out.begin(), nothing_.begin(), nothing_.end());
         for (const auto& one : system_.left_out) plan_.left_out.push_back({one.what, one.reason});
         return std::move(plan_);
@@ -120,7 +124,7 @@ private:
             std::int32_t parts = 0;
             for (const auto& part : simulation_.solver().parts(problem)) {
                 sparse_ = sparse_ || part.structure > Structure::Blocks;
-                if (part.m == 0) continue;
+                if (part.m == 0 && system_.leave_out) continue;
                 ++parts;
                 needs_ |= part.needs;
             }
@@ -161,7 +165,7 @@ private:
             keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities each that moves");
         if (!fixed.empty())
             leave(counted(fixed.size(), "fixed body", "fixed bodies"), "no unknowns, no columns: " + some_of(fixed));
-        if (!free.empty())
+        if (!free.empty() && system_.leave_out)
             leave(counted(free.size(), "free body", "free bodies"),
                   "nothing touches or holds them, so they reach no solver: " + some_of(free));
     }
@@ -201,7 +205,10 @@ private:
     }
 
     void contacts() {
-        if (touching_.detects()) {
+        if (!touching_.detects() && !system_.leave_out) {
+            keep("the collision library", everything);
+            plan_.libraries.emplace_back("delassus_collision.so");
+        } else if (touching_.detects()) {
             keep("collision detection", counted(system_.system->shapes().size(), "shape", "shapes") +
                                             (touching_.nodes_touch() ? " and nodes of elements" : ""));
             plan_.libraries.emplace_back("delassus_collision.so");
@@ -213,10 +220,10 @@ private:
         for (const auto& pair : touching_.pairs()) {
             const auto& first = system_.materials[static_cast<std::size_t>(pair.first)].name;
             const auto& second = system_.materials[static_cast<std::size_t>(pair.second)].name;
-            if (pair.friction > 0.0) {
+            if (pair.friction > 0.0 || !system_.leave_out) {
                 friction = true;
                 keep(fmt::format("friction cones of 3 rows, {} on {}", first, second),
-                     fmt::format("friction {:.4g}", pair.friction));
+                     pair.friction > 0.0 ? fmt::format("friction {:.4g}", pair.friction) : everything);
             } else {
                 needs_ |= DELASSUS_CAN_NONNEGATIVE;
                 keep(fmt::format("contacts of 1 row, {} on {}", first, second), "friction is zero");
@@ -233,7 +240,9 @@ private:
     }
 
     void matrix() {
-        if (sparse_) {
+        if (!system_.leave_out) {
+            keep("H as a sparse matrix, factorised", everything);
+        } else if (sparse_) {
             keep("a sparse H", "forces or constraints couple bodies in it; it is factorised");
         } else {
             leave("factorisation of H", "no stiffness couples bodies: H is diagonal by blocks of one body");

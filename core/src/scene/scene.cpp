@@ -51,8 +51,8 @@ void apply(const SceneOverrides& overrides, SceneSystem& system) {
     }
 }
 
-/// Step, tolerance and end from the command line, put where the file would have them.
-void put_times(const SceneOverrides& overrides, Source& source, YAML::Node map) {
+/// What overrides hold for every system, put where the file would have it.
+void put_values(const SceneOverrides& overrides, Source& source, YAML::Node map) {
     if (!map.IsMap()) return;  // refused when it is read
     const auto put = [&](const char* key, const std::optional<double>& value) {
         if (!value) return;
@@ -67,6 +67,7 @@ void put_times(const SceneOverrides& overrides, Source& source, YAML::Node map) 
     put("step", overrides.step);
     put("tolerance", overrides.tolerance);
     put("end", overrides.end);
+    if (overrides.leave_out) map["leave_out"] = *overrides.leave_out;
 }
 
 std::string canonical_text(const YAML::Node& root, const SceneOverrides& overrides) {
@@ -88,9 +89,9 @@ Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOv
         if (!root.IsMap()) throw InputError(fmt::format("{}: a scene must be a map of keys to values", where));
         for (const auto& [path, text] : overrides.values) scene::set_value(source, root, path, text);
         if (root["systems"].IsDefined() && root["systems"].IsMap()) {
-            for (const auto& entry : root["systems"]) put_times(overrides, source, entry.second);
+            for (const auto& entry : root["systems"]) put_values(overrides, source, entry.second);
         } else {
-            put_times(overrides, source, root);
+            put_values(overrides, source, root);
         }
         const std::pair<std::string_view, Handler> title{
             "title", [&](const YAML::Node& n) { scene.title = scalar(source, n, "title"); }};

@@ -23,6 +23,7 @@ constexpr double rounding_of_step = 1e-9;
 
 Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
+    if (!system.leave_out) solver_->leave_nothing_out();
     try {
         // Checked here without loading the plugin, which may never be needed.
         SolverConfig solver = system.solver;

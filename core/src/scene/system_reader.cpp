@@ -19,6 +19,8 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
+        {"leave_out",
+         [this](const YAML::Node& n) { result_.leave_out = value<bool>(source_, n, "leave_out", "true or false"); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
     for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
                              "cables", "beams", "joints", "motors", "springs", "bushings", "loads", "keep_apart"})
@@ -52,6 +54,7 @@ void SystemReader::build(const YAML::Node& place) {
     read_items("bushings", &SystemReader::read_bushing);
     read_items("loads", &SystemReader::read_load);
     if (const auto found = lists_.find("keep_apart"); found != lists_.end()) read_keep_apart(found->second);
+    if (!result_.leave_out) result_.system->leave_nothing_out();
     at(place, [&] { result_.system->finish(); });
 }
 
