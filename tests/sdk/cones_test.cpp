@@ -48,7 +48,7 @@ TEST(Cones, ProjectionsDecomposeEveryVector) {
             std::vector<double> v(static_cast<std::size_t>(rows));
             for (double& entry : v) entry = normal(random);
             if (trial % 7 == 0) std::fill(v.begin() + 1, v.end(), 0.0);
-            if (mu > 0.0) expect_moreau(friction(mu, rows), v);
+            expect_moreau(friction(mu, rows), v);
             expect_moreau({DELASSUS_CONE_NONNEGATIVE, 0, rows, 0, 0.0, nullptr, nullptr}, v);
             expect_moreau({DELASSUS_CONE_FREE, 0, rows, 0, 0.0, nullptr, nullptr}, v);
         }
@@ -78,6 +78,12 @@ TEST(Cones, ZeroFrictionKeepsTheNormalOnly) {
     std::vector<double> v = {2.0, 1.0, 1.0};
     project(cone, v.data());
     EXPECT_EQ(v, (std::vector<double>{2.0, 0.0, 0.0}));
+}
+
+TEST(Cones, ZeroFrictionDoesNotPull) {
+    std::vector<double> v = {-1.0, 0.0, 0.0};  // no tangential part: not inside, although 0 ≤ 0 v_n
+    operations_of(friction(0.0, 3)).project(friction(0.0, 3), v.data());
+    EXPECT_EQ(v, (std::vector<double>{0.0, 0.0, 0.0}));
 }
 
 TEST(Cones, BoxClampsAndItsDualKnowsInfiniteBounds) {

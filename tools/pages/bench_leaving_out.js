@@ -2,10 +2,10 @@
 // Scenes as they are and with nothing left out: what leaving out saves.
 "use strict";
 const savings = [
-  { title: "time of stepping", unit: "s", of: (run) => run.seconds.stepping, text: seconds },
-  { title: "most rows of a problem", unit: "", of: (run) => run.totals.most_rows ?? null, text: whole },
-  { title: "peak memory", unit: "MiB", of: (run) => run.peak_memory / 1048576, text: (value) => (value === null ? missing : value.toFixed(1)) },
-  { title: "libraries in the process", unit: "", of: (run) => run.libraries.length, text: whole },
+  { title: "time of stepping", head: "time s", unit: "s", of: (run) => run.seconds.stepping, text: seconds },
+  { title: "most rows of a problem", head: "rows", unit: "", of: (run) => run.totals.most_rows ?? null, text: whole },
+  { title: "peak memory", head: "MiB", unit: "MiB", of: (run) => run.peak_memory / 1048576, text: (value) => (value === null ? missing : value.toFixed(1)) },
+  { title: "libraries in the process", head: "libraries", unit: "", of: (run) => run.libraries.length, text: whole },
 ];
 const sides = [{ key: "as_is", label: "as it is", color: "#0072b2" }, { key: "forced", label: "nothing left out", color: "#e69f00" }];
 
@@ -33,9 +33,9 @@ function writeLeavingOut() {
   const pairs = (one, row) => sides.map((side) => (row[side.key].cause ? spoken(row[side.key].cause) : one.text(one.of(row[side.key]))));
   section("leaving-out", "What leaving out saves", element("p", { className: "facts", textContent:
     "Each scene as it is, and with nothing left out (leave_out: false): one problem with all of its parts, H factorised as a sparse matrix, three rows for " +
-    "contacts without friction, a solver for every kind of cone and the collision library loaded. The physics is the same: how far apart the two ends are stands in the last column." }),
+    "contacts without friction, a solver for every kind of cone and the collision library loaded. The physics is the same: the last column says how far apart the two ends are, relative to the way that the scene goes (nothing of a scene that stands still)." }),
     grid,
-    table(["scene", ...savings.flatMap(({ title, unit }) => [`${title}${unit ? ` ${unit}` : ""}`, "nothing left out"]), "ends differ by"],
+    table(["scene", ...savings.flatMap(({ head }) => [head, "all kept"]), "ends differ by"],
       rows.map((row) => ({ cells: [row.name, ...savings.flatMap((one) => pairs(one, row)), error(row.forced.error.position)] }))),
     element("details", {}, element("summary", { textContent: "what is left out, and the libraries that come with it" }),
       ...rows.map((row) => element("div", { className: "two" }, planList(`${row.name}: left out`, row.left_out),

@@ -15,17 +15,17 @@ struct FrictionCone {
     }
 
     /// Euclidean projection onto {‖v_t‖ ≤ slope · v_n}. With t = ‖v_t‖:
+    ///   in the polar cone (slope t ≤ −v_n): 0; first, as with slope 0 and t = 0 a v_n < 0 would count as inside;
     ///   inside (t ≤ slope v_n): v;
-    ///   in the polar cone (slope t ≤ −v_n): 0;
     ///   else the nearest point of the generator (1, slope v_t/t): v_n' = (v_n + slope t)/(1 + slope²), v_t' = slope
     ///   v_n' v_t/t.
     static void project_with_slope(double slope, int rows, double* v) {
         const double t = rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
-        if (t <= slope * v[0]) return;
         if (slope * t <= -v[0]) {
             std::fill_n(v, rows, 0.0);
             return;
         }
+        if (t <= slope * v[0]) return;
         v[0] = (v[0] + slope * t) / (1.0 + slope * slope);
         const double factor = slope * v[0] / t;
         for (int i = 1; i < rows; ++i) v[i] *= factor;
