@@ -2,16 +2,17 @@
 // L S Lᵀ of a symmetric sparse matrix with pivots of known signs S = diag(±1), without pivoting, by dense fronts.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/OrderingMethods>
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <numeric>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "delassus/sdk/dense_front.hpp"
 #include "delassus/sdk/dissection.hpp"
 #include "delassus/sdk/problem_view.hpp"
 
@@ -20,9 +21,14 @@ namespace delassus::sdk {
 /// The multifrontal method (Duff and Reid 1983; Liu 1992): columns of L with nearly the same pattern form a supernode,
 /// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
 /// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD, or nested
-/// dissection where that takes fewer operations.
+/// dissection where that takes fewer operations. Fronts are factored by Eigen, or by the system's BLAS where the
+/// analysis foretells so much work that loading it pays.
 class SparseFactor {
 public:
+    enum class Kernels { Best, Eigen };
+
+    explicit SparseFactor(Kernels kernels = Kernels::Best) : kernels_(kernels) {}
+
     /// The rows of a matrix by the supernodes that they reach in half solves.
     struct Reach {
         std::vector<std::vector<std::int32_t>> rows;  ///< of each supernode, ascending
@@ -49,6 +55,9 @@ public:
     /// Entries of L, known after analyze.
     [[nodiscard]] double entries() const { return entries_; }
 
+    /// What works on dense fronts, known after analyze.
+    [[nodiscard]] std::string kernels() const { return front_.blas() ? front_.blas()->description() : "Eigen"; }
+
     /// Which half-solved rows D L⁻ᵀ have entries where; the pattern of D (any rows, as many columns as the matrix).
     [[nodiscard]] Reach reach(const SparseRowsView& D) const;
 
@@ -68,7 +77,9 @@ private:
         std::size_t row = 0;                  // into row_: height of them, ascending
         std::size_t panel = 0;                // into value_: height × columns
         std::size_t entry = 0;                // into entry_: up to that of the next supernode
-        bool definite = true;                 // all pivots positive
+        std::size_t child = 0, children = 0;  // into child_
+        std::size_t depth = 0;                // below its root
+        std::size_t update = 0;               // into stack_[depth % 2]: (height − columns)², lower triangle
     };
     struct Entry {
         std::int32_t source;  // into the values of the matrix
@@ -76,9 +87,10 @@ private:
     };
 
     void find_supernodes(const SparseColumns& permuted, const std::vector<std::int32_t>& parent);
+    void find_stacks();
     void find_places(const Eigen::Ref<const SparseColumns>& matrix);
-    void add_update(std::size_t child);
-    [[nodiscard]] bool eliminate(std::size_t node);
+    [[nodiscard]] DenseFront::Block update_of(const Supernode& node);
+    void add_update(const Supernode& child);
 
     static std::vector<std::int32_t> minimum_degree(const Eigen::Ref<const SparseColumns>& matrix);
     static std::vector<std::int32_t> elimination_tree(const SparseColumns& lower);
@@ -87,7 +99,6 @@ private:
                                  const std::vector<std::int32_t>& position);
 
     using Matrix = Eigen::MatrixXd;
-    using Panel = Eigen::Map<Matrix>;
     using ConstPanel = Eigen::Map<const Matrix>;
 
     Eigen::Index size_ = 0, positive_ = 0;
@@ -102,7 +113,13 @@ private:
     std::vector<std::int32_t> place_in_parent_;
     std::vector<Entry> entry_;
     std::vector<double> value_;
-    std::vector<Matrix> update_;  // one a supernode, while its parent waits for it; lower triangle
+    std::vector<std::size_t> child_;      // supernodes
+    // Updates that wait for their parents, by the parity of the depth: the children of a supernode lie on top of one
+    // stack when it puts its own update on the other.
+    std::array<std::vector<double>, 2> stack_;
+    std::array<std::size_t, 2> stack_size_{};
+    Kernels kernels_;
+    DenseFront front_;
     mutable Vector work_, gathered_;
 };
 
@@ -204,15 +221,17 @@ inline bool SparseFactor::has_analyzed(const Eigen::Ref<const SparseColumns>& ma
 
 inline bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
     constexpr Eigen::Index smallest_to_dissect = 1000;
+    constexpr double least_flops_for_blas = 1e8;  // some 15 ms of Eigen
     if (has_analyzed(matrix, positive)) return false;
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     analyze(matrix, positive, minimum_degree(matrix));
     // Dissection is worth its time where the fill is large.
     if (entries_ >= 10.0 * static_cast<double>(matrix.nonZeros()) && size_ >= smallest_to_dissect) {
-        SparseFactor other;
+        SparseFactor other(kernels_);
         other.analyze(matrix, positive, nested_dissection(matrix));
         if (other.flops_ < flops_) *this = std::move(other);
     }
+    front_ = DenseFront(kernels_ == Kernels::Best && flops_ >= least_flops_for_blas ? Blas::find() : nullptr);
     analyzed_start_.assign(start, start + matrix.cols() + 1);
     analyzed_row_.assign(row, row + matrix.nonZeros());
     return true;
@@ -297,7 +316,6 @@ inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const s
         for (std::int32_t c = 0; c < run.columns; ++c) {
             row_.push_back(run.first + c);
             node_of_[static_cast<std::size_t>(run.first + c)] = static_cast<std::int32_t>(nodes_.size());
-            if (sign_[static_cast<std::size_t>(run.first + c)] < 0.0) node.definite = false;
         }
         row_.insert(row_.end(), run.below.begin(), run.below.end());
         entries_ += static_cast<double>(node.height) * node.columns;
@@ -307,6 +325,31 @@ inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const s
     for (Supernode& node : nodes_)
         if (node.height > node.columns)
             node.parent = node_of_[static_cast<std::size_t>(row_[node.row + static_cast<std::size_t>(node.columns)])];
+    find_stacks();
+}
+
+inline void SparseFactor::find_stacks() {
+    std::vector<std::vector<std::size_t>> children(nodes_.size());
+    for (std::size_t s = 0; s < nodes_.size(); ++s)
+        if (nodes_[s].parent >= 0) children[static_cast<std::size_t>(nodes_[s].parent)].push_back(s);
+    child_.clear();
+    for (std::size_t s = nodes_.size(); s-- > 0;) {
+        Supernode& node = nodes_[s];
+        node.depth = node.parent < 0 ? 0 : nodes_[static_cast<std::size_t>(node.parent)].depth + 1;
+        node.child = child_.size();
+        node.children = children[s].size();
+        child_.insert(child_.end(), children[s].begin(), children[s].end());
+    }
+    stack_size_ = {};
+    std::array<std::size_t, 2> top{};
+    for (Supernode& node : nodes_) {
+        const auto rest = static_cast<std::size_t>(node.height - node.columns);
+        if (node.children > 0) top[(node.depth + 1) % 2] = nodes_[child_[node.child]].update;
+        const std::size_t own = node.depth % 2;
+        node.update = top[own];
+        top[own] += rest * rest;
+        stack_size_[own] = std::max(stack_size_[own], top[own]);
+    }
 }
 
 inline void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& matrix) {
@@ -341,77 +384,44 @@ inline void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& mat
 
 inline bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
     value_.assign(static_cast<std::size_t>(entries_), 0.0);
-    update_.resize(nodes_.size());
+    for (std::size_t k = 0; k < 2; ++k) stack_[k].resize(stack_size_[k]);
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
         const Supernode& node = nodes_[s];
         const std::size_t end = s + 1 < nodes_.size() ? nodes_[s + 1].entry : entry_.size();
         for (std::size_t k = node.entry; k < end; ++k)
             value_[node.panel + entry_[k].target] += matrix.valuePtr()[entry_[k].source];
-    }
-    for (std::size_t s = 0; s < nodes_.size(); ++s) {
-        const Eigen::Index rest = nodes_[s].height - nodes_[s].columns;
-        if (update_[s].rows() != rest) update_[s].setZero(rest, rest);
-        if (!eliminate(s)) {
-            update_.clear();
-            return false;
-        }
-        if (rest > 0) add_update(s);
+        DenseFront::Block update = update_of(node);
+        for (Eigen::Index j = 0; j < update.cols(); ++j) update.col(j).tail(update.rows() - j).setZero();
+        for (std::size_t k = 0; k < node.children; ++k) add_update(nodes_[child_[node.child + k]]);
+        const DenseFront::Block panel(value_.data() + node.panel, node.height, node.columns,
+                                      Eigen::OuterStride<>(node.height));
+        if (!front_.factor(panel, sign_.data() + node.first, update)) return false;
     }
     return true;
 }
 
-// Factors the panel [A11; A21] into L11, L21 = A21 L11⁻ᵀ S, and takes L21 S L21ᵀ from the update.
-inline bool SparseFactor::eliminate(std::size_t s) {
-    const Supernode& node = nodes_[s];
-    const Eigen::Index k = node.columns, rest = node.height - k;
-    Panel panel(value_.data() + node.panel, node.height, k);
-    auto top = panel.topRows(k);
-    auto bottom = panel.bottomRows(rest);
-    if (node.definite) {
-        if (k == 1) {
-            if (!(panel(0, 0) > 0.0) || !std::isfinite(panel(0, 0))) return false;
-            panel(0, 0) = std::sqrt(panel(0, 0));
-            bottom /= panel(0, 0);
-        } else {
-            Eigen::LLT<Eigen::Ref<Matrix>> factor(top);
-            if (factor.info() != Eigen::Success || !std::isfinite(top.diagonal().sum())) return false;
-            if (rest > 0) top.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(bottom);
-        }
-        if (rest > 0) update_[s].selfadjointView<Eigen::Lower>().rankUpdate(bottom, -1.0);
-        return true;
-    }
-    const Eigen::Map<const Vector> sign(sign_.data() + node.first, k);
-    for (Eigen::Index c = 0; c < k; ++c) {
-        const double pivot = sign[c] * panel(c, c);
-        if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
-        panel.col(c).tail(node.height - c) *= sign[c] / std::sqrt(pivot);
-        for (Eigen::Index j = c + 1; j < k; ++j)
-            panel.col(j).tail(node.height - j) -= sign[c] * panel(j, c) * panel.col(c).tail(node.height - j);
-    }
-    if (rest > 0) update_[s].triangularView<Eigen::Lower>() -= (bottom * sign.asDiagonal()) * bottom.transpose();
-    return true;
+inline DenseFront::Block SparseFactor::update_of(const Supernode& node) {
+    const Eigen::Index rest = node.height - node.columns;
+    return {stack_[node.depth % 2].data() + node.update, rest, rest, Eigen::OuterStride<>(rest)};
 }
 
-// Adds the update of a supernode to its parent's front, and frees it.
-inline void SparseFactor::add_update(std::size_t child) {
-    const Supernode& node = nodes_[child];
-    const auto p = static_cast<std::size_t>(node.parent);
-    const Supernode& parent = nodes_[p];
-    Matrix& update = update_[child];
-    const Eigen::Index rest = update.rows(), above = parent.height - parent.columns;
-    if (update_[p].rows() != above) update_[p].setZero(above, above);
-    const std::int32_t* place = place_in_parent_.data() + node.row + node.columns;
+// Adds the update of a supernode to its parent's front.
+inline void SparseFactor::add_update(const Supernode& child) {
+    const Supernode& parent = nodes_[static_cast<std::size_t>(child.parent)];
+    const DenseFront::Block from = update_of(child);
+    DenseFront::Block update = update_of(parent);
+    const Eigen::Index rest = from.rows();
+    const std::int32_t* place = place_in_parent_.data() + child.row + child.columns;
     for (Eigen::Index j = 0; j < rest; ++j) {
         if (place[j] < parent.columns) {
             double* target = value_.data() + parent.panel +
                              static_cast<std::size_t>(place[j]) * static_cast<std::size_t>(parent.height);
-            for (Eigen::Index i = j; i < rest; ++i) target[place[i]] += update(i, j);
+            for (Eigen::Index i = j; i < rest; ++i) target[place[i]] += from(i, j);
         } else {
-            double* target = update_[p].col(place[j] - parent.columns).data();
-            for (Eigen::Index i = j; i < rest; ++i) target[place[i] - parent.columns] += update(i, j);
+            double* target = update.col(place[j] - parent.columns).data();
+            for (Eigen::Index i = j; i < rest; ++i) target[place[i] - parent.columns] += from(i, j);
         }
     }
-    update.resize(0, 0);
 }
 
 inline void SparseFactor::solve(Vector& v) const {
