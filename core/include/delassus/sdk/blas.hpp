@@ -9,7 +9,7 @@
 
 namespace delassus::sdk {
 
-/// Four operations of the C interface to BLAS (32-bit integers), for column-major matrices, and what they come from.
+/// Three operations of the C interface to BLAS (32-bit integers), for column-major matrices, and what they come from.
 /// The library stays loaded until the process ends. Its threads are its own (OPENBLAS_NUM_THREADS, OMP_NUM_THREADS).
 class Blas {
 public:
@@ -37,11 +37,6 @@ public:
         trsm_(column_major, right, lower, transposed, no_unit_diagonal, rows, size, 1.0, L, ldl, B, ldb);
     }
 
-    /// y ← y − A x, or with flip y ← y − Aᵀ x; A rows × columns.
-    void subtract_image(bool flip, int rows, int columns, const double* A, int lda, const double* x, double* y) const {
-        gemv_(column_major, flip ? transposed : plain, rows, columns, -1.0, A, lda, x, 1, 1.0, y, 1);
-    }
-
     /// The library, its kernels and threads, as far as it says so: "OpenBLAS SkylakeX, 1 thread".
     [[nodiscard]] std::string description() const {
         std::string text = name_;
@@ -63,7 +58,6 @@ private:
                           int);
     using Syrk = void (*)(int, int, int, int, int, double, const double*, int, double, double*, int);
     using Trsm = void (*)(int, int, int, int, int, int, int, double, const double*, int, double*, int);
-    using Gemv = void (*)(int, int, int, int, double, const double*, int, const double*, int, double, double*, int);
 
     Blas() {
         struct Candidate {
@@ -87,8 +81,7 @@ private:
         gemm_ = reinterpret_cast<Gemm>(dlsym(library, "cblas_dgemm"));
         syrk_ = reinterpret_cast<Syrk>(dlsym(library, "cblas_dsyrk"));
         trsm_ = reinterpret_cast<Trsm>(dlsym(library, "cblas_dtrsm"));
-        gemv_ = reinterpret_cast<Gemv>(dlsym(library, "cblas_dgemv"));
-        if (dlsym(library, mark) && gemm_ && syrk_ && trsm_ && gemv_) {
+        if (dlsym(library, mark) && gemm_ && syrk_ && trsm_) {
             core_ = reinterpret_cast<char* (*)()>(dlsym(library, "openblas_get_corename"));
             threads_ = reinterpret_cast<int (*)()>(dlsym(library, "openblas_get_num_threads"));
             return true;
@@ -101,7 +94,6 @@ private:
     Gemm gemm_ = nullptr;
     Syrk syrk_ = nullptr;
     Trsm trsm_ = nullptr;
-    Gemv gemv_ = nullptr;
     char* (*core_)() = nullptr;
     int (*threads_)() = nullptr;
 };

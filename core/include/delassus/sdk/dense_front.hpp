@@ -40,7 +40,8 @@ private:
     static constexpr double least_work = 2e4;           // multiplications that are worth a call of BLAS
 
     [[nodiscard]] bool by_blas(Eigen::Index rows, Eigen::Index columns, Eigen::Index depth) const {
-        return blas_ && static_cast<double>(rows) * static_cast<double>(columns) * static_cast<double>(depth) >= least_work;
+        return blas_ &&
+               static_cast<double>(rows) * static_cast<double>(columns) * static_cast<double>(depth) >= least_work;
     }
 
     static Block part(Block matrix, Eigen::Index row, Eigen::Index column, Eigen::Index rows, Eigen::Index columns) {

@@ -56,6 +56,7 @@ public:
     [[nodiscard]] double entries() const { return entries_; }
 
     /// What works on dense fronts, known after analyze.
+    [[nodiscard]] bool uses_blas() const { return front_.blas() != nullptr; }
     [[nodiscard]] std::string kernels() const { return front_.blas() ? front_.blas()->description() : "Eigen"; }
 
     /// Which half-solved rows D L⁻ᵀ have entries where; the pattern of D (any rows, as many columns as the matrix).
@@ -117,9 +118,10 @@ private:
     std::vector<std::int32_t> row_;
     // Beside row_, for the rows of the update: their rows in the parent's front.
     std::vector<std::int32_t> place_in_parent_;
+    std::vector<std::int32_t> run_end_;  // beside place_in_parent_: up to there the places follow one another
     std::vector<Entry> entry_;
     std::vector<double> value_;
-    std::vector<std::size_t> child_;      // supernodes
+    std::vector<std::size_t> child_;  // supernodes
     // Updates that wait for their parents, by the parity of the depth: the children of a supernode lie on top of one
     // stack when it puts its own update on the other.
     std::array<std::vector<double>, 2> stack_;
@@ -149,9 +151,8 @@ inline SparseFactor::Pattern SparseFactor::permute(const Eigen::Ref<const Sparse
     std::partial_sum(result.start.begin(), result.start.end(), result.start.begin());
     result.index.resize(static_cast<std::size_t>(result.start.back()));
     std::vector<std::int32_t> next = result.start;
-    visit([&](std::size_t outer, std::int32_t inner) {
-        result.index[static_cast<std::size_t>(next[outer]++)] = inner;
-    });
+    visit(
+        [&](std::size_t outer, std::int32_t inner) { result.index[static_cast<std::size_t>(next[outer]++)] = inner; });
     return result;
 }
 
@@ -223,7 +224,7 @@ inline bool SparseFactor::has_analyzed(const Eigen::Ref<const SparseColumns>& ma
 
 inline bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
     constexpr Eigen::Index smallest_to_dissect = 1000;
-    constexpr double least_flops_for_blas = 1e8;  // some 15 ms of Eigen
+    constexpr double least_flops_for_blas = 5e7;  // some 5 ms of Eigen
     if (has_analyzed(matrix, positive)) return false;
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     analyze(matrix, positive, minimum_degree(matrix));
@@ -392,6 +393,7 @@ inline void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& mat
         entry_[next[s]++] = {k, high, column * static_cast<std::size_t>(nodes_[s].height)};
     });
     place_in_parent_.resize(row_.size());
+    run_end_.resize(row_.size());
     std::vector<std::int32_t> place(static_cast<std::size_t>(size_));
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
         const Supernode& node = nodes_[s];
@@ -404,6 +406,11 @@ inline void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& mat
             for (std::int32_t i = child.columns; i < child.height; ++i) {
                 const std::size_t k = child.row + static_cast<std::size_t>(i);
                 place_in_parent_[k] = place[static_cast<std::size_t>(row_[k])];
+            }
+            for (std::int32_t i = child.height - 1; i >= child.columns; --i) {
+                const std::size_t k = child.row + static_cast<std::size_t>(i);
+                const bool last = i + 1 == child.height || place_in_parent_[k + 1] != place_in_parent_[k] + 1;
+                run_end_[k] = last ? i + 1 - child.columns : run_end_[k + 1];
             }
         }
     }
@@ -439,14 +446,16 @@ inline void SparseFactor::add_update(const Supernode& child) {
     DenseFront::Block update = update_of(parent);
     const Eigen::Index rest = from.rows();
     const std::int32_t* place = place_in_parent_.data() + child.row + child.columns;
+    const std::int32_t* run_end = run_end_.data() + child.row + child.columns;
     for (Eigen::Index j = 0; j < rest; ++j) {
-        if (place[j] < parent.columns) {
-            double* target = value_.data() + parent.panel +
-                             static_cast<std::size_t>(place[j]) * static_cast<std::size_t>(parent.height);
-            for (Eigen::Index i = j; i < rest; ++i) target[place[i]] += from(i, j);
-        } else {
-            double* target = update.col(place[j] - parent.columns).data();
-            for (Eigen::Index i = j; i < rest; ++i) target[place[i] - parent.columns] += from(i, j);
+        const bool own = place[j] < parent.columns;
+        double* target = own ? value_.data() + parent.panel +
+                                   static_cast<std::size_t>(place[j]) * static_cast<std::size_t>(parent.height)
+                             : update.col(place[j] - parent.columns).data() - parent.columns;
+        const double* source = from.col(j).data();
+        for (Eigen::Index i = j; i < rest;) {
+            const Eigen::Index end = run_end[i];
+            for (double* t = target + place[i]; i < end; ++i) *t++ += source[i];
         }
     }
 }
