@@ -73,10 +73,15 @@ void Resolvent::choose_form(const sdk::ProblemView& problem, const RowScaling& s
     if (form_ != Form::Automatic) return;
     form_ = Form::Primal;
     if (problem.m >= problem.n) return;
-    const SparseColumns pattern = H_ + SparseColumns(D_.transpose() * D_);
-    factor_->analyze(pattern);
     const auto m = static_cast<double>(problem.m);
-    if (0.5 * m * (m + 1.0) <= factor_->entries()) form_ = Form::Dual;
+    const double of_N = 0.5 * m * (m + 1.0);
+    // H + ρDᵀD has H's pattern and more: where the factor of H, whose analysis outlives changes of D, is large enough,
+    // nothing else is analysed.
+    if (of_N > static_cast<double>(scaling.N().inverse().factor_entries())) {
+        factor_->analyze(SparseColumns(H_ + SparseColumns(D_.transpose() * D_)));
+        if (of_N > factor_->entries()) return;
+    }
+    form_ = Form::Dual;
 }
 
 void Resolvent::set_penalty(double penalty) {

@@ -13,6 +13,11 @@ namespace {
 // ‖S r‖ = 1 in scaled units: a solution this much larger than the data is none.
 constexpr double largest_solution = 1e9;
 
+// Relative residuals of linear solves: the predictor only foretells a step, and what the corrector leaves of the
+// equations is in the residuals of the next iteration.
+constexpr double predictor_residual = 1e-3;
+constexpr double corrector_residual = 1e-9;
+
 KktSettings settings_from(const sdk::OptionValues& options) {
     const std::string form = options.choice("form");
     return {form == "normal"      ? Form::Normal
@@ -87,7 +92,7 @@ void InteriorPoint::start_cold() {
     cones_.start(zero, zero, 1.0, theta);
     cones_.scale(theta_);
     kkt_.factorize(cones_, theta_);
-    kkt_.solve(cones_, system.a, -system.b, x_, dz_);
+    kkt_.solve(cones_, system.a, -system.b, corrector_residual, x_, dz_);
     cones_.from_eigenbasis(dz_);
     const double size = std::max(root_mean_square(dz_), 1e-2);
     cones_.start(dz_, -theta * dz_, size, 10.0 * theta * size);
@@ -126,15 +131,15 @@ bool InteriorPoint::step() {
     cones_.to_eigenbasis(g_);
     cones_.target_zero(target_);
     right_ = target_ + g_;
-    kkt_.solve(cones_, f_, right_, dx_, dz_);
-    cones_.set_direction(dz_);
     const double tau = cones_.mean_product();
+    kkt_.solve(cones_, f_, right_, tau > 0.0 ? predictor_residual : corrector_residual, dx_, dz_);
+    cones_.set_direction(dz_);
     if (tau > 0.0) {
         const double predicted = std::min(1.0, cones_.longest_step());
         const double ratio = std::clamp(cones_.mean_product(predicted) / tau, 0.0, 1.0);
         cones_.target(ratio * ratio * ratio * tau, target_);
         right_ = target_ + g_;
-        kkt_.solve(cones_, f_, right_, dx_, dz_);
+        kkt_.solve(cones_, f_, right_, corrector_residual, dx_, dz_);
         cones_.set_direction(dz_);
     }
     const double length = std::min(1.0, step_fraction_ * cones_.longest_step());

@@ -194,8 +194,8 @@ void KktSystem::solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vect
     }
 }
 
-double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx,
-                        sdk::Vector& dz) {
+double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
+                        sdk::Vector& dx, sdk::Vector& dz) {
     const auto norm = [this](const sdk::Vector& x, const sdk::Vector& z) {
         return std::sqrt(x.squaredNorm() + z.cwiseProduct(weight_).squaredNorm());
     };
@@ -236,7 +236,7 @@ double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, cons
         }
         const bool slow = next > 0.5 * rest;
         rest = next;
-        if (rest <= 1e-13 * size || slow || refinement >= settings_.refinements) return rest / size;
+        if (rest <= enough * size || slow || refinement >= settings_.refinements) return rest / size;
     }
 }
 
@@ -245,7 +245,7 @@ std::string KktSystem::description() const {
     char text[120];
     std::snprintf(text, sizeof text, "%s form, %.0f entries in the factor, regularisation %.0e", name,
                   factor_.entries(), delta_);
-    return text;
+    return factor_.uses_blas() ? text + (", fronts by " + factor_.kernels()) : text;
 }
 
 }  // namespace delassus::ipm

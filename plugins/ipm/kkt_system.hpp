@@ -40,10 +40,10 @@ public:
     /// sdk::NumericalFailure if it does not for any.
     void factorize(const Complementarity& cones, const sdk::Vector& theta);
 
-    /// Solves for δx (n) and δz (m) from f (n) and g (m); rows of g and δz in the eigenbases. Returns the relative
-    /// residual.
-    double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx,
-                 sdk::Vector& dz);
+    /// Solves for δx (n) and δz (m) from f (n) and g (m); rows of g and δz in the eigenbases. Refines until the
+    /// relative residual, which it returns, is at most `enough`.
+    double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
+                 sdk::Vector& dx, sdk::Vector& dz);
 
     /// The form in use, its fill and the regularisation, for a message.
     [[nodiscard]] std::string description() const;

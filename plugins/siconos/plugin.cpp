@@ -63,6 +63,7 @@ constexpr PluginInfo info{
     .capabilities = DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_FRICTION | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL |
                     DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE |
                     DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
+    .flags = DELASSUS_FLAG_PEER,  // Siconos exits the process on some of its internal errors
 };
 
 const Method& method_of(const std::string& name) {

@@ -55,6 +55,11 @@ TEST_F(Siconos, FactoringMethodsAgreeToo) {
     for (const char* method : {"nsn_ac", "admm"}) expect_velocities_of_pgs(pile, {{"method", method}});
 }
 
+// Its library may exit the process: auto must not come to it by itself.
+TEST_F(Siconos, IsAPeer) {
+    EXPECT_EQ(Registry().find("siconos").flags, DELASSUS_FLAG_PEER);
+}
+
 TEST_F(Siconos, RefusesTheAssociatedLaw) {
     const Problem problem = tests::point_on_plane(1.0, 1.0, 2.0, 0.5, Law::Associated);
     EXPECT_THROW(solve_with("siconos", problem, to(1e-8)), Unsupported);

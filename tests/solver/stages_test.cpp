@@ -7,10 +7,12 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "delassus/config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
+#include "solver/auto_solver.hpp"
 #include "support/run_command.hpp"
 #include "support/small_problems.hpp"
 
@@ -151,6 +153,34 @@ TEST(Auto, GoesOnWithWhoeverCan) {
     EXPECT_EQ(report.stages[0].solver, "pgs");
     EXPECT_EQ(report.stages[0].status, Status::IterationLimit);
     EXPECT_GE(report.stages.size(), 2U);
+}
+
+// A plugin that is there for comparisons works only where a rule names it.
+TEST(Auto, NeverTurnsToAPeerByItself) {
+    const ScratchFolder scratch;
+    const auto add_plugin = [&](const std::string& name, std::uint32_t flags) {
+        PluginInfo info;
+        info.name = name;
+        info.abi_major = DELASSUS_ABI_MAJOR;
+        info.flags = flags;
+        info.capabilities = registry().find("pgs").capabilities;
+        info.library = scratch / (name + ".so");
+        std::ofstream(info.library) << "never loaded";
+        std::ofstream(scratch / (name + ".json")) << sidecar_text(info);
+    };
+    add_plugin("helper", 0);
+    add_plugin("peer", DELASSUS_FLAG_PEER);
+    const Registry with_both({scratch.path()});
+    const std::uint64_t needs = PreparedProblem(point_on_plane(2.0, 10.0, 8.0, 0.5, Law::Coulomb)).needs();
+    const auto later = [&](const std::string& stages) {
+        const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [)" + stages + "]}]");
+        const auto choice = auto_choice(with_both, {{"ranking", file}}, needs, 1e-8);
+        return std::set<std::string>(choice.later.begin(), choice.later.end());
+    };
+    const std::string pgs = R"({"solver": "pgs", "reason": "first"})";
+    EXPECT_TRUE(later(pgs).contains("helper"));
+    EXPECT_FALSE(later(pgs).contains("peer"));
+    EXPECT_TRUE(later(pgs + R"(, {"solver": "peer", "reason": "named"})").contains("peer"));
 }
 
 // A stage may solve under the other law, as a start; the problem's own law judges.

@@ -187,9 +187,9 @@ typedef struct delassus_outcome {
 } delassus_outcome;
 
 /* ---- The descriptor ------------------------------------------------------------------------------------------ */
-
 #define DELASSUS_FLAG_GLOBAL_SYMBOLS 1u /* load with RTLD_GLOBAL (libraries that load parts of themselves) */
 #define DELASSUS_FLAG_MPI 2u            /* starts MPI when first created */
+#define DELASSUS_FLAG_PEER 4u           /* for comparisons: works only where it is named, never as a last resort */
 
 typedef struct delassus_plugin_descriptor {
     uint32_t magic;       /* DELASSUS_PLUGIN_MAGIC */

@@ -47,6 +47,17 @@ bool can(const Registry& registry, const std::string& name, std::uint64_t needs)
                        [&](const PluginInfo& plugin) { return plugin.name == name && plugin.missing(needs) == 0; });
 }
 
+/// Who can take problems with these needs without being named; ascending.
+std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) {
+    std::vector<std::string> names = registry.capable(needs);
+    std::erase_if(names, [&](const std::string& name) {
+        return std::any_of(registry.plugins().begin(), registry.plugins().end(), [&](const PluginInfo& plugin) {
+            return plugin.name == name && (plugin.flags & DELASSUS_FLAG_PEER) != 0;
+        });
+    });
+    return names;
+}
+
 class AutoSolver : public Solver::Implementation {
 public:
     AutoSolver(const Registry& registry, OptionTexts options)
@@ -58,17 +69,19 @@ public:
     [[nodiscard]] const PluginInfo& info() const override { return info_; }
     [[nodiscard]] const OptionTexts& options() const override { return options_; }
 
-    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings&) override {
-        if (!registry_.capable(needs_of(problem, {})).empty()) return {};
+    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) override {
+        const std::uint64_t needs = needs_of(problem, {});
+        if (!unnamed(registry_, needs).empty()) return {};
+        for (const auto& ranked : rule_of(problem, settings).stages)
+            if (can(registry_, ranked.solver, needs)) return {};
         return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
-                           problem.describe(needs_of(problem, {})));
+                           problem.describe(needs));
     }
 
     void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
              SolveReport& report) override {
         const std::uint64_t needs = needs_of(problem, {});
-        const RankingRule& rule =
-            chosen_.ranking.rule({needs, settings.tolerance, chosen_.simulation}, problem.raw().m);
+        const RankingRule& rule = rule_of(problem, settings);
         StageRunner runner(problem, solution, settings, report);
         bool done = false;
         for (const auto& ranked : rule.stages) {
@@ -79,7 +92,7 @@ public:
         }
         // Nothing of the rule is installed, or none got there: everyone else who can, from the best so far.
         if (!done)
-            for (const auto& name : registry_.capable(needs)) {
+            for (const auto& name : unnamed(registry_, needs)) {
                 const RankedStage ranked{name, {}, {.reason = "those before it did not get there", .watched = true}};
                 const bool tried =
                     std::any_of(report.stages.begin(), report.stages.end(), [&](const StageReport& stage) {
@@ -92,6 +105,10 @@ public:
     }
 
 private:
+    [[nodiscard]] const RankingRule& rule_of(const PreparedProblem& problem, const SolveSettings& settings) const {
+        return chosen_.ranking.rule({needs_of(problem, {}), settings.tolerance, chosen_.simulation}, problem.raw().m);
+    }
+
     /// The solver of a stage, kept from problem to problem; null if it is not installed or cannot take the problem.
     Solver* usable(const RankedStage& ranked, const PreparedProblem& problem) {
         if (!can(registry_, ranked.solver, needs_of(problem, {}))) return nullptr;
@@ -172,7 +189,7 @@ AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint6
         others = others || !ends;
     }
     if (others)
-        for (const auto& name : registry.capable(needs)) add(choice.first.empty() ? choice.first : choice.later, name);
+        for (const auto& name : unnamed(registry, needs)) add(choice.first.empty() ? choice.first : choice.later, name);
     return choice;
 }
 

@@ -2,16 +2,17 @@
 // L S Lᵀ of a symmetric sparse matrix with pivots of known signs S = diag(±1), without pivoting, by dense fronts.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/OrderingMethods>
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <numeric>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "delassus/sdk/dense_front.hpp"
 #include "delassus/sdk/dissection.hpp"
 #include "delassus/sdk/problem_view.hpp"
 
@@ -20,9 +21,14 @@ namespace delassus::sdk {
 /// The multifrontal method (Duff and Reid 1983; Liu 1992): columns of L with nearly the same pattern form a supernode,
 /// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
 /// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD, or nested
-/// dissection where that takes fewer operations.
+/// dissection where that takes fewer operations. Fronts are factored by Eigen, or by the system's BLAS where the
+/// analysis foretells so much work that loading it pays.
 class SparseFactor {
 public:
+    enum class Kernels { Best, Eigen };
+
+    explicit SparseFactor(Kernels kernels = Kernels::Best) : kernels_(kernels) {}
+
     /// The rows of a matrix by the supernodes that they reach in half solves.
     struct Reach {
         std::vector<std::vector<std::int32_t>> rows;  ///< of each supernode, ascending
@@ -49,6 +55,10 @@ public:
     /// Entries of L, known after analyze.
     [[nodiscard]] double entries() const { return entries_; }
 
+    /// What works on dense fronts, known after analyze.
+    [[nodiscard]] bool uses_blas() const { return front_.blas() != nullptr; }
+    [[nodiscard]] std::string kernels() const { return front_.blas() ? front_.blas()->description() : "Eigen"; }
+
     /// Which half-solved rows D L⁻ᵀ have entries where; the pattern of D (any rows, as many columns as the matrix).
     [[nodiscard]] Reach reach(const SparseRowsView& D) const;
 
@@ -68,26 +78,34 @@ private:
         std::size_t row = 0;                  // into row_: height of them, ascending
         std::size_t panel = 0;                // into value_: height × columns
         std::size_t entry = 0;                // into entry_: up to that of the next supernode
-        bool definite = true;                 // all pivots positive
+        std::size_t child = 0, children = 0;  // into child_
+        std::size_t depth = 0;                // below its root
+        std::size_t update = 0;               // into stack_[depth % 2]: (height − columns)², lower triangle
     };
     struct Entry {
         std::int32_t source;  // into the values of the matrix
+        std::int32_t row;     // of L
         std::size_t target;   // into the panel
     };
 
-    void find_supernodes(const SparseColumns& permuted, const std::vector<std::int32_t>& parent);
+    /// Rows by columns, or columns by rows, without values.
+    struct Pattern {
+        std::vector<std::int32_t> start, index;
+    };
+
+    void find_supernodes(const Pattern& columns);
+    void find_stacks();
     void find_places(const Eigen::Ref<const SparseColumns>& matrix);
-    void add_update(std::size_t child);
-    [[nodiscard]] bool eliminate(std::size_t node);
+    [[nodiscard]] DenseFront::Block update_of(const Supernode& node);
+    void add_update(const Supernode& child);
 
     static std::vector<std::int32_t> minimum_degree(const Eigen::Ref<const SparseColumns>& matrix);
-    static std::vector<std::int32_t> elimination_tree(const SparseColumns& lower);
+    static std::vector<std::int32_t> elimination_tree(const Pattern& rows);
     static std::vector<std::int32_t> postorder(const std::vector<std::int32_t>& parent);
-    static SparseColumns permute(const Eigen::Ref<const SparseColumns>& matrix,
-                                 const std::vector<std::int32_t>& position);
+    static Pattern permute(const Eigen::Ref<const SparseColumns>& matrix, const std::vector<std::int32_t>& position,
+                           bool by_rows);
 
     using Matrix = Eigen::MatrixXd;
-    using Panel = Eigen::Map<Matrix>;
     using ConstPanel = Eigen::Map<const Matrix>;
 
     Eigen::Index size_ = 0, positive_ = 0;
@@ -100,50 +118,52 @@ private:
     std::vector<std::int32_t> row_;
     // Beside row_, for the rows of the update: their rows in the parent's front.
     std::vector<std::int32_t> place_in_parent_;
+    std::vector<std::int32_t> run_end_;  // beside place_in_parent_: up to there the places follow one another
     std::vector<Entry> entry_;
     std::vector<double> value_;
-    std::vector<Matrix> update_;  // one a supernode, while its parent waits for it; lower triangle
+    std::vector<std::size_t> child_;  // supernodes
+    // Updates that wait for their parents, by the parity of the depth: the children of a supernode lie on top of one
+    // stack when it puts its own update on the other.
+    std::array<std::vector<double>, 2> stack_;
+    std::array<std::size_t, 2> stack_size_{};
+    Kernels kernels_;
+    DenseFront front_;
     mutable Vector work_, gathered_;
 };
 
-/// The lower triangle of the matrix with its rows and columns at new positions, columns sorted.
-inline SparseColumns SparseFactor::permute(const Eigen::Ref<const SparseColumns>& matrix,
-                                           const std::vector<std::int32_t>& position) {
-    std::vector<std::int32_t> count(position.size(), 0);
+/// The strict lower triangle of the matrix with its rows and columns at new positions, in no order within a row or
+/// column.
+inline SparseFactor::Pattern SparseFactor::permute(const Eigen::Ref<const SparseColumns>& matrix,
+                                                   const std::vector<std::int32_t>& position, bool by_rows) {
+    const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     const auto visit = [&](auto&& take) {
-        for (Eigen::Index j = 0; j < matrix.cols(); ++j)
-            for (Eigen::Ref<const SparseColumns>::InnerIterator entry(matrix, j); entry; ++entry) {
-                if (entry.row() < j) continue;
-                const std::int32_t p = position[static_cast<std::size_t>(entry.row())];
-                const std::int32_t q = position[static_cast<std::size_t>(j)];
-                take(std::max(p, q), std::min(p, q));
+        for (std::int32_t j = 0; j < matrix.cols(); ++j)
+            for (std::int32_t k = start[j]; k < start[j + 1]; ++k) {
+                if (row[k] <= j) continue;
+                const auto [low, high] =
+                    std::minmax(position[static_cast<std::size_t>(row[k])], position[static_cast<std::size_t>(j)]);
+                by_rows ? take(static_cast<std::size_t>(high), low) : take(static_cast<std::size_t>(low), high);
             }
     };
-    visit([&](std::int32_t, std::int32_t column) { ++count[static_cast<std::size_t>(column)]; });
-    SparseColumns result(matrix.rows(), matrix.cols());
-    const std::int32_t entries = std::accumulate(count.begin(), count.end(), 0);
-    result.resizeNonZeros(entries);
-    std::fill_n(result.valuePtr(), entries, 1.0);
-    std::int32_t* start = result.outerIndexPtr();
-    start[0] = 0;
-    for (std::size_t j = 0; j < count.size(); ++j) start[j + 1] = start[j] + count[j];
-    std::vector<std::int32_t> next(start, start + count.size());
-    visit([&](std::int32_t row, std::int32_t column) {
-        result.innerIndexPtr()[next[static_cast<std::size_t>(column)]++] = row;
-    });
-    for (std::size_t j = 0; j < count.size(); ++j)
-        std::sort(result.innerIndexPtr() + start[j], result.innerIndexPtr() + start[j + 1]);
+    Pattern result;
+    result.start.assign(position.size() + 1, 0);
+    visit([&](std::size_t outer, std::int32_t) { ++result.start[outer + 1]; });
+    std::partial_sum(result.start.begin(), result.start.end(), result.start.begin());
+    result.index.resize(static_cast<std::size_t>(result.start.back()));
+    std::vector<std::int32_t> next = result.start;
+    visit(
+        [&](std::size_t outer, std::int32_t inner) { result.index[static_cast<std::size_t>(next[outer]++)] = inner; });
     return result;
 }
 
-/// The elimination tree (Liu 1986): parent of each column, −1 at a root.
-inline std::vector<std::int32_t> SparseFactor::elimination_tree(const SparseColumns& lower) {
-    const auto n = static_cast<std::size_t>(lower.cols());
+/// The elimination tree (Liu 1986) of a matrix by the rows of its lower triangle: parent of each column, −1 at a root.
+inline std::vector<std::int32_t> SparseFactor::elimination_tree(const Pattern& rows) {
+    const std::size_t n = rows.start.size() - 1;
     std::vector<std::int32_t> parent(n, -1), ancestor(n, -1);
-    const Eigen::SparseMatrix<double, Eigen::RowMajor, std::int32_t> rows = lower;
-    for (std::int32_t i = 0; i < lower.rows(); ++i) {
-        for (decltype(rows)::InnerIterator entry(rows, i); entry; ++entry) {
-            auto j = static_cast<std::int32_t>(entry.col());
+    for (std::size_t row = 0; row < n; ++row) {
+        const auto i = static_cast<std::int32_t>(row);
+        for (std::int32_t k = rows.start[row]; k < rows.start[row + 1]; ++k) {
+            std::int32_t j = rows.index[static_cast<std::size_t>(k)];
             while (j >= 0 && j < i) {
                 const std::int32_t next = ancestor[static_cast<std::size_t>(j)];
                 ancestor[static_cast<std::size_t>(j)] = i;
@@ -204,15 +224,17 @@ inline bool SparseFactor::has_analyzed(const Eigen::Ref<const SparseColumns>& ma
 
 inline bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
     constexpr Eigen::Index smallest_to_dissect = 1000;
+    constexpr double least_flops_for_blas = 5e7;  // some 5 ms of Eigen
     if (has_analyzed(matrix, positive)) return false;
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     analyze(matrix, positive, minimum_degree(matrix));
     // Dissection is worth its time where the fill is large.
     if (entries_ >= 10.0 * static_cast<double>(matrix.nonZeros()) && size_ >= smallest_to_dissect) {
-        SparseFactor other;
+        SparseFactor other(kernels_);
         other.analyze(matrix, positive, nested_dissection(matrix));
         if (other.flops_ < flops_) *this = std::move(other);
     }
+    front_ = DenseFront(kernels_ == Kernels::Best && flops_ >= least_flops_for_blas ? Blas::find() : nullptr);
     analyzed_start_.assign(start, start + matrix.cols() + 1);
     analyzed_row_.assign(row, row + matrix.nonZeros());
     return true;
@@ -224,61 +246,77 @@ inline void SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix,
     positive_ = positive;
     const auto n = static_cast<std::size_t>(size_);
     position_ = std::move(position);
-    const std::vector<std::int32_t> parent = elimination_tree(permute(matrix, position_));
-    const std::vector<std::int32_t> post = postorder(parent);
-    std::vector<std::int32_t> moved(n, -1);
-    for (std::size_t j = 0; j < n; ++j)
-        if (parent[j] >= 0) moved[static_cast<std::size_t>(post[j])] = post[static_cast<std::size_t>(parent[j])];
+    const std::vector<std::int32_t> post = postorder(elimination_tree(permute(matrix, position_, true)));
     for (auto& p : position_) p = post[static_cast<std::size_t>(p)];
     sign_.assign(n, 1.0);
     for (std::size_t i = 0; i < n; ++i)
         if (static_cast<Eigen::Index>(i) >= positive) sign_[static_cast<std::size_t>(position_[i])] = -1.0;
-    find_supernodes(permute(matrix, position_), moved);
+    find_supernodes(permute(matrix, position_, false));
     find_places(matrix);
 }
 
-inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const std::vector<std::int32_t>& parent) {
+// A column of L has the rows of the matrix's column and those of its children in the elimination tree: of the runs of
+// columns so far whose first row below is this column. Where one run alone has it, and the matrix adds no row, the
+// column joins that run without a look at its rows.
+inline void SparseFactor::find_supernodes(const Pattern& columns) {
     const auto n = static_cast<std::size_t>(size_);
-    // The pattern of each column of L: its own entries and those of its children below themselves.
-    std::vector<std::vector<std::int32_t>> pattern(n), children(n);
-    for (std::size_t j = 0; j < n; ++j)
-        if (parent[j] >= 0) children[static_cast<std::size_t>(parent[j])].push_back(static_cast<std::int32_t>(j));
-    std::vector<std::int32_t> mark(n, -1);
     struct Run {
         std::int32_t first, columns;
-        std::vector<std::int32_t> below;  // rows under the last column
-        double zeros;                     // stored without need
+        std::vector<std::int32_t> below;  // rows under the last column, ascending, from `begin` on
+        std::size_t begin;
+        double zeros;  // stored without need
+
+        [[nodiscard]] std::size_t rows_below() const { return below.size() - begin; }
     };
     std::vector<Run> runs;
+    std::vector<std::int32_t> first_waiting(n, -1), next_waiting;  // runs by their first row below
+    std::vector<std::int32_t> mark(n, -1);                         // the column in whose turn the row was found
+    std::int32_t marked = -1;                                      // the turn that found the rows of the last run
     for (std::size_t j = 0; j < n; ++j) {
         const auto column = static_cast<std::int32_t>(j);
-        std::vector<std::int32_t>& rows = pattern[j];
-        mark[j] = column;
-        const auto take = [&](std::int32_t i) {
-            if (i <= column || mark[static_cast<std::size_t>(i)] == column) return;
-            mark[static_cast<std::size_t>(i)] = column;
-            rows.push_back(i);
-        };
-        for (SparseColumns::InnerIterator entry(permuted, column); entry; ++entry)
-            take(static_cast<std::int32_t>(entry.row()));
-        for (const auto child : children[j]) {
-            for (const auto i : pattern[static_cast<std::size_t>(child)]) take(i);
-            pattern[static_cast<std::size_t>(child)] = {};
+        const auto* own = columns.index.data() + columns.start[j];
+        const auto* own_end = columns.index.data() + columns.start[j + 1];
+        const std::int32_t child = first_waiting[j];
+        Run run{column, 1, {}, 0, 0.0};
+        if (child >= 0 && next_waiting[static_cast<std::size_t>(child)] < 0 &&
+            static_cast<std::size_t>(child) + 1 == runs.size() &&
+            std::all_of(own, own_end, [&](std::int32_t i) { return mark[static_cast<std::size_t>(i)] == marked; })) {
+            run = std::move(runs.back());
+            runs.pop_back();
+            ++run.begin;
+            ++run.columns;
+        } else {
+            const auto take = [&](std::int32_t i) {
+                if (i <= column || mark[static_cast<std::size_t>(i)] == column) return;
+                mark[static_cast<std::size_t>(i)] = column;
+                run.below.push_back(i);
+            };
+            std::for_each(own, own_end, take);
+            for (std::int32_t r = child; r >= 0; r = next_waiting[static_cast<std::size_t>(r)]) {
+                const Run& from = runs[static_cast<std::size_t>(r)];
+                std::for_each(from.below.begin() + static_cast<std::ptrdiff_t>(from.begin), from.below.end(), take);
+            }
+            std::sort(run.below.begin(), run.below.end());
+            marked = column;
         }
-        std::sort(rows.begin(), rows.end());
-        Run run{column, 1, rows, 0.0};
         // The run before joins in if this column is its parent and few zeros are stored for it.
         while (!runs.empty()) {
             const Run& before = runs.back();
-            if (before.below.empty() || before.below.front() > column) break;
-            const double height = static_cast<double>(run.columns) + static_cast<double>(run.below.size());
-            const double extra = before.columns * (height - static_cast<double>(before.below.size()));
-            const double columns = before.columns + run.columns;
-            const double stored = columns * (columns + static_cast<double>(run.below.size()));
+            if (before.rows_below() == 0 || before.below[before.begin] > column) break;
+            const double height = static_cast<double>(run.columns) + static_cast<double>(run.rows_below());
+            const double extra = before.columns * (height - static_cast<double>(before.rows_below()));
+            const double together = before.columns + run.columns;
+            const double stored = together * (together + static_cast<double>(run.rows_below()));
             const double zeros = before.zeros + run.zeros + extra;
-            if (extra > 0.0 && !(zeros <= 0.1 * stored || (columns <= 12.0 && zeros <= 0.3 * stored))) break;
-            run = {before.first, before.columns + run.columns, std::move(run.below), zeros};
+            if (extra > 0.0 && !(zeros <= 0.1 * stored || (together <= 12.0 && zeros <= 0.3 * stored))) break;
+            run = {before.first, before.columns + run.columns, std::move(run.below), run.begin, zeros};
             runs.pop_back();
+        }
+        next_waiting.resize(runs.size() + 1, -1);
+        if (run.rows_below() > 0) {
+            const auto above = static_cast<std::size_t>(run.below[run.begin]);
+            next_waiting[runs.size()] = first_waiting[above];
+            first_waiting[above] = static_cast<std::int32_t>(runs.size());
         }
         runs.push_back(std::move(run));
     }
@@ -291,15 +329,14 @@ inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const s
         Supernode node;
         node.first = run.first;
         node.columns = run.columns;
-        node.height = run.columns + static_cast<std::int32_t>(run.below.size());
+        node.height = run.columns + static_cast<std::int32_t>(run.rows_below());
         node.row = row_.size();
         node.panel = static_cast<std::size_t>(entries_);
         for (std::int32_t c = 0; c < run.columns; ++c) {
             row_.push_back(run.first + c);
             node_of_[static_cast<std::size_t>(run.first + c)] = static_cast<std::int32_t>(nodes_.size());
-            if (sign_[static_cast<std::size_t>(run.first + c)] < 0.0) node.definite = false;
         }
-        row_.insert(row_.end(), run.below.begin(), run.below.end());
+        row_.insert(row_.end(), run.below.begin() + static_cast<std::ptrdiff_t>(run.begin), run.below.end());
         entries_ += static_cast<double>(node.height) * node.columns;
         flops_ += static_cast<double>(node.height) * node.height * node.columns;
         nodes_.push_back(node);
@@ -307,111 +344,120 @@ inline void SparseFactor::find_supernodes(const SparseColumns& permuted, const s
     for (Supernode& node : nodes_)
         if (node.height > node.columns)
             node.parent = node_of_[static_cast<std::size_t>(row_[node.row + static_cast<std::size_t>(node.columns)])];
+    find_stacks();
+}
+
+inline void SparseFactor::find_stacks() {
+    std::vector<std::vector<std::size_t>> children(nodes_.size());
+    for (std::size_t s = 0; s < nodes_.size(); ++s)
+        if (nodes_[s].parent >= 0) children[static_cast<std::size_t>(nodes_[s].parent)].push_back(s);
+    child_.clear();
+    for (std::size_t s = nodes_.size(); s-- > 0;) {
+        Supernode& node = nodes_[s];
+        node.depth = node.parent < 0 ? 0 : nodes_[static_cast<std::size_t>(node.parent)].depth + 1;
+        node.child = child_.size();
+        node.children = children[s].size();
+        child_.insert(child_.end(), children[s].begin(), children[s].end());
+    }
+    stack_size_ = {};
+    std::array<std::size_t, 2> top{};
+    for (Supernode& node : nodes_) {
+        const auto rest = static_cast<std::size_t>(node.height - node.columns);
+        if (node.children > 0) top[(node.depth + 1) % 2] = nodes_[child_[node.child]].update;
+        const std::size_t own = node.depth % 2;
+        node.update = top[own];
+        top[own] += rest * rest;
+        stack_size_[own] = std::max(stack_size_[own], top[own]);
+    }
 }
 
 inline void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& matrix) {
-    const auto place = [this](const Supernode& node, std::int32_t row) {
-        const auto begin = row_.begin() + static_cast<std::ptrdiff_t>(node.row);
-        return static_cast<std::int32_t>(std::lower_bound(begin, begin + node.height, row) - begin);
+    // The entries of the matrix by supernodes: their counts, then their places in L for the time being.
+    const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
+    const auto visit = [&](auto&& take) {
+        for (std::int32_t j = 0; j < matrix.cols(); ++j)
+            for (std::int32_t k = start[j]; k < start[j + 1]; ++k) {
+                if (row[k] < j) continue;
+                const auto [low, high] =
+                    std::minmax(position_[static_cast<std::size_t>(row[k])], position_[static_cast<std::size_t>(j)]);
+                take(k, low, high, static_cast<std::size_t>(node_of_[static_cast<std::size_t>(low)]));
+            }
     };
-    place_in_parent_.assign(row_.size(), 0);
-    for (const Supernode& node : nodes_)
-        for (std::int32_t i = node.columns; i < node.height; ++i)
-            place_in_parent_[node.row + static_cast<std::size_t>(i)] =
-                place(nodes_[static_cast<std::size_t>(node.parent)], row_[node.row + static_cast<std::size_t>(i)]);
-    std::vector<std::vector<Entry>> entries(nodes_.size());
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
-        for (std::int32_t k = matrix.outerIndexPtr()[j]; k < matrix.outerIndexPtr()[j + 1]; ++k) {
-            if (matrix.innerIndexPtr()[k] < j) continue;
-            const std::int32_t p = position_[static_cast<std::size_t>(matrix.innerIndexPtr()[k])];
-            const std::int32_t q = position_[static_cast<std::size_t>(j)];
-            const auto s = static_cast<std::size_t>(node_of_[static_cast<std::size_t>(std::min(p, q))]);
-            const Supernode& node = nodes_[s];
-            const auto column = static_cast<std::size_t>(std::min(p, q) - node.first);
-            entries[s].push_back({k, column * static_cast<std::size_t>(node.height) +
-                                         static_cast<std::size_t>(place(node, std::max(p, q)))});
-        }
-    }
-    entry_.clear();
+    std::vector<std::size_t> next(nodes_.size() + 1, 0);
+    visit([&](std::int32_t, std::int32_t, std::int32_t, std::size_t s) { ++next[s + 1]; });
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    entry_.resize(next.back());
+    for (std::size_t s = 0; s < nodes_.size(); ++s) nodes_[s].entry = next[s];
+    visit([&](std::int32_t k, std::int32_t low, std::int32_t high, std::size_t s) {
+        const auto column = static_cast<std::size_t>(low - nodes_[s].first);
+        entry_[next[s]++] = {k, high, column * static_cast<std::size_t>(nodes_[s].height)};
+    });
+    place_in_parent_.resize(row_.size());
+    run_end_.resize(row_.size());
+    std::vector<std::int32_t> place(static_cast<std::size_t>(size_));
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
-        nodes_[s].entry = entry_.size();
-        entry_.insert(entry_.end(), entries[s].begin(), entries[s].end());
+        const Supernode& node = nodes_[s];
+        for (std::int32_t i = 0; i < node.height; ++i)
+            place[static_cast<std::size_t>(row_[node.row + static_cast<std::size_t>(i)])] = i;
+        for (std::size_t k = node.entry; k < next[s]; ++k)
+            entry_[k].target += static_cast<std::size_t>(place[static_cast<std::size_t>(entry_[k].row)]);
+        for (std::size_t c = 0; c < node.children; ++c) {
+            const Supernode& child = nodes_[child_[node.child + c]];
+            for (std::int32_t i = child.columns; i < child.height; ++i) {
+                const std::size_t k = child.row + static_cast<std::size_t>(i);
+                place_in_parent_[k] = place[static_cast<std::size_t>(row_[k])];
+            }
+            for (std::int32_t i = child.height - 1; i >= child.columns; --i) {
+                const std::size_t k = child.row + static_cast<std::size_t>(i);
+                const bool last = i + 1 == child.height || place_in_parent_[k + 1] != place_in_parent_[k] + 1;
+                run_end_[k] = last ? i + 1 - child.columns : run_end_[k + 1];
+            }
+        }
     }
 }
 
 inline bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
     value_.assign(static_cast<std::size_t>(entries_), 0.0);
-    update_.resize(nodes_.size());
+    for (std::size_t k = 0; k < 2; ++k) stack_[k].resize(stack_size_[k]);
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
         const Supernode& node = nodes_[s];
         const std::size_t end = s + 1 < nodes_.size() ? nodes_[s + 1].entry : entry_.size();
         for (std::size_t k = node.entry; k < end; ++k)
             value_[node.panel + entry_[k].target] += matrix.valuePtr()[entry_[k].source];
-    }
-    for (std::size_t s = 0; s < nodes_.size(); ++s) {
-        const Eigen::Index rest = nodes_[s].height - nodes_[s].columns;
-        if (update_[s].rows() != rest) update_[s].setZero(rest, rest);
-        if (!eliminate(s)) {
-            update_.clear();
-            return false;
-        }
-        if (rest > 0) add_update(s);
+        DenseFront::Block update = update_of(node);
+        for (Eigen::Index j = 0; j < update.cols(); ++j) update.col(j).tail(update.rows() - j).setZero();
+        for (std::size_t k = 0; k < node.children; ++k) add_update(nodes_[child_[node.child + k]]);
+        const DenseFront::Block panel(value_.data() + node.panel, node.height, node.columns,
+                                      Eigen::OuterStride<>(node.height));
+        if (!front_.factor(panel, sign_.data() + node.first, update)) return false;
     }
     return true;
 }
 
-// Factors the panel [A11; A21] into L11, L21 = A21 L11⁻ᵀ S, and takes L21 S L21ᵀ from the update.
-inline bool SparseFactor::eliminate(std::size_t s) {
-    const Supernode& node = nodes_[s];
-    const Eigen::Index k = node.columns, rest = node.height - k;
-    Panel panel(value_.data() + node.panel, node.height, k);
-    auto top = panel.topRows(k);
-    auto bottom = panel.bottomRows(rest);
-    if (node.definite) {
-        if (k == 1) {
-            if (!(panel(0, 0) > 0.0) || !std::isfinite(panel(0, 0))) return false;
-            panel(0, 0) = std::sqrt(panel(0, 0));
-            bottom /= panel(0, 0);
-        } else {
-            Eigen::LLT<Eigen::Ref<Matrix>> factor(top);
-            if (factor.info() != Eigen::Success || !std::isfinite(top.diagonal().sum())) return false;
-            if (rest > 0) top.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(bottom);
-        }
-        if (rest > 0) update_[s].selfadjointView<Eigen::Lower>().rankUpdate(bottom, -1.0);
-        return true;
-    }
-    const Eigen::Map<const Vector> sign(sign_.data() + node.first, k);
-    for (Eigen::Index c = 0; c < k; ++c) {
-        const double pivot = sign[c] * panel(c, c);
-        if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
-        panel.col(c).tail(node.height - c) *= sign[c] / std::sqrt(pivot);
-        for (Eigen::Index j = c + 1; j < k; ++j)
-            panel.col(j).tail(node.height - j) -= sign[c] * panel(j, c) * panel.col(c).tail(node.height - j);
-    }
-    if (rest > 0) update_[s].triangularView<Eigen::Lower>() -= (bottom * sign.asDiagonal()) * bottom.transpose();
-    return true;
+inline DenseFront::Block SparseFactor::update_of(const Supernode& node) {
+    const Eigen::Index rest = node.height - node.columns;
+    return {stack_[node.depth % 2].data() + node.update, rest, rest, Eigen::OuterStride<>(rest)};
 }
 
-// Adds the update of a supernode to its parent's front, and frees it.
-inline void SparseFactor::add_update(std::size_t child) {
-    const Supernode& node = nodes_[child];
-    const auto p = static_cast<std::size_t>(node.parent);
-    const Supernode& parent = nodes_[p];
-    Matrix& update = update_[child];
-    const Eigen::Index rest = update.rows(), above = parent.height - parent.columns;
-    if (update_[p].rows() != above) update_[p].setZero(above, above);
-    const std::int32_t* place = place_in_parent_.data() + node.row + node.columns;
+// Adds the update of a supernode to its parent's front.
+inline void SparseFactor::add_update(const Supernode& child) {
+    const Supernode& parent = nodes_[static_cast<std::size_t>(child.parent)];
+    const DenseFront::Block from = update_of(child);
+    DenseFront::Block update = update_of(parent);
+    const Eigen::Index rest = from.rows();
+    const std::int32_t* place = place_in_parent_.data() + child.row + child.columns;
+    const std::int32_t* run_end = run_end_.data() + child.row + child.columns;
     for (Eigen::Index j = 0; j < rest; ++j) {
-        if (place[j] < parent.columns) {
-            double* target = value_.data() + parent.panel +
-                             static_cast<std::size_t>(place[j]) * static_cast<std::size_t>(parent.height);
-            for (Eigen::Index i = j; i < rest; ++i) target[place[i]] += update(i, j);
-        } else {
-            double* target = update_[p].col(place[j] - parent.columns).data();
-            for (Eigen::Index i = j; i < rest; ++i) target[place[i] - parent.columns] += update(i, j);
+        const bool own = place[j] < parent.columns;
+        double* target = own ? value_.data() + parent.panel +
+                                   static_cast<std::size_t>(place[j]) * static_cast<std::size_t>(parent.height)
+                             : update.col(place[j] - parent.columns).data() - parent.columns;
+        const double* source = from.col(j).data();
+        for (Eigen::Index i = j; i < rest;) {
+            const Eigen::Index end = run_end[i];
+            for (double* t = target + place[i]; i < end; ++i) *t++ += source[i];
         }
     }
-    update.resize(0, 0);
 }
 
 inline void SparseFactor::solve(Vector& v) const {
