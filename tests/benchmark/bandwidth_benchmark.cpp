@@ -48,7 +48,7 @@ double bytes_of_iteration(const delassus::Problem& problem, bool sweeps) {
     const double coefficients = static_cast<double>(problem.D.entries()) * sizeof(double);
     const double columns = static_cast<double>(problem.D.entries()) / 3.0 * sizeof(std::int32_t);
     if (sweeps) {
-        const double headers = contacts * (sizeof(delassus::pgs::Block) + sizeof(delassus::pgs::LocalBlock));
+        const double headers = contacts * (sizeof(delassus::sdk::BlockRows::Group) + sizeof(delassus::pgs::LocalBlock));
         return coefficients + columns / 3.0 + headers + sizeof(double) * (3.0 * m + 2.0 * n);
     }
     return 2.0 * (coefficients + columns) + sizeof(double) * (6.0 * m + 2.0 * n);

@@ -78,10 +78,17 @@ public:
         if (rows_.entries() > 0) {
             work_.setZero();
             rows_.transpose_multiply_add(lambda.data(), work_.data());
-            if (!whitened_) operator_.inverse().apply(work_);
+            if (!whitened_) {
+                velocity_ = work_.head(velocity_.size());
+                operator_.inverse().apply(velocity_);
+                work_.head(velocity_.size()) = velocity_;
+            }
             rows_.multiply_add(work_.data(), result.data());
         }
-        if (square_.entries() > 0) square_.multiply_add(lambda.data(), result.data());
+        if (square_.entries() > 0) {
+            padded_.head(lambda.size()) = lambda;
+            square_.multiply_add(padded_.data(), result.data());
+        }
     }
 
     /// gradient ← N̂ λ̂ + r̂ = û; both m.
@@ -182,7 +189,9 @@ private:
     void build_operator(const ProblemView& problem) {
         rows_ = {};
         square_ = {};
-        work_.setZero(problem.n);
+        work_.setZero(problem.n + chunk_padding);
+        velocity_.setZero(problem.n);
+        padded_.setZero(problem.m + chunk_padding);
         const Form form = cheapest_form(problem);
         whitened_ = form != Form::Solved;
         const HInverse& inverse = operator_.inverse();
@@ -212,7 +221,8 @@ private:
     BlockRows square_;  // Ê, or all of N̂
     bool whitened_ = true;
     bool coulomb_ = false;
-    mutable Vector work_;
+    mutable Vector work_, padded_;  // n and m, with the padding of BlockRows
+    mutable Vector velocity_;       // n
 };
 
 }  // namespace delassus::sdk
