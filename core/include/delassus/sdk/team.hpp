@@ -39,7 +39,8 @@ class Team {
 public:
     /// size: members, the calling thread among them; ≥ 1. Throws std::system_error if a thread cannot be started.
     explicit Team(int size) : size_(size) {
-        if (size > 1 && size <= usable_processors()) patience_ = 4000;
+        if (size == 1) return;
+        if (size <= usable_processors()) patience_ = 4000;
         // Signals belong to the host's threads.
         sigset_t all, before;
         sigfillset(&all);
@@ -83,7 +84,11 @@ public:
         }
         for (int k = 0; k < patience_; ++k) {
             if (turn_.load(std::memory_order_acquire) != turn) return;
-            pause();
+            if (k % looks_between_yields == looks_between_yields - 1) {
+                std::this_thread::yield();  // the one that is waited for may need this very processor
+            } else {
+                pause();
+            }
         }
         while (turn_.load(std::memory_order_acquire) == turn) turn_.wait(turn, std::memory_order_acquire);
     }
@@ -118,6 +123,7 @@ private:
     }
 
     std::atomic<int> size_;
+    static constexpr int looks_between_yields = 64;
     int patience_ = 0;  // looks at the counter before sleeping
     alignas(64) std::atomic<int> arrived_{0};
     alignas(64) std::atomic<std::uint32_t> turn_{0};
