@@ -31,6 +31,21 @@ inline void multiply_group(const double* value, const std::int32_t* start, int c
     Quad a = {}, b = {};
     int k = 0;
     if constexpr (Width == 6) {
+        if (chunks == 2) {  // two bodies: what most contacts are
+            const double *first = v + start[0], *second = v + start[1];
+            Quad middle = {}, last = {}, c = {}, d = {};
+            load(first, b);
+            load(first + 4, second, middle);
+            load(second + 2, last);
+#pragma GCC unroll 6
+            for (int i = 0; i < Rows; ++i) {
+                load(value + i * 12, a);
+                load(value + i * 12 + 4, c);
+                load(value + i * 12 + 8, d);
+                u[i] = sum(a * b + c * middle + d * last) + offset[i];
+            }
+            return;
+        }
         for (; k + 1 < chunks; k += 2, value += Rows * 12) {
             const double *first = v + start[k], *second = v + start[k + 1];
             Quad middle = {}, last = {};

@@ -43,6 +43,11 @@ inline void store(double* low, double* high, const Quad& from) {
     store(low, __builtin_shufflevector(from, from, 0, 1));
     store(high, __builtin_shufflevector(from, from, 2, 3));
 }
+/// (q₀ + q₂) + (q₁ + q₃)
+inline double sum(const Quad& quad) {
+    const Pair halves = __builtin_shufflevector(quad, quad, 0, 1) + __builtin_shufflevector(quad, quad, 2, 3);
+    return halves[0] + halves[1];
+}
 /// (q₀ + q₂ + p₀) + (q₁ + q₃ + p₁)
 inline double sum(const Quad& quad, const Pair& pair) {
     const Pair halves = __builtin_shufflevector(quad, quad, 0, 1) + __builtin_shufflevector(quad, quad, 2, 3) + pair;
