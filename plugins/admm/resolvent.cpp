@@ -139,6 +139,7 @@ void Resolvent::load(const sdk::ProblemView& problem, const sdk::Vector& r) {
     a_ = problem.a;
     b_ = scale_.cwiseProduct(primal() ? sdk::Vector(problem.b) : r);
     x_.resize(problem.n);
+    padded_.setZero(problem.n + sdk::chunk_padding);
     work_.resize(problem.m);
 }
 
@@ -155,11 +156,13 @@ void Resolvent::apply(const sdk::Vector& w, sdk::Vector& mu, sdk::Vector& u) {
     if (primal()) {
         work_ = mu;
         apply_V(work_);
-        x_ = a_;
-        rows_.transpose_multiply_add(work_.data(), x_.data());
+        padded_.head(a_.size()) = a_;
+        rows_.transpose_multiply_add(work_.data(), padded_.data());
+        x_ = padded_.head(a_.size());
         factor_->solve(x_);
+        padded_.head(a_.size()) = x_;
         work_.setZero();
-        rows_.multiply_add(x_.data(), work_.data());
+        rows_.multiply_add(padded_.data(), work_.data());
         mu -= work_;
         apply_V(mu);
     } else {

@@ -61,6 +61,7 @@ private:
     sdk::Vector compliance_, V_;  // the diagonals of Ê and of V, if Ê is diagonal; primal only
     sdk::BlockRows rows_;         // D̂; primal only
     sdk::Vector x_, work_;
+    sdk::Vector padded_;  // x with the padding of BlockRows
     std::unique_ptr<delassus_cholmod::Cholesky> factor_, compliance_factor_;
     std::int64_t analyses_ = 0, factorizations_ = 0;
 };

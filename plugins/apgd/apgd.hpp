@@ -19,19 +19,20 @@ public:
     [[nodiscard]] std::int64_t factorizations() const override { return scaled_.unscaled().inverse().factorizations(); }
 
 private:
-    void iterate(sdk::ScaledRun& run);
-    bool gradient_step(sdk::ScaledRun& run);
+    void iterate(sdk::ScaledRun& run, sdk::Team& team);
+    bool gradient_step(sdk::ScaledRun& run, sdk::Team& team);
 
     sdk::ScaledProblem scaled_;
     double growth_, shrinkage_;
     bool restart_;
-    std::int64_t stall_iterations_;
+    std::int64_t stall_iterations_, threads_;
 
-    double step_ = 1.0;                   // t
-    sdk::Vector lambda_, velocity_;       // λ̂ of the latest iterate and its û
-    sdk::Vector point_, point_velocity_;  // y, where the gradient is taken, and its û
-    sdk::Vector next_, next_velocity_;    // the iterate that follows
-    sdk::Vector change_, product_;        // d = next − y and N̂ d
+    double step_ = 1.0;                    // t
+    sdk::Vector lambda_, velocity_;        // λ̂ of the latest iterate and its û
+    sdk::Vector point_, point_velocity_;   // y, where the gradient is taken, and its û
+    sdk::Vector next_, next_velocity_;     // the iterate that follows
+    sdk::Vector change_, product_;         // d = next − y and N̂ d
+    double natural_ = 0.0, uphill_ = 0.0;  // of next: its natural error, and dᵀ(next − λ̂)
 };
 
 }  // namespace delassus::apgd

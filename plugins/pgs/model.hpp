@@ -9,9 +9,17 @@
 #include <vector>
 
 #include "delassus/sdk/delassus_operator.hpp"
+#include "delassus/sdk/team.hpp"
 #include "sweep.hpp"
+#include "sweep_order.hpp"
 
 namespace delassus::pgs {
+
+/// The rows of a block, and the cone of the problem that they belong to.
+struct Block {
+    sdk::RowGroup rows;
+    std::int32_t cone = 0;
+};
 
 /// Blocks that a sweep visits: a friction cone is one, free rows are one where there are at most six of them, and the
 /// other kinds are visited row by row.
@@ -19,10 +27,10 @@ inline std::vector<Block> blocks_of(std::span<const delassus_cone> cones) {
     std::vector<Block> blocks;
     for (std::size_t c = 0; c < cones.size(); ++c) {
         const bool together = cones[c].kind == DELASSUS_CONE_FRICTION ||
-                              (cones[c].kind == DELASSUS_CONE_FREE && cones[c].rows <= largest_block);
+                              (cones[c].kind == DELASSUS_CONE_FREE && cones[c].rows <= sdk::largest_group);
         const std::int32_t rows = together ? cones[c].rows : 1;
         for (std::int32_t i = 0; i < cones[c].rows; i += rows)
-            blocks.push_back({cones[c].first_row + i, rows, 0, static_cast<std::int32_t>(c), 0, 0});
+            blocks.push_back({{cones[c].first_row + i, rows}, static_cast<std::int32_t>(c)});
     }
     return blocks;
 }
@@ -41,85 +49,155 @@ inline bool can_sweep_on_velocities(const sdk::ProblemView& problem) {
            is_nonnegative_diagonal(problem.E);
 }
 
+/// What a sweep changes, counted as the sweep counts rows.
+struct SweepState {
+    sdk::Vector z;       ///< v̂, or λ; padded
+    sdk::Vector lambda;  ///< on velocities: λ
+};
+
 class Model {
 public:
     /// The operator is factorised. Throws std::length_error where N would be too large to form.
-    void build(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, bool on_velocities, bool jacobi) {
+    void build(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, bool on_velocities, bool jacobi,
+               Ordering ordering) {
         on_velocities_ = on_velocities;
         states_ = on_velocities ? problem.n + problem.m : problem.m;
         if (!on_velocities) check_size(problem);
         const sdk::SparseRows matrix = on_velocities ? whitened_jacobian(problem, N.inverse()) : N.formed(problem);
-        rows_.build(matrix, blocks_of(problem.cones));
+        std::vector<Block> blocks = blocks_of(problem.cones);
+        std::vector<sdk::RowGroup> groups;
+        for (const Block& block : blocks) groups.push_back(block.rows);
+        rows_ = sdk::BlockRows(matrix, groups, nullptr, nullptr);
+        order_ = SweepOrder::make(rows_, ordering, on_velocities);
+        blocks_.clear();
+        row_.clear();
+        for (const std::int32_t k : order_.block) {
+            blocks_.push_back(blocks[static_cast<std::size_t>(k)]);
+            for (std::int32_t i = 0; i < blocks_.back().rows.rows; ++i) row_.push_back(blocks_.back().rows.first + i);
+        }
+        if (ordering != Ordering::Given || on_velocities) rows_ = rows_.reordered(order_.block, on_velocities);
         build_local_problems(problem, jacobi);
     }
 
     /// μ and bounds, and what the sweep starts from; call it at each solve.
     void set_right_hand_side(const sdk::ProblemView& problem, const sdk::DelassusOperator& N) {
-        for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
-            const Block& block = rows_.blocks()[k];
-            const delassus_cone& cone = problem.cones[static_cast<std::size_t>(block.cone)];
+        for (std::size_t k = 0; k < blocks_.size(); ++k) {
+            const delassus_cone& cone = problem.cones[static_cast<std::size_t>(blocks_[k].cone)];
             LocalBlock& local = local_.block[k];
             local.mu = cone.mu;
             if (cone.kind == DELASSUS_CONE_NONNEGATIVE) local.lo = 0.0;
             if (cone.kind == DELASSUS_CONE_BOX) {
-                local.lo = cone.lo[block.first_row - cone.first_row];
-                local.hi = cone.hi[block.first_row - cone.first_row];
+                local.lo = cone.lo[blocks_[k].rows.first - cone.first_row];
+                local.hi = cone.hi[blocks_[k].rows.first - cone.first_row];
             }
         }
         std::fill(local_.kappa.begin(), local_.kappa.end(), 0.0);
         if (on_velocities_) {
-            offset_ = problem.b;
-            free_state_.setZero(states_ + padding);
+            to_sweep(problem.b, offset_);
+            free_state_.setZero(states_ + sdk::chunk_padding);
             free_state_.head(problem.n) = whitened(problem, N.inverse());
         } else {
             offset_ = N.free_velocity(problem);
         }
+        velocities_.setZero(problem.m);
     }
 
-    /// The state z of a sweep that belongs to λ; with padding.
-    void state_of(const sdk::Vector& lambda, sdk::Vector& z) const {
+    /// The state that belongs to λ (m, as the problem counts rows).
+    void state_of(const sdk::Vector& lambda, SweepState& state) const {
         if (on_velocities_) {
-            z = free_state_;
-            add_impulses(rows_, lambda.data(), z.data());
+            to_sweep(lambda, state.lambda);
+            state.z = free_state_;
+            rows_.transpose_multiply_add(state.lambda.data(), state.z.data());
         } else {
-            z.setZero(states_ + padding);
-            z.head(lambda.size()) = lambda;
+            state.z.setZero(states_ + sdk::chunk_padding);
+            state.z.head(lambda.size()) = lambda;
+        }
+    }
+    /// λ of a state; m, as the problem counts rows.
+    void reactions(const SweepState& state, sdk::Vector& lambda) const {
+        if (on_velocities_) {
+            to_problem(state.lambda, lambda);
+        } else {
+            lambda = state.z.head(offset_.size());
         }
     }
 
-    /// One Gauss–Seidel sweep; z and λ (m) belong together before and after.
-    void sweep_in_place(const SweepRule& rule, sdk::Vector& z, sdk::Vector& lambda) const {
-        if (on_velocities_) {
-            sweep<true>(rows_, local_, rule, offset_.data(), z.data(), z.data(), lambda.data());
-        } else {
-            sweep<false>(rows_, local_, rule, offset_.data(), z.data(), z.data(), nullptr);
-            lambda = z.head(lambda.size());
+    /// One Gauss–Seidel sweep; with a team of more than one, coloured blocks at the same time.
+    void sweep_in_place(const SweepRule& rule, SweepState& state, sdk::Team& team) const {
+        if (team.size() == 1 || order_.coloured == 0) {
+            visit_range(rule, state, state.z, 0, blocks_.size());
+            return;
         }
+        team.run([&](int member) {
+            const bool forward = rule.direction == Direction::Forward;
+            if (!forward) visit_rest(rule, state, team, member);
+            const std::size_t count = order_.colour.size();
+            for (std::size_t c = 0; c < count; ++c) {
+                const std::size_t colour = forward ? c : count - 1 - c;
+                const std::size_t begin = order_.colour[colour];
+                const std::size_t end = colour + 1 < count ? order_.colour[colour + 1] : order_.coloured;
+                const auto [first, last] = team.share(end - begin, member);
+                visit_range(rule, state, state.z, begin + first, begin + last);
+                team.barrier();
+            }
+            if (forward) visit_rest(rule, state, team, member);
+        });
     }
 
     /// One Jacobi step; next is work space.
-    void jacobi_step(const SweepRule& rule, sdk::Vector& z, sdk::Vector& next, sdk::Vector& lambda) const {
-        next = z;
-        if (on_velocities_) {
-            sweep<true>(rows_, local_, rule, offset_.data(), z.data(), next.data(), lambda.data());
-        } else {
-            sweep<false>(rows_, local_, rule, offset_.data(), z.data(), next.data(), nullptr);
-            lambda = next.head(lambda.size());
-        }
-        z.swap(next);
+    void jacobi_step(const SweepRule& rule, SweepState& state, sdk::Vector& next) const {
+        next = state.z;
+        visit_range(rule, state, next, 0, blocks_.size());
+        state.z.swap(next);
     }
 
-    /// u without the De Saxcé term; m.
-    void constraint_velocities(const sdk::Vector& z, sdk::Vector& u) const {
-        u.resize(offset_.size());
-        velocities(rows_, offset_.data(), z.data(), u.data());
+    /// u without the De Saxcé term; m, as the problem counts rows.
+    void constraint_velocities(const SweepState& state, sdk::Vector& u, sdk::Team& team) {
+        team.run([&](int member) {
+            const auto [first, last] = team.share(blocks_.size(), member);
+            rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), first, last);
+        });
+        if (on_velocities_) {
+            to_problem(velocities_, u);
+        } else {
+            u = velocities_;
+        }
     }
 
     [[nodiscard]] bool on_velocities() const { return on_velocities_; }
-    [[nodiscard]] const SweepRows& rows() const { return rows_; }
+    [[nodiscard]] const sdk::BlockRows& rows() const { return rows_; }
+    [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }  ///< as they are visited
+    [[nodiscard]] const SweepOrder& order() const { return order_; }
     [[nodiscard]] const LocalProblems& local() const { return local_; }
 
 private:
+    void visit_range(const SweepRule& rule, SweepState& state, sdk::Vector& next, std::size_t first,
+                     std::size_t last) const {
+        if (on_velocities_) {
+            visit<true>(rows_, first, last, local_, rule, offset_.data(), state.z.data(), next.data(),
+                        state.lambda.data());
+        } else {
+            visit<false>(rows_, first, last, local_, rule, offset_.data(), state.z.data(), next.data(), nullptr);
+        }
+    }
+
+    // The blocks without a colour, by one member.
+    void visit_rest(const SweepRule& rule, SweepState& state, sdk::Team& team, int member) const {
+        if (order_.coloured == blocks_.size()) return;
+        if (member == 0) visit_range(rule, state, state.z, order_.coloured, blocks_.size());
+        team.barrier();
+    }
+
+    template <class Rows>
+    void to_sweep(const Rows& by_problem, sdk::Vector& by_sweep) const {
+        by_sweep.resize(by_problem.size());
+        for (std::size_t i = 0; i < row_.size(); ++i) by_sweep[static_cast<Eigen::Index>(i)] = by_problem[row_[i]];
+    }
+    void to_problem(const sdk::Vector& by_sweep, sdk::Vector& by_problem) const {
+        by_problem.resize(by_sweep.size());
+        for (std::size_t i = 0; i < row_.size(); ++i) by_problem[row_[i]] = by_sweep[static_cast<Eigen::Index>(i)];
+    }
+
     // D̂ = D L⁻ᵀ with H = L Lᵀ, m × (n + m): with v̂ = Lᵀv, D v = D̂ v̂ and an impulse changes v̂ by D̂ᵀδ, so that the
     // sweep needs one set of rows instead of D and H⁻¹Dᵀ. A diagonal compliance is one more velocity of its own for
     // each row: √E_ii in column n + i adds E_ii to N_ii.
@@ -185,21 +263,20 @@ private:
     }
 
     void build_local_problems(const sdk::ProblemView& problem, bool jacobi) {
-        const std::size_t count = rows_.blocks().size();
         local_ = {};
-        local_.block.resize(count);
+        local_.block.resize(blocks_.size());
         const std::vector<double> sharing = jacobi && on_velocities_ ? sharing_of_columns() : std::vector<double>();
         Eigen::MatrixXd M;
-        for (std::size_t k = 0; k < count; ++k) {
-            const Block& block = rows_.blocks()[k];
-            block_matrix(block, jacobi, sharing, M);
+        for (std::size_t k = 0; k < blocks_.size(); ++k) {
+            const std::int32_t rows = blocks_[k].rows.rows;
+            block_matrix(rows_.groups()[k], jacobi, sharing, M);
             LocalBlock& local = local_.block[k];
-            if (problem.cones[static_cast<std::size_t>(block.cone)].kind == DELASSUS_CONE_FRICTION) {
+            if (problem.cones[static_cast<std::size_t>(blocks_[k].cone)].kind == DELASSUS_CONE_FRICTION) {
                 local.kind = LocalBlock::Kind::Friction;
                 local.step = reciprocal(largest_eigenvalue(M));
                 local.matrix = static_cast<std::int32_t>(local_.contact.size());
-                local_.contact.emplace_back(block.rows, M.data());
-            } else if (block.rows > 1) {
+                local_.contact.emplace_back(rows, M.data());
+            } else if (rows > 1) {
                 local.kind = LocalBlock::Kind::Free;
                 local.matrix = static_cast<std::int32_t>(local_.inverse.size());
                 append_pseudo_inverse(M);
@@ -212,15 +289,14 @@ private:
 
     // How many blocks touch each entry of v̂.
     [[nodiscard]] std::vector<double> sharing_of_columns() const {
-        std::vector<double> sharing(static_cast<std::size_t>(states_ + padding), 0.0);
-        std::vector<std::int32_t> last(sharing.size(), -1);
-        for (const Block& block : rows_.blocks())
-            rows_.for_each(block, [&](int, std::int32_t column, double value) {
-                const auto j = static_cast<std::size_t>(column);
-                if (value == 0.0 || last[j] == block.first_row) return;
-                last[j] = block.first_row;
-                sharing[j] += 1.0;
-            });
+        std::vector<double> sharing(static_cast<std::size_t>(states_ + sdk::chunk_padding), 0.0);
+        for (const auto& group : rows_.groups())
+            for (int k = 0; k < group.chunks; ++k)
+                for (int j = 0; j < rows_.width(); ++j) {
+                    bool touched = false;
+                    for (int i = 0; i < group.rows; ++i) touched = touched || rows_.chunk(group, k, i)[j] != 0.0;
+                    if (touched) sharing[static_cast<std::size_t>(rows_.starts(group)[k] + j)] += 1.0;
+                }
         return sharing;
     }
 
@@ -230,31 +306,30 @@ private:
     // bounds the objective. On velocities: if w_j blocks touch the entry j of v̂, then
     //     λᵀNλ = Σ_j (Σ_c (D̂_cᵀλ_c)_j)² ≤ Σ_j w_j Σ_c (D̂_cᵀλ_c)_j² = Σ_c λ_cᵀ (D̂_c W D̂_cᵀ) λ_c     (Cauchy–Schwarz).
     // On rows of N: N ≼ diag(Σ_j |N_ij|), as the difference is diagonally dominant.
-    void block_matrix(const Block& block, bool jacobi, const std::vector<double>& sharing, Eigen::MatrixXd& M) const {
-        M.setZero(block.rows, block.rows);
-        if (!on_velocities_) {
-            rows_.for_each(block, [&](int i, std::int32_t column, double value) {
-                const Eigen::Index j = column - block.first_row;
-                if (jacobi) {
-                    M(i, i) += std::abs(value);
-                } else if (j >= 0 && j < block.rows) {
-                    M(i, j) += value;
+    void block_matrix(const sdk::BlockRows::Group& group, bool jacobi, const std::vector<double>& sharing,
+                      Eigen::MatrixXd& M) const {
+        M.setZero(group.rows, group.rows);
+        for (int k = 0; k < group.chunks; ++k)
+            for (int c = 0; c < rows_.width(); ++c) {
+                const std::int32_t column = rows_.starts(group)[k] + c;
+                if (on_velocities_) {
+                    const double weight = jacobi ? sharing[static_cast<std::size_t>(column)] : 1.0;
+                    for (int i = 0; i < group.rows; ++i)
+                        for (int j = 0; j < group.rows; ++j)
+                            M(i, j) += weight * rows_.chunk(group, k, i)[c] * rows_.chunk(group, k, j)[c];
+                    continue;
                 }
-            });
-            M = (0.5 * (M + M.transpose())).eval();
-            return;
-        }
-        const int width = rows_.width();
-        for (int k = 0; k < block.chunks; ++k) {
-            const double* chunk = rows_.values(block) + static_cast<std::ptrdiff_t>(k) * block.rows * width;
-            for (int j = 0; j < width; ++j) {
-                const double weight =
-                    jacobi ? sharing[static_cast<std::size_t>(rows_.chunk_starts(block)[k] + j)] : 1.0;
-                for (int i = 0; i < block.rows; ++i)
-                    for (int other = 0; other < block.rows; ++other)
-                        M(i, other) += weight * chunk[i * width + j] * chunk[other * width + j];
+                const std::int32_t j = column - group.first;
+                for (int i = 0; i < group.rows; ++i) {
+                    const double value = rows_.chunk(group, k, i)[c];
+                    if (jacobi) {
+                        M(i, i) += std::abs(value);
+                    } else if (j >= 0 && j < group.rows) {
+                        M(i, j) += value;
+                    }
+                }
             }
-        }
+        if (!on_velocities_) M = (0.5 * (M + M.transpose())).eval();
     }
 
     static double reciprocal(double value) { return value > 0.0 ? 1.0 / value : 0.0; }
@@ -277,10 +352,14 @@ private:
 
     bool on_velocities_ = false;
     Eigen::Index states_ = 0;  // entries of z without padding
-    SweepRows rows_;
+    sdk::BlockRows rows_;      // by visits; on velocities its rows are counted so too
+    SweepOrder order_;
+    std::vector<Block> blocks_;      // by visits, rows as the problem counts them
+    std::vector<std::int32_t> row_;  // the problem's row of each row by visits
     LocalProblems local_;
     sdk::Vector offset_;      // m: b on velocities, r on rows of N
     sdk::Vector free_state_;  // v̂ without reactions, padded
+    sdk::Vector velocities_;  // work space of constraint_velocities; m
 };
 
 }  // namespace delassus::pgs

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Projected Gauss–Seidel over blocks: see README.md.
 #include <chrono>
+#include <stdexcept>
+#include <string>
 
 #include "delassus/sdk/monitor.hpp"
 #include "delassus/sdk/residual.hpp"
 #include "delassus/sdk/solver.hpp"
+#include "delassus/sdk/team.hpp"
 #include "model.hpp"
 
 namespace delassus::pgs {
@@ -15,6 +18,7 @@ using sdk::Vector;
 
 constexpr const char* variants[] = {"forward", "symmetric", "jacobi"};
 constexpr const char* local_solvers[] = {"diagonal", "exact"};
+constexpr const char* orderings[] = {"given", "spaced", "coloured"};
 constexpr const char* forms[] = {"auto", "velocities", "operator"};
 
 constexpr delassus_option option_table[] = {
@@ -26,6 +30,12 @@ constexpr delassus_option option_table[] = {
     sdk::real_option("omega", "1.5", 1e-3, 1.999, "", "over- or underrelaxation of the local step"),
     sdk::choice_option("form", "auto", forms,
                        "sweep on velocities (H diagonal or of blocks, E diagonal), on rows of N, or what is possible"),
+    sdk::choice_option("ordering", "spaced", orderings,
+                       "of the blocks in a sweep: as in the problem; as in the problem, but for neighbours a little "
+                       "apart; by colours that share no body"),
+    sdk::integer_option("threads", "1", 1, 1024, "threads",
+                        "that sweep together (ordering = coloured); at most as many as there are processors, and the "
+                        "answer does not depend on it"),
     sdk::integer_option("check_every", "0", 0, 1e9, "iterations",
                         "between measurements of the natural error; 0: every 5 % of the iterations done"),
     sdk::integer_option("stall_window", "1000000", 0, 1e15, "iterations",
@@ -38,10 +48,18 @@ public:
         : symmetric_(options.choice("variant") == "symmetric"),
           jacobi_(options.choice("variant") == "jacobi"),
           form_(options.choice("form")),
+          threads_(options.integer("threads")),
           check_every_(options.integer("check_every")),
           stall_window_(options.integer("stall_window")) {
         rule_.local = options.choice("local_solver") == "exact" ? Local::Exact : Local::Diagonal;
         rule_.omega = options.real("omega");
+        const std::string ordering = options.choice("ordering");
+        ordering_ = ordering == "given"    ? Ordering::Given
+                    : ordering == "spaced" ? Ordering::Spaced
+                                           : Ordering::Coloured;
+        if (threads_ > 1 && (ordering_ != Ordering::Coloured || jacobi_))
+            throw std::invalid_argument("threads = " + std::to_string(threads_) +
+                                        " needs ordering = coloured and a variant other than jacobi");
     }
 
     std::string refusal(const ProblemView& problem) override {
@@ -55,7 +73,7 @@ public:
     void factorize(const ProblemView& problem) override {
         const bool on_velocities = form_ != "operator" && can_sweep_on_velocities(problem);
         operator_.factorize(problem, !on_velocities);
-        model_.build(problem, operator_, on_velocities, jacobi_);
+        model_.build(problem, operator_, on_velocities, jacobi_, ordering_);
     }
 
     sdk::Outcome solve(const ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
@@ -68,7 +86,8 @@ public:
         for (const delassus_cone& cone : problem.cones) sdk::project(cone, lambda_.data() + cone.first_row);
 
         sdk::Monitor monitor(request, stall_window_);
-        iterate(problem, request, monitor);
+        sdk::Team team(sdk::useful_threads(threads_));
+        iterate(problem, request, monitor, team);
         lambda = monitor.best();
         x = operator_.velocity(problem, lambda);
         return monitor.outcome();
@@ -81,50 +100,53 @@ private:
     using Clock = std::chrono::steady_clock;
     static constexpr std::chrono::milliseconds patience{20};  // between two calls of progress
 
-    void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor) {
-        model_.state_of(lambda_, z_);
+    void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor, sdk::Team& team) {
+        model_.state_of(lambda_, state_);
         std::int64_t next_check = 0;
         Clock::time_point shown = Clock::now();
         for (std::int64_t iteration = 0;; ++iteration) {
-            if (iteration > 0) advance();
+            if (iteration > 0) advance(team);
             bool due = iteration >= next_check || iteration >= request.max_iterations();
             if (!due && request.has_listener() && Clock::now() - shown > patience) {
+                model_.reactions(state_, lambda_);
                 const auto answer = request.progress(iteration, nullptr, lambda_.data());
                 shown = Clock::now();
                 due = answer != DELASSUS_CONTINUE;
                 if (due) {
                     // The iterate may be better than the best that was measured.
-                    (void)monitor.check(iteration, nullptr, lambda_, measure(problem, request));
+                    (void)monitor.check(iteration, nullptr, lambda_, measure(problem, request, team));
                     monitor.outcome().status = sdk::status_of(answer);
                     return;
                 }
             }
             if (!due) continue;
-            if (monitor.check(iteration, nullptr, lambda_, measure(problem, request))) return;
+            if (monitor.check(iteration, nullptr, lambda_, measure(problem, request, team))) return;
             shown = Clock::now();
             next_check = iteration + (check_every_ > 0 ? check_every_ : 1 + iteration / 20);
         }
     }
 
-    void advance() {
+    void advance(sdk::Team& team) {
         if (jacobi_) {
-            model_.jacobi_step(rule_, z_, next_, lambda_);
+            model_.jacobi_step(rule_, state_, next_);
             return;
         }
         rule_.direction = Direction::Forward;
-        model_.sweep_in_place(rule_, z_, lambda_);
+        model_.sweep_in_place(rule_, state_, team);
         if (!symmetric_) return;
         rule_.direction = Direction::Backward;
-        model_.sweep_in_place(rule_, z_, lambda_);
+        model_.sweep_in_place(rule_, state_, team);
     }
 
-    // The natural error of λ. Where it would end the solve it is measured again as the host does, from
-    // u = D H⁻¹(a + Dᵀλ) + E λ + b, and v̂ is renewed from λ, which takes out the rounding of all changes so far.
-    double measure(const ProblemView& problem, const sdk::Request& request) {
-        model_.constraint_velocities(z_, u_);
+    // The natural error of λ, which is taken from the state. Where it would end the solve it is measured again as the
+    // host does, from u = D H⁻¹(a + Dᵀλ) + E λ + b, and v̂ is renewed from λ, which takes out the rounding of all
+    // changes so far.
+    double measure(const ProblemView& problem, const sdk::Request& request, sdk::Team& team) {
+        model_.reactions(state_, lambda_);
+        model_.constraint_velocities(state_, u_, team);
         const double error = residual_.natural(lambda_, u_);
         if (error > sdk::Monitor::aim * request.tolerance()) return error;
-        model_.state_of(lambda_, z_);
+        model_.state_of(lambda_, state_);
         u_ = problem.b;
         if (problem.n > 0) u_.noalias() += problem.D * operator_.velocity(problem, lambda_);
         if (problem.E.nonZeros() > 0) u_.noalias() += problem.E * lambda_;
@@ -133,12 +155,15 @@ private:
 
     bool symmetric_, jacobi_;
     std::string form_;
+    std::int64_t threads_;
+    Ordering ordering_ = Ordering::Spaced;
     std::int64_t check_every_, stall_window_;
     SweepRule rule_;
     sdk::DelassusOperator operator_;
     Model model_;
     sdk::NaturalResidual residual_;
-    Vector lambda_, z_, next_, u_;
+    SweepState state_;
+    Vector lambda_, next_, u_;
 };
 
 constexpr std::uint64_t capabilities =

@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "contact_problem.hpp"
+#include "delassus/sdk/block_rows.hpp"
 #include "delassus/sdk/cones.hpp"
-#include "sweep_rows.hpp"
+#include "sweep_order.hpp"
 
 namespace delassus::pgs {
 
@@ -62,10 +63,10 @@ inline void diagonal_contact_step(const LocalBlock& local, const SweepRule& rule
 
 /// λ_c ← P(λ_c + ω (λ_c* − λ_c)), where λ_c* solves M_c λ* + q = u, q = u_c − M_c λ_c, in its cone.
 template <int Rows>
-inline void exact_contact_step(const LocalProblems& problems, const LocalBlock& local, const SweepRule& rule,
-                               const double* u, double* lambda) {
+[[gnu::noinline]] void exact_contact_step(const LocalProblems& problems, const LocalBlock& local, const SweepRule& rule,
+                                          const double* u, double* lambda) {
     const ContactMatrix& M = problems.contact[static_cast<std::size_t>(local.matrix)];
-    double q[3], solution[3] = {lambda[0], 0.0, 0.0};
+    double q[3] = {}, solution[3] = {lambda[0], 0.0, 0.0};
     if constexpr (Rows == 3) {
         q[0] = u[0] - M.nn * lambda[0] - M.nt[0] * lambda[1] - M.nt[1] * lambda[2];
         q[1] = u[1] - M.nt[0] * lambda[0] - M.tt[0] * lambda[1] - M.tt[1] * lambda[2];
@@ -114,99 +115,53 @@ inline void local_step(const LocalProblems& problems, const LocalBlock& local, c
     }
 }
 
-/// One visit of every block. lambda: m, by the problem's rows. offset: m.
+/// Visits the blocks first … last − 1. lambda and offset: by the rows of `rows`.
 ///   OnVelocities: z and next have the entries of v̂; Gauss–Seidel passes one array for both, Jacobi reads z and adds to
 ///   next (a copy of z on entry). Otherwise z is λ itself and next where new values go; lambda is not used.
 template <bool OnVelocities, int Width, Local Choice>
-void sweep_blocks(const SweepRows& rows, const LocalProblems& problems, const SweepRule& rule, const double* offset,
-                  const double* z, double* next, double* lambda) {
-    const auto blocks = rows.blocks();
-    const auto count = static_cast<std::ptrdiff_t>(blocks.size());
+void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
+                  const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
+    constexpr std::size_t ahead = 256, line = 8;  // doubles: coefficients are fetched so far before their use
     const bool forward = rule.direction == Direction::Forward;
-    for (std::ptrdiff_t k = 0; k < count; ++k) {
-        const auto index = static_cast<std::size_t>(forward ? k : count - 1 - k);
-        const Block& block = blocks[index];
+    for (std::size_t k = first; k < last; ++k) {
+        const std::size_t index = forward ? k : last - 1 - (k - first);
+        const auto& block = rows.groups()[index];
         const LocalBlock& local = problems.block[index];
         const double* value = rows.values(block);
-        const std::int32_t* start = rows.chunk_starts(block);
-        with_rows(block.rows, [&]<int Rows>() {
+        const std::int32_t* start = rows.starts(block);
+        sdk::with_rows(block.rows, [&]<int Rows>() {
+            for (std::size_t i = 0; i < 2 * Rows * Width; i += line)
+                __builtin_prefetch(forward ? value + ahead + i : value - ahead + i);
             double u[Rows], fresh[Rows], delta[Rows];
-            velocity_of_block<Rows, Width>(value, start, block.chunks, z, offset + block.first_row, u);
-            const double* old = (OnVelocities ? lambda : z) + block.first_row;
+            sdk::multiply_group<Rows, Width>(value, start, block.chunks, z, offset + block.first, u);
+            const double* old = (OnVelocities ? lambda : z) + block.first;
             for (int i = 0; i < Rows; ++i) fresh[i] = old[i];
             local_step<Rows, Choice>(problems, local, rule, u, fresh);
             if constexpr (OnVelocities) {
-                bool changed = false;
                 for (int i = 0; i < Rows; ++i) {
-                    delta[i] = fresh[i] - lambda[block.first_row + i];
-                    lambda[block.first_row + i] = fresh[i];
-                    changed = changed || delta[i] != 0.0;
+                    delta[i] = fresh[i] - lambda[block.first + i];
+                    lambda[block.first + i] = fresh[i];
                 }
-                if (changed) add_impulse_of_block<Rows, Width>(value, start, block.chunks, delta, next);
+                sdk::transpose_multiply_group<Rows, Width>(value, start, block.chunks, delta, next);
             } else {
-                for (int i = 0; i < Rows; ++i) next[block.first_row + i] = fresh[i];
+                for (int i = 0; i < Rows; ++i) next[block.first + i] = fresh[i];
             }
         });
     }
 }
 
-/// sweep_blocks with the width and the local solver chosen at run time.
+/// visit_blocks with the width and the local solver chosen at run time.
 template <bool OnVelocities>
-void sweep(const SweepRows& rows, const LocalProblems& problems, const SweepRule& rule, const double* offset,
-           const double* z, double* next, double* lambda) {
-    const auto go = [&]<int Width>() {
+void visit(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
+           const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
+    sdk::with_width(rows.width(), [&]<int Width>() {
         if (rule.local == Local::Diagonal) {
-            sweep_blocks<OnVelocities, Width, Local::Diagonal>(rows, problems, rule, offset, z, next, lambda);
+            visit_blocks<OnVelocities, Width, Local::Diagonal>(rows, first, last, problems, rule, offset, z, next,
+                                                               lambda);
         } else {
-            sweep_blocks<OnVelocities, Width, Local::Exact>(rows, problems, rule, offset, z, next, lambda);
+            visit_blocks<OnVelocities, Width, Local::Exact>(rows, first, last, problems, rule, offset, z, next, lambda);
         }
-    };
-    switch (rows.width()) {
-        case 2:
-            return go.template operator()<2>();
-        case 4:
-            return go.template operator()<4>();
-        default:
-            return go.template operator()<6>();
-    }
-}
-
-/// u ← A z + offset; both m.
-inline void velocities(const SweepRows& rows, const double* offset, const double* z, double* u) {
-    const auto go = [&]<int Width>() {
-        for (const Block& block : rows.blocks())
-            with_rows(block.rows, [&]<int Rows>() {
-                velocity_of_block<Rows, Width>(rows.values(block), rows.chunk_starts(block), block.chunks, z,
-                                               offset + block.first_row, u + block.first_row);
-            });
-    };
-    switch (rows.width()) {
-        case 2:
-            return go.template operator()<2>();
-        case 4:
-            return go.template operator()<4>();
-        default:
-            return go.template operator()<6>();
-    }
-}
-
-/// z += Aᵀ δ; δ has m entries.
-inline void add_impulses(const SweepRows& rows, const double* delta, double* z) {
-    const auto go = [&]<int Width>() {
-        for (const Block& block : rows.blocks())
-            with_rows(block.rows, [&]<int Rows>() {
-                add_impulse_of_block<Rows, Width>(rows.values(block), rows.chunk_starts(block), block.chunks,
-                                                  delta + block.first_row, z);
-            });
-    };
-    switch (rows.width()) {
-        case 2:
-            return go.template operator()<2>();
-        case 4:
-            return go.template operator()<4>();
-        default:
-            return go.template operator()<6>();
-    }
+    });
 }
 
 }  // namespace delassus::pgs

@@ -2,12 +2,15 @@
 #include "spg.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 namespace delassus::spg {
 
 namespace {
+
+using Part = sdk::ScaledProblem::Part;
 
 constexpr double sufficient_decrease = 1e-4;                  // of Armijo's rule
 constexpr double shortest_step = 1e-10, longest_step = 1e10;  // of a gradient step; N̂ has unit diagonal on the average
@@ -23,7 +26,8 @@ SpectralGradient::SpectralGradient(const sdk::OptionValues& options)
       memory_(static_cast<std::size_t>(options.integer("memory"))),
       tangential_(options.boolean("tangential")),
       face_steps_(options.boolean("face_steps")),
-      stall_iterations_(options.integer("stall_iterations")) {}
+      stall_iterations_(options.integer("stall_iterations")),
+      threads_(options.integer("threads")) {}
 
 sdk::Outcome SpectralGradient::solve(const sdk::ProblemView& problem, const sdk::Request& request,
                                      sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
@@ -35,14 +39,15 @@ sdk::Outcome SpectralGradient::solve(const sdk::ProblemView& problem, const sdk:
     face_.reset(scaled_);
     face_period_ = first_face_period;
     since_face_ = 0;
-    iterate(run);
+    sdk::Team team(sdk::useful_threads(threads_));
+    iterate(run, team);
     return run.finish(x, lambda);
 }
 
 // One product with N̂ an iteration: f is quadratic, so that N̂ d gives f, û and both spectral steps anywhere on the
 // segment from λ̂ to Π(λ̂ − α û). Changes of f are formed without subtracting values of f, which would lose all digits
 // near the solution.
-void SpectralGradient::iterate(sdk::ScaledRun& run) {
+void SpectralGradient::iterate(sdk::ScaledRun& run, sdk::Team& team) {
     scaled_.gradient(lambda_, gradient_);
     if (run.check(lambda_, gradient_)) return;
     double alpha = 1.0;
@@ -52,17 +57,25 @@ void SpectralGradient::iterate(sdk::ScaledRun& run) {
             if (take_face_step(run)) return;
             alpha = 1.0;
         }
-        direction_ = lambda_ - alpha * gradient_;
-        scaled_.project(direction_);
-        direction_ -= lambda_;
-        scaled_.multiply(direction_, product_);
-        const double slope = gradient_.dot(direction_);
-        const double square = direction_.squaredNorm();
-        const double curvature = direction_.dot(product_);
+        const auto [slope, square] = scaled_.sums_over_parts<2>(team, [&](const Part& part) {
+            part.of(direction_) = part.of(lambda_) - alpha * part.of(gradient_);
+            scaled_.project(part, direction_);
+            part.of(direction_) -= part.of(lambda_);
+            return std::array{part.of(gradient_).dot(part.of(direction_)), part.of(direction_).squaredNorm()};
+        });
+        scaled_.begin_product(team, direction_);
+        const auto [curvature] = scaled_.sums_over_parts<1>(team, [&](const Part& part) {
+            scaled_.finish_product(part, product_);
+            return std::array{part.of(direction_).dot(part.of(product_))};
+        });
         const double length = line_search(slope, curvature);
-        lambda_ += length * direction_;
-        gradient_ += length * product_;
-        if (run.check(lambda_, gradient_)) return;
+        const auto [natural] = scaled_.sums_over_parts<1>(team, [&](const Part& part) {
+            part.of(lambda_) += length * part.of(direction_);
+            part.of(gradient_) += length * part.of(product_);
+            part.of(run.unscaled()) = part.of(lambda_).cwiseProduct(part.of(scaled_.scaling()));
+            return std::array{scaled_.natural_square(part, lambda_, gradient_)};
+        });
+        if (run.judge(scaled_.natural_from(natural))) return;
         if (run.stale() || run.iteration() % refresh_interval == 0) scaled_.gradient(lambda_, gradient_);
         alpha = next_step(run.iteration(), square, curvature);
     }

@@ -3,7 +3,7 @@
 // bytes that an iteration must move would take at the speed of reading an array of as many bytes, over the time that it
 // takes. Both through the plugin border, with everything that an iteration does.
 //
-// The bytes. A contact of two bodies has 3 × 12 coefficients of Ŵ = P D L⁻ᵀ and 12 columns (4 chunks of 3 in pgs). A
+// The bytes. A contact of two bodies has 3 × 12 coefficients of Ŵ = P D L⁻ᵀ, two chunks of columns and a header. A
 // sweep of pgs reads them once (the second use finds them in the cache), with b, λ (read and written) and its local
 // problem, and each body's velocities once (read and written). An iteration of apgd reads them twice, in Ŵᵀλ and Ŵ v,
 // and six vectors of m. What the caches could save beyond that by chance is not counted, so of_stream may exceed 1.
@@ -46,12 +46,12 @@ double stream(double bytes) {
 double bytes_of_iteration(const delassus::Problem& problem, bool sweeps) {
     const double contacts = static_cast<double>(problem.cones.size()), m = problem.m(), n = problem.n();
     const double coefficients = static_cast<double>(problem.D.entries()) * sizeof(double);
-    const double columns = static_cast<double>(problem.D.entries()) / 3.0 * sizeof(std::int32_t);
-    if (sweeps) {
-        const double headers = contacts * (sizeof(delassus::pgs::Block) + sizeof(delassus::pgs::LocalBlock));
-        return coefficients + columns / 3.0 + headers + sizeof(double) * (3.0 * m + 2.0 * n);
-    }
-    return 2.0 * (coefficients + columns) + sizeof(double) * (6.0 * m + 2.0 * n);
+    const double chunks = static_cast<double>(problem.D.entries()) / 18.0 * sizeof(std::int32_t);
+    const double headers = contacts * sizeof(delassus::sdk::BlockRows::Group);
+    if (sweeps)
+        return coefficients + chunks + headers + contacts * sizeof(delassus::pgs::LocalBlock) +
+               sizeof(double) * (3.0 * m + 2.0 * n);
+    return 2.0 * (coefficients + chunks + headers) + sizeof(double) * (6.0 * m + 2.0 * n);
 }
 
 void iterations(benchmark::State& state, const std::string& name) {

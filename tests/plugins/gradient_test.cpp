@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "delassus/errors.hpp"
+#include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
 #include "support/dense.hpp"
@@ -232,6 +233,19 @@ TEST_P(Gradient, DoesNotDependOnUnits) {
         EXPECT_EQ(decimal.status, Status::Solved);
         EXPECT_NEAR(static_cast<double>(decimal.iterations), static_cast<double>(report.iterations),
                     0.05 * static_cast<double>(report.iterations) + 1.0);
+    }
+}
+
+TEST_P(Gradient, ThreadsDoNotChangeTheAnswer) {
+    SpherePileParameters parameters;
+    parameters.contacts = 1500;
+    for (const bool elastic : {false, true}) {
+        const Problem problem = elastic ? generate_elastic_block({}) : generate_sphere_pile(parameters);
+        const auto one = tests::solve_with(GetParam(), problem, to(1e-5), {{"threads", "1"}});
+        const auto two = tests::solve_with(GetParam(), problem, to(1e-5), {{"threads", "2"}});
+        EXPECT_EQ(one.report.status, Status::Solved);
+        EXPECT_EQ(one.solution.lambda, two.solution.lambda);
+        EXPECT_EQ(one.report.iterations, two.report.iterations);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -146,12 +147,13 @@ void compare_forms(Problem problem, pgs::Local local) {
     N.analyze(view);
     N.factorize(view);
     pgs::Model models[2];
-    sdk::Vector lambda[2], z[2], next;
+    sdk::Vector lambda[2];
+    pgs::SweepState state[2];
+    sdk::Team alone(1);
     for (int form = 0; form < 2; ++form) {
-        models[form].build(view, N, form == 0, false);
+        models[form].build(view, N, form == 0, false, pgs::Ordering::Given);
         models[form].set_right_hand_side(view, N);
-        lambda[form].setZero(view.m);
-        models[form].state_of(lambda[form], z[form]);
+        models[form].state_of(sdk::Vector::Zero(view.m), state[form]);
     }
     pgs::SweepRule rule;
     rule.local = local;
@@ -159,7 +161,10 @@ void compare_forms(Problem problem, pgs::Local local) {
     rule.omega = 1.2;
     for (int k = 0; k < 30; ++k) {
         rule.direction = k % 3 == 2 ? pgs::Direction::Backward : pgs::Direction::Forward;
-        for (int form = 0; form < 2; ++form) models[form].sweep_in_place(rule, z[form], lambda[form]);
+        for (int form = 0; form < 2; ++form) {
+            models[form].sweep_in_place(rule, state[form], alone);
+            models[form].reactions(state[form], lambda[form]);
+        }
         ASSERT_GT(lambda[0].norm(), 0.0);
         ASSERT_LE((lambda[0] - lambda[1]).norm(), 1e-10 * lambda[0].norm()) << "sweep " << k;
     }
@@ -192,20 +197,112 @@ TEST(PgsSweep, JacobiBlocksBoundN) {
     const Eigen::MatrixXd dense = N.formed(view);
     for (const bool on_velocities : {true, false}) {
         pgs::Model model;
-        model.build(view, N, on_velocities, true);
+        model.build(view, N, on_velocities, true, pgs::Ordering::Given);
         Eigen::MatrixXd difference = -dense;
-        for (std::size_t k = 0; k < model.rows().blocks().size(); ++k) {
-            const auto& block = model.rows().blocks()[k];
+        for (std::size_t k = 0; k < model.blocks().size(); ++k) {
+            const auto& block = model.blocks()[k].rows;
             const auto& M = model.local().contact[static_cast<std::size_t>(model.local().block[k].matrix)];
             Eigen::Matrix3d full;
             full << M.nn, M.nt[0], M.nt[1], M.nt[0], M.tt[0], M.tt[1], M.nt[1], M.tt[1], M.tt[2];
-            difference.block<3, 3>(block.first_row, block.first_row) += full;
+            difference.block<3, 3>(block.first, block.first) += full;
             EXPECT_LE(full.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() * model.local().block[k].step,
                       1.0 + 1e-9);
         }
         const double least = difference.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff();
         EXPECT_GE(least, -1e-9 * dense.norm()) << (on_velocities ? "on velocities" : "on rows of N");
     }
+}
+
+// ---- Orders and threads ---------------------------------------------------------------------------------------------
+
+/// A model of a problem, with λ after some sweeps both ways.
+struct Swept {
+    PreparedProblem prepared;
+    pgs::Model model;
+    sdk::DelassusOperator N;
+    sdk::Vector lambda;
+
+    Swept(Problem problem, pgs::Ordering ordering, bool on_velocities, int threads, pgs::Local local)
+        : prepared(std::move(problem)) {
+        const sdk::ProblemView view(prepared.raw());
+        N.analyze(view);
+        N.factorize(view);
+        model.build(view, N, on_velocities, false, ordering);
+        model.set_right_hand_side(view, N);
+        pgs::SweepState state;
+        model.state_of(sdk::Vector::Zero(view.m), state);
+        sdk::Team team(threads);
+        pgs::SweepRule rule;
+        rule.local = local;
+        rule.coulomb = view.coulomb;
+        rule.omega = 1.2;
+        for (int k = 0; k < 40; ++k) {
+            rule.direction = k % 3 == 2 ? pgs::Direction::Backward : pgs::Direction::Forward;
+            model.sweep_in_place(rule, state, team);
+        }
+        model.reactions(state, lambda);
+    }
+};
+
+TEST(PgsOrder, EveryBlockIsVisitedOnce) {
+    for (const auto ordering : {pgs::Ordering::Given, pgs::Ordering::Spaced, pgs::Ordering::Coloured}) {
+        for (const bool on_velocities : {true, false}) {
+            const Swept swept(pile(), ordering, on_velocities, 1, pgs::Local::Diagonal);
+            std::vector<std::int32_t> order = swept.model.order().block;
+            std::sort(order.begin(), order.end());
+            for (std::size_t k = 0; k < order.size(); ++k) ASSERT_EQ(order[k], static_cast<std::int32_t>(k));
+            EXPECT_EQ(order.size(), swept.prepared.problem().cones.size());
+        }
+    }
+}
+
+TEST(PgsOrder, BlocksOfOneColourDoNotTouch) {
+    const Swept swept(pile(), pgs::Ordering::Coloured, true, 1, pgs::Local::Diagonal);
+    const auto& order = swept.model.order();
+    ASSERT_GT(order.colour.size(), 2u);
+    EXPECT_GT(order.coloured, order.block.size() / 2);
+    for (std::size_t c = 0; c < order.colour.size(); ++c) {
+        std::vector<int> visits(static_cast<std::size_t>(swept.prepared.problem().n() + swept.prepared.problem().m()) +
+                                sdk::chunk_padding);
+        const std::size_t end = c + 1 < order.colour.size() ? order.colour[c + 1] : order.coloured;
+        for (std::size_t k = order.colour[c]; k < end; ++k) {
+            const auto& group = swept.model.rows().groups()[k];
+            for (int chunk = 0; chunk < group.chunks; ++chunk)
+                for (int j = 0; j < swept.model.rows().width(); ++j)
+                    EXPECT_EQ(++visits[static_cast<std::size_t>(swept.model.rows().starts(group)[chunk] + j)], 1);
+        }
+    }
+}
+
+TEST(PgsOrder, SpacedNeighboursRarelyShareABody) {
+    const auto sharing = [](pgs::Ordering ordering) {
+        const Swept swept(pile(), ordering, true, 1, pgs::Local::Diagonal);
+        int count = 0;
+        const auto groups = swept.model.rows().groups();
+        for (std::size_t k = 1; k < groups.size(); ++k)
+            for (int i = 0; i < groups[k].chunks; ++i)
+                for (int j = 0; j < groups[k - 1].chunks; ++j)
+                    count += swept.model.rows().starts(groups[k])[i] == swept.model.rows().starts(groups[k - 1])[j];
+        return count;
+    };
+    EXPECT_LT(10 * sharing(pgs::Ordering::Spaced), sharing(pgs::Ordering::Given));
+}
+
+TEST(PgsThreads, GiveTheSameBits) {
+    SpherePileParameters parameters;
+    parameters.contacts = 1000;
+    parameters.speed = 0.5;
+    for (const Law law : {Law::Associated, Law::Coulomb})
+        for (const auto local : {pgs::Local::Diagonal, pgs::Local::Exact})
+            for (const bool on_velocities : {true, false}) {
+                Problem problem = on_velocities ? generate_sphere_pile(parameters) : pile();
+                problem.law = law;
+                const Swept one(problem, pgs::Ordering::Coloured, on_velocities, 1, local);
+                ASSERT_GT(one.lambda.norm(), 0.0);
+                for (const int threads : {2, 4})
+                    EXPECT_EQ(one.lambda, Swept(problem, pgs::Ordering::Coloured, on_velocities, threads, local).lambda)
+                        << threads << " threads";
+            }
 }
 
 // ---- The plugin ----------------------------------------------------------------------------------------------------
@@ -412,6 +509,26 @@ TEST(Pgs, StopsWhereItIsTold) {
     EXPECT_LT(report.seconds_solve, 5.0);
     settings.time_limit = infinity;
     EXPECT_EQ(solve(impossible, {{"stall_window", "1000"}}, settings).report.status, Status::Stalled);
+}
+
+TEST(Pgs, SolvesInEveryOrder) {
+    for (const char* ordering : {"given", "spaced", "coloured"})
+        for (const Law law : {Law::Associated, Law::Coulomb}) {
+            Problem problem = pile();
+            problem.law = law;
+            const auto report = solve(problem, {{"ordering", ordering}}, to(1e-9)).report;
+            EXPECT_EQ(report.status, Status::Solved) << ordering;
+            EXPECT_LE(report.error.natural, 1e-9) << ordering;
+        }
+}
+
+TEST(Pgs, ThreadsDoNotChangeTheAnswer) {
+    const auto one = solve(pile(), {{"ordering", "coloured"}}, to(1e-8));
+    const auto two = solve(pile(), {{"ordering", "coloured"}, {"threads", "2"}}, to(1e-8));
+    EXPECT_EQ(one.report.status, Status::Solved);
+    EXPECT_EQ(one.solution.lambda, two.solution.lambda);
+    EXPECT_EQ(one.report.iterations, two.report.iterations);
+    EXPECT_THROW((void)solve(pile(), {{"threads", "2"}}, to(1e-8)), Error);
 }
 
 TEST(Pgs, RefusesAFormThatTheProblemDoesNotHave) {

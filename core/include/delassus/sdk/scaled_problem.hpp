@@ -19,9 +19,11 @@
 #include <vector>
 
 #include "delassus/sdk/block_rows.hpp"
+#include "delassus/sdk/column_shares.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/delassus_operator.hpp"
 #include "delassus/sdk/residual.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus::sdk {
 
@@ -35,6 +37,17 @@ public:
     /// Rows that are projected one by one onto [lower, upper].
     struct Interval {
         std::int32_t first, rows;
+    };
+    /// About a thousand rows that follow one another, with what belongs to them. Who works by parts, and adds up what
+    /// the parts give in their order, gets the same bits whatever the number of threads.
+    struct Part {
+        std::int32_t first = 0, rows = 0;
+        std::size_t first_block = 0, blocks = 0, first_interval = 0, intervals = 0, first_group = 0, groups = 0;
+
+        template <class Any>
+        [[nodiscard]] auto of(Any& vector) const {
+            return vector.segment(first, rows);
+        }
     };
 
     void analyze(const ProblemView& problem) { operator_.analyze(problem); }
@@ -53,12 +66,14 @@ public:
         coulomb_ = problem.coulomb;
         r_.array() *= p_.array();
         blocks_.clear();
+        contacts_.clear();
         intervals_.clear();
         lower_.setConstant(problem.m, -unbounded_value);
         upper_.setConstant(problem.m, unbounded_value);
         for (const delassus_cone& cone : problem.cones) {
             if (!is_separable(cone)) {
                 blocks_.push_back({cone, cone.first_row, cone.rows});
+                contacts_.push_back({cone.mu, cone.first_row, cone.kind == DELASSUS_CONE_FRICTION ? cone.rows : 0});
                 continue;
             }
             if (cone.kind == DELASSUS_CONE_NONNEGATIVE) lower_.segment(cone.first_row, cone.rows).setZero();
@@ -68,20 +83,75 @@ public:
                     upper_[cone.first_row + i] = cone.hi[i] / p_[cone.first_row + i];
                 }
             }
-            intervals_.push_back({cone.first_row, cone.rows});
+            for (std::int32_t i = 0; i < cone.rows; i += longest_interval)
+                intervals_.push_back({cone.first_row + i, std::min(longest_interval, cone.rows - i)});
         }
+        divide();
+    }
+
+    /// The rows in parts, in their order; since load().
+    [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
+
+    /// body(part) for all parts, by all members of the team.
+    template <class Body>
+    void for_parts(Team& team, const Body& body) const {
+        team.run([&](int member) {
+            const auto [first, last] = team.share(parts_.size(), member);
+            for (std::size_t k = first; k < last; ++k) body(parts_[k]);
+        });
+    }
+    /// The sums over all parts of the Count numbers that body(part) returns as an array.
+    template <std::size_t Count, class Body>
+    [[nodiscard]] std::array<double, Count> sums_over_parts(Team& team, const Body& body) const {
+        partial_.resize(Count * parts_.size());
+        team.run([&](int member) {
+            const auto [first, last] = team.share(parts_.size(), member);
+            for (std::size_t k = first; k < last; ++k) {
+                const std::array<double, Count> sums = body(parts_[k]);
+                std::copy(sums.begin(), sums.end(), partial_.begin() + static_cast<std::ptrdiff_t>(Count * k));
+            }
+        });
+        std::array<double, Count> total = {};
+        for (std::size_t k = 0; k < partial_.size(); ++k) total[k % Count] += partial_[k];
+        return total;
+    }
+
+    /// A product with N̂ in two steps: first what concerns all rows at once, by all members of the team …
+    void begin_product(Team& team, const Vector& lambda) const {
+        if (rows_.entries() > 0) {
+            if (team.size() > 1) {
+                if (shares_.members() != team.size()) shares_ = ColumnShares(rows_, work_.size(), team.size());
+                team.run([&](int member) { shares_.transpose_multiply(rows_, lambda.data(), work_.data(), member); });
+            } else {
+                work_.setZero();
+                rows_.transpose_multiply_add(lambda.data(), work_.data());
+            }
+            if (!whitened_) {
+                velocity_ = work_.head(velocity_.size());
+                operator_.inverse().apply(velocity_);
+                work_.head(velocity_.size()) = velocity_;
+            }
+        }
+        if (square_.entries() > 0) padded_.head(lambda.size()) = lambda;
+    }
+    /// … then the rows of a part: result ← N̂ λ̂ there (m), with the λ̂ of begin_product.
+    void finish_product(const Part& part, Vector& result) const {
+        part.of(result).setZero();
+        const std::size_t last = part.first_group + part.groups;
+        if (rows_.entries() > 0) rows_.multiply(work_.data(), result.data(), result.data(), part.first_group, last);
+        if (square_.entries() > 0)
+            square_.multiply(padded_.data(), result.data(), result.data(), part.first_group, last);
     }
 
     /// result ← N̂ λ̂; both m. Allocates nothing (but in Eigen's solve with a sparse factor).
     void multiply(const Vector& lambda, Vector& result) const {
-        result.setZero(lambda.size());
-        if (rows_.entries() > 0) {
-            work_.setZero();
-            rows_.transpose_multiply_add(lambda.data(), work_.data());
-            if (!whitened_) operator_.inverse().apply(work_);
-            rows_.multiply_add(work_.data(), result.data());
-        }
-        if (square_.entries() > 0) square_.multiply_add(lambda.data(), result.data());
+        Team alone(1);
+        multiply(alone, lambda, result);
+    }
+    void multiply(Team& team, const Vector& lambda, Vector& result) const {
+        result.resize(lambda.size());
+        begin_product(team, lambda);
+        for_parts(team, [&](const Part& part) { finish_product(part, result); });
     }
 
     /// gradient ← N̂ λ̂ + r̂ = û; both m.
@@ -92,9 +162,20 @@ public:
 
     /// λ̂ ← its Euclidean projection onto Υ̂; m.
     void project(Vector& lambda) const {
-        for (const Block& block : blocks_) sdk::project(block.cone, lambda.data() + block.first);
-        for (const Interval& run : intervals_)
-            for (std::int32_t i = run.first; i < run.first + run.rows; ++i)
+        for (const Part& part : parts_) project(part, lambda);
+    }
+    /// The rows of one part.
+    void project(const Part& part, Vector& lambda) const {
+        for (std::size_t k = part.first_block; k < part.first_block + part.blocks; ++k) {
+            const Contact& contact = contacts_[k];
+            if (contact.rows == 3) {
+                FrictionCone::project_with_slope(contact.mu, 3, lambda.data() + contact.first);
+            } else {
+                sdk::project(blocks_[k].cone, lambda.data() + blocks_[k].first);
+            }
+        }
+        for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k)
+            for (std::int32_t i = intervals_[k].first; i < intervals_[k].first + intervals_[k].rows; ++i)
                 lambda[i] = std::min(upper_[i], std::max(lower_[i], lambda[i]));
     }
 
@@ -103,17 +184,34 @@ public:
     /// unit step (s/p)² of û.
     [[nodiscard]] double natural(const Vector& lambda, const Vector& velocity) const {
         double sum = 0.0;
+        for (const Part& part : parts_) sum += natural_square(part, lambda, velocity);
+        return natural_from(sum);
+    }
+    /// The natural error from the sum of its parts' squares.
+    [[nodiscard]] double natural_from(double sum) const { return std::sqrt(sum) / residual_.reference(); }
+    /// One part's share.
+    [[nodiscard]] double natural_square(const Part& part, const Vector& lambda, const Vector& velocity) const {
+        double sum = 0.0, sums[3] = {};  // of three rows apart: their additions do not wait for one another
         std::array<double, largest_block> trial;
-        for (const Block& block : blocks_) {
-            const double* l = lambda.data() + block.first;
-            const double* u = velocity.data() + block.first;
+        for (std::size_t k = part.first_block; k < part.first_block + part.blocks; ++k) {
+            const Contact& contact = contacts_[k];
+            const double* l = lambda.data() + contact.first;
+            const double* u = velocity.data() + contact.first;
+            if (contact.rows == 3 && !coulomb_) {
+                for (std::size_t i = 0; i < 3; ++i) trial[i] = l[i] - u[i];
+                FrictionCone::project_with_slope(contact.mu, 3, trial.data());
+                for (std::size_t i = 0; i < 3; ++i) sums[i] += (l[i] - trial[i]) * (l[i] - trial[i]);
+                continue;
+            }
+            const Block& block = blocks_[k];
             for (std::int32_t i = 0; i < block.rows; ++i) trial[i] = l[i] - u[i];
             if (coulomb_ && block.cone.kind == DELASSUS_CONE_FRICTION)
                 trial[0] -= FrictionCone::de_saxce(block.cone, u);
             sdk::project(block.cone, trial.data());
             for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - trial[i]) * (l[i] - trial[i]);
         }
-        for (const Interval& run : intervals_) {
+        for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k) {
+            const Interval& run = intervals_[k];
             for (std::int32_t i = run.first; i < run.first + run.rows; ++i) {
                 const double w = ratio_[i];
                 const double change =
@@ -121,7 +219,7 @@ public:
                 sum += change * change / (w * w);
             }
         }
-        return std::sqrt(sum) / residual_.reference();
+        return sum + sums[0] + sums[1] + sums[2];
     }
 
     /// The natural error as the host will measure it: x = H⁻¹(a + Dᵀλ) and u = D x + E λ + b computed anew from λ (m,
@@ -143,7 +241,14 @@ public:
     [[nodiscard]] const DelassusOperator& unscaled() const { return operator_; }
 
 private:
+    /// What hot loops need of a block: a fifth of its bytes.
+    struct Contact {
+        double mu;
+        std::int32_t first, rows;  // rows: 0 where the block is not one of friction
+    };
+
     static constexpr std::size_t largest_block = 16;  // rows of a block that is projected as a whole
+    static constexpr std::int32_t longest_interval = 512, part_rows = 1024;
     static constexpr double unbounded_value = std::numeric_limits<double>::infinity();
 
     void scale_rows(const ProblemView& problem) {
@@ -179,10 +284,44 @@ private:
         return whitened <= solved ? Form::Whitened : Form::Solved;
     }
 
+    // Cuts the rows into parts of at least part_rows, where no block, interval or group is cut. All three stand in the
+    // order of their rows.
+    void divide() {
+        parts_.clear();
+        Part part;
+        const auto rows = static_cast<std::int32_t>(p_.size());
+        while (part.first < rows) {
+            part.first_block += part.blocks;
+            part.first_interval += part.intervals;
+            part.first_group += part.groups;
+            part.blocks = part.intervals = part.groups = 0;
+            std::int32_t end = part.first;
+            while (end < rows && end - part.first < part_rows) {
+                const std::size_t block = part.first_block + part.blocks;
+                if (block < blocks_.size() && blocks_[block].first == end) {
+                    end += blocks_[block].rows;
+                    ++part.blocks;
+                } else {
+                    end += intervals_[part.first_interval + part.intervals].rows;
+                    ++part.intervals;
+                }
+            }
+            while (part.first_group + part.groups < groups_.size() &&
+                   groups_[part.first_group + part.groups].first < end)
+                ++part.groups;
+            part.rows = end - part.first;
+            parts_.push_back(part);
+            part.first = end;
+        }
+    }
+
     void build_operator(const ProblemView& problem) {
         rows_ = {};
         square_ = {};
-        work_.setZero(problem.n);
+        shares_ = {};
+        work_.setZero(problem.n + chunk_padding);
+        velocity_.setZero(problem.n);
+        padded_.setZero(problem.m + chunk_padding);
         const Form form = cheapest_form(problem);
         whitened_ = form != Form::Solved;
         const HInverse& inverse = operator_.inverse();
@@ -206,13 +345,18 @@ private:
     Vector p_, ratio_;  // ratio: s of the row's block over p of the row
     Vector r_, lower_, upper_;
     std::vector<Block> blocks_;
+    std::vector<Contact> contacts_;  // beside blocks_
     std::vector<Interval> intervals_;
     std::vector<RowGroup> groups_;
-    BlockRows rows_;    // Ŵ, or D̂ = P D
-    BlockRows square_;  // Ê, or all of N̂
+    std::vector<Part> parts_;
+    mutable std::vector<double> partial_;  // sums of the parts
+    mutable ColumnShares shares_;          // of rows_, for the latest team
+    BlockRows rows_;                       // Ŵ, or D̂ = P D
+    BlockRows square_;                     // Ê, or all of N̂
     bool whitened_ = true;
     bool coulomb_ = false;
-    mutable Vector work_;
+    mutable Vector work_, padded_;  // n and m, with the padding of BlockRows
+    mutable Vector velocity_;       // n
 };
 
 }  // namespace delassus::sdk

@@ -29,8 +29,12 @@ public:
     /// Judges the iterate λ̂ with its û; true: stop now. Each call after the first counts as an iteration. A claim of
     /// convergence rests on û computed anew; where it fails, stale() tells the caller to renew its û.
     [[nodiscard]] bool check(const Vector& lambda, const Vector& velocity) {
-        double residual = scaled_.natural(lambda, velocity);
         lambda_ = lambda.array() * scaled_.scaling().array();
+        return judge(scaled_.natural(lambda, velocity));
+    }
+
+    /// The same for a caller that has put the iterate's λ = P λ̂ into unscaled() and knows its natural error.
+    [[nodiscard]] bool judge(double residual) {
         stale_ = false;
         if (residual <= Monitor::aim * request_.tolerance()) {
             residual = scaled_.measured(problem_, lambda_, x_);
@@ -39,6 +43,7 @@ public:
         latest_ = residual;
         return monitor_.check(iteration_++, nullptr, lambda_, residual);
     }
+    [[nodiscard]] Vector& unscaled() { return lambda_; }
 
     /// Counts a product with N that made no new iterate; true: stop now.
     [[nodiscard]] bool count() { return monitor_.check(iteration_++, nullptr, lambda_, latest_); }
