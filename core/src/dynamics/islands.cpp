@@ -39,40 +39,62 @@ Island& Islands::next_island() {
     return island;
 }
 
-// A contact has the same columns in all of its rows: once the first has joined them, those below add nothing, and that
-// they have the same columns is seen faster than each entry looked up.
+namespace {
+
+/// Whether all rows from `first` to the one before `last` have their entries in the same columns. Differences are
+/// gathered, which needs no branch a column.
+bool share_columns(const SparseMatrix& D, std::int32_t first, std::int32_t last) {
+    const auto* start = D.row_start.data();
+    const std::int32_t length = start[first + 1] - start[first];
+    const std::int32_t* column = D.column.data() + start[first];
+    for (auto row = first + 1; row < last; ++row) {
+        if (start[row + 1] - start[row] != length) return false;
+        const std::int32_t* other = D.column.data() + start[row];
+        std::int32_t difference = 0;
+        for (std::int32_t k = 0; k < length; ++k) difference |= column[k] ^ other[k];
+        if (difference != 0) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+// The root of all is found once a cone, and columns that it has are told by one look. A contact has the same columns in
+// all of its rows: they are looked at once, and the rows' values only where a column is new.
 void Islands::join_rows(const SparseMatrix& D) {
     const auto cones = first_row_.size() - 1;
     cone_column_.assign(cones, -1);  // any column of the cone's rows
     for (std::size_t c = 0; c < cones; ++c) {
+        const auto first = first_row_[c], last = first_row_[c + 1];
         std::int32_t top = -1;  // the root of the cone's columns
-        bool joined = false;    // all columns of the first row
-        const auto* first = D.column.data() + D.row_start[static_cast<std::size_t>(first_row_[c])];
-        const auto first_length = D.row_start[static_cast<std::size_t>(first_row_[c]) + 1] -
-                                  D.row_start[static_cast<std::size_t>(first_row_[c])];
-        for (auto row = first_row_[c]; row < first_row_[c + 1]; ++row) {
-            const auto begin = D.row_start[static_cast<std::size_t>(row)];
-            const auto end = D.row_start[static_cast<std::size_t>(row) + 1];
-            const bool same =
-                end - begin == first_length && std::equal(first, first + first_length, D.column.data() + begin);
-            if (same && joined) continue;
-            bool all = true;
-            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-                const auto column = D.column[k];
-                if (top >= 0 && parent_[static_cast<std::size_t>(column)] == top) continue;
-                if (D.value[k] == 0.0) {
-                    all = false;
-                    continue;
-                }
-                if (top < 0) {
-                    cone_column_[c] = column;
-                } else {
-                    join(top, column);
-                }
+        const auto is_joined = [&](std::int32_t column) {
+            return top >= 0 && parent_[static_cast<std::size_t>(column)] == top;
+        };
+        const auto take = [&](std::int32_t column) {
+            if (top < 0) {
+                cone_column_[c] = column;
                 top = root(column);
+                return;
             }
-            joined = same && all;
+            join(top, column);
+            top = root(top);
+            parent_[static_cast<std::size_t>(column)] = top;
+        };
+        const auto begin = D.row_start[static_cast<std::size_t>(first)];
+        const auto end = D.row_start[static_cast<std::size_t>(last)];
+        if (share_columns(D, first, last)) {
+            const auto length = D.row_start[static_cast<std::size_t>(first) + 1] - begin;
+            for (auto k = begin; k < begin + length; ++k) {
+                const auto column = D.column[static_cast<std::size_t>(k)];
+                if (is_joined(column)) continue;
+                bool zero = true;
+                for (auto e = k; zero && e < end; e += length) zero = D.value[static_cast<std::size_t>(e)] == 0.0;
+                if (!zero) take(column);
+            }
+            continue;
         }
+        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
+            if (!is_joined(D.column[k]) && D.value[k] != 0.0) take(D.column[k]);
     }
 }
 

@@ -158,10 +158,10 @@ struct ErrorMeter::Implementation {
         }
     }
 
-    /// λ, u: of the cone's rows; u without and with the De Saxcé term of the law. trial: memory for as many.
+    /// λ, u: of the cone's rows, u with the De Saxcé term where the law asks for it. trial: memory for as many.
     template <class Projections>
-    void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* plain_velocity,
-                  const double* u, double* trial, Sums& sums) const {
+    void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* u, double* trial,
+                  Sums& sums) const {
         const auto& cone = view.cones[c];
         const std::int32_t rows = on.rows(cone);
         const double square = residual.scaling()[c] * residual.scaling()[c];
@@ -170,7 +170,16 @@ struct ErrorMeter::Implementation {
             for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - trial[i]) * (from[i] - trial[i]);
             return sum;
         };
-        sums.natural += residual.squared_block(c, lambda, plain_velocity);
+        double squared_velocity = 0.0;
+        for (std::int32_t i = 0; i < rows; ++i) squared_velocity += u[i] * u[i];
+        sums.velocity += squared_velocity;
+        if (cone.kind == DELASSUS_CONE_FREE) {  // λ cancels; it must not leave its rounding
+            sums.natural += square * squared_velocity;
+        } else {
+            for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - square * u[i];
+            on.project(cone, trial);
+            sums.natural += squared_distance(lambda) / square;
+        }
         for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i];
         on.project(cone, trial);
         sums.cone += squared_distance(lambda) / square;
@@ -181,7 +190,6 @@ struct ErrorMeter::Implementation {
         on.project_dual(cone, trial);
         sums.dual += squared_distance(u) * square;
         sums.gap += on.gap(cone, lambda, u);
-        for (std::int32_t i = 0; i < rows; ++i) sums.velocity += u[i] * u[i];
     }
 
     /// One pass over D and E, cone by cone, which leaves the impulse Dᵀ λ as well. On the rounding: a product of k
@@ -190,25 +198,23 @@ struct ErrorMeter::Implementation {
     [[nodiscard]] Sums sums_over_cones(const double* x, const double* lambda) const {
         Sums sums;
         impulse.setZero(view.n);
-        work.resize(4 * largest_cone());
+        work.resize(3 * largest_cone());
         for (std::size_t c = 0; c < view.cones.size(); ++c) {
             const auto& cone = view.cones[c];
             const double* lambda_c = lambda + cone.first_row;
-            double *u = work.data(), *judged = u + cone.rows, *magnitude = judged + cone.rows;
+            double *u = work.data(), *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
             pass_over_rows(c, x, lambda, u, magnitude);
             const double s = residual.scaling()[c];
             for (std::int32_t i = 0; i < cone.rows; ++i) {
                 const double scaled = s * magnitude[i] + std::abs(lambda_c[i]) / s;
                 sums.rounding += scaled * scaled;
-                judged[i] = u[i];
             }
             const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
-            if (friction && view.coulomb) judged[0] += sdk::FrictionCone::de_saxce(cone, u);
-            double* trial = magnitude + cone.rows;
+            if (friction && view.coulomb) u[0] += sdk::FrictionCone::de_saxce(cone, u);
             if (friction && cone.rows == 3) {
-                add_cone(SpatialFriction{}, c, lambda_c, u, judged, trial, sums);
+                add_cone(SpatialFriction{}, c, lambda_c, u, trial, sums);
             } else {
-                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, judged, trial, sums);
+                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, trial, sums);
             }
         }
         return sums;
