@@ -71,8 +71,29 @@ struct AnyCone {
         return operations.gap(cone, lambda, u);
     }
 };
+/// Three rows, in the operations of sdk::FrictionCone but without its branches: near a solution of a pile, which of them
+/// a contact takes is a matter of chance, and a guess that fails costs more than the whole projection.
 struct SpatialFriction : sdk::FrictionCone {
     [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
+
+    static void project_with_slope(double slope, double* v) {
+        const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
+        const bool inside = t <= slope * v[0], polar = slope * t <= -v[0];
+        const double normal = (v[0] + slope * t) / (1.0 + slope * slope);
+        const double factor = slope * normal / t;  // not finite for t = 0 alone, which is inside or polar
+        v[0] = inside ? v[0] : polar ? 0.0 : normal;
+        const double kept = inside ? 1.0 : polar ? 0.0 : factor;
+        v[1] *= kept;
+        v[2] *= kept;
+    }
+    static void project(const delassus_cone& cone, double* lambda) { project_with_slope(cone.mu, lambda); }
+    static void project_dual(const delassus_cone& cone, double* u) {
+        if (cone.mu > 0.0) {
+            project_with_slope(1.0 / cone.mu, u);
+        } else {
+            u[0] = std::max(0.0, u[0]);
+        }
+    }
 };
 
 }  // namespace
@@ -212,7 +233,8 @@ struct ErrorMeter::Implementation {
             const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
             if (friction && view.coulomb) u[0] += sdk::FrictionCone::de_saxce(cone, u);
             if (friction && cone.rows == 3) {
-                add_cone(SpatialFriction{}, c, lambda_c, u, trial, sums);
+                std::array<double, 3> of_three;
+                add_cone(SpatialFriction{}, c, lambda_c, u, of_three.data(), sums);
             } else {
                 add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, trial, sums);
             }
