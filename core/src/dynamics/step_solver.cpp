@@ -61,7 +61,7 @@ struct StepSolver::Implementation {
     std::set<std::string> loaded;
     Islands islands;
     std::deque<KeptPart> parts;  // by the number of the part
-    Problem given;  // a copy of what solve() must not change
+    Problem given;               // a copy of what solve() must not change
     Solution start;
     SolverEffort effort;
 };
@@ -108,8 +108,7 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     return solved;
 }
 
-bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution, bool warm_start,
-                                            std::size_t number) {
+bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number) {
     if (number == parts.size()) parts.emplace_back();
     auto& kept = parts[number].prepared;
     if (!kept) {

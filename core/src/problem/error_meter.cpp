@@ -71,8 +71,8 @@ struct AnyCone {
         return operations.gap(cone, lambda, u);
     }
 };
-/// Three rows, in the operations of sdk::FrictionCone but without its branches: near a solution of a pile, which of them
-/// a contact takes is a matter of chance, and a guess that fails costs more than the whole projection.
+/// Three rows, in the operations of sdk::FrictionCone but without its branches: near a solution of a pile, which of
+/// them a contact takes is a matter of chance, and a guess that fails costs more than the whole projection.
 struct SpatialFriction : sdk::FrictionCone {
     [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
 
@@ -134,8 +134,8 @@ struct ErrorMeter::Implementation {
 
     /// The rows of one cone, which share their columns, times x, and by λ into the impulse.
     struct RowsAtSolution {
-        const double *x, *lambda;      // λ: of the cone's rows
-        double *u, *magnitude;         // of the cone's rows
+        const double *x, *lambda;  // λ: of the cone's rows
+        double *u, *magnitude;     // of the cone's rows
         Vector& impulse;
         template <int length>
         void operator()(const DenseRows<length>& rows) const {
@@ -224,6 +224,7 @@ struct ErrorMeter::Implementation {
             const auto& cone = view.cones[c];
             const double* lambda_c = lambda + cone.first_row;
             double *u = work.data(), *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
+            prefetch_after(view.raw->D, cone.first_row);
             pass_over_rows(c, x, lambda, u, magnitude);
             const double s = residual.scaling()[c];
             for (std::int32_t i = 0; i < cone.rows; ++i) {
@@ -290,8 +291,7 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
     errors.cone = std::sqrt(sums.cone) / reference;
     errors.dual = std::sqrt(sums.dual) / reference;
     errors.gap = std::abs(sums.gap) / (reference * reference);
-    errors.siconos =
-        ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), std::sqrt(sums.velocity)}));
+    errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), std::sqrt(sums.velocity)}));
     return errors;
 }
 

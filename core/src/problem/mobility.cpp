@@ -67,6 +67,7 @@ const Vector& Mobility::free_velocity(const sdk::ProblemView& problem, std::span
     for (std::size_t c = 0; c < problem.cones.size(); ++c) {
         const delassus_cone& cone = problem.cones[c];
         const auto first = cone.first_row, last = first + cone.rows;
+        prefetch_after(D, first);
         if (!shares_columns[c] ||
             !for_dense_rows(D, cone, FreeRows{work_, inverse_diagonal_, r.data() + first, diagonal_.data() + first}))
             for (auto row = first; row < last; ++row) {

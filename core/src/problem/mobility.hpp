@@ -21,8 +21,8 @@ public:
     void refresh() { rows_are_new_ = true; }
 
     [[nodiscard]] const sdk::HInverse& inverse() const { return H_is_diagonal_ ? inverse_ : operator_.inverse(); }
-    /// r ← D H⁻¹ a + b, resized to m; the diagonal of N, m, valid until the next call. shares_columns: of cones, whether
-    /// all their rows have entries in the same columns of D.
+    /// r ← D H⁻¹ a + b, resized to m; the diagonal of N, m, valid until the next call. shares_columns: of cones,
+    /// whether all their rows have entries in the same columns of D.
     const sdk::Vector& free_velocity(const sdk::ProblemView& problem, std::span<const char> shares_columns,
                                      sdk::Vector& r);
     /// x ← H⁻¹ (a + Dᵀ λ); resized to n. λ: m, or none for λ = 0.
