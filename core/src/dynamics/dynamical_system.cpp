@@ -68,6 +68,11 @@ void UnilateralRows::end_block(const Cone& cone, std::uint64_t key, double resti
     block.restitution = restitution;
     block.key = key;
     block.speed = velocity_ ? speed(first_row, velocity_) : 0.0;
+    // The processor's own prefetching ends at each page.
+    if (const std::size_t ahead = used_ + 512; ahead < column_.size()) {
+        __builtin_prefetch(&value_[ahead], 1);
+        __builtin_prefetch(&column_[ahead], 1);
+    }
 }
 
 double UnilateralRows::speed(std::size_t row, const double* v) const {

@@ -66,6 +66,9 @@ void Islands::join_rows(const SparseMatrix& D) {
     cone_column_.assign(cones, -1);  // any column of the cone's rows
     for (std::size_t c = 0; c < cones; ++c) {
         const auto first = first_row_[c], last = first_row_[c + 1];
+        // The processor's own prefetching ends at each page.
+        if (const auto ahead = D.row_start[static_cast<std::size_t>(first)] + 1024; ahead < D.entries())
+            __builtin_prefetch(D.column.data() + ahead);
         std::int32_t top = -1;  // the root of the cone's columns
         const auto is_joined = [&](std::int32_t column) {
             return top >= 0 && parent_[static_cast<std::size_t>(column)] == top;
