@@ -263,6 +263,19 @@ TEST(Renewal, LeavesTheFormerArrays) {
     EXPECT_EQ(second.E.rows, 0);
 }
 
+TEST(Renewal, KeepsWhereBoundsStand) {
+    const Problem first = masses_with_rows({{0, 0, 1.0}, {1, 1, 1.0}}, {Cone::free(1), Cone::box({-1.0}, {2.0})});
+    Problem second = first;
+    second.cones[1] = Cone::box({-3.0}, {4.0});
+    PreparedProblem kept(first);
+    const double *lo = kept.raw().cones[1].lo, *hi = kept.raw().cones[1].hi;
+    kept.renew(std::move(second));
+    EXPECT_EQ(kept.raw().cones[1].lo, lo);
+    EXPECT_EQ(kept.raw().cones[1].hi, hi);
+    EXPECT_EQ(*lo, -3.0);
+    EXPECT_EQ(*hi, 4.0);
+}
+
 // Contacts of two bodies and of one go through passes of their own; natural() goes through plain products.
 TEST(Errors, OfAPileAreThoseOfPlainProducts) {
     for (const Law law : {Law::Associated, Law::Coulomb}) {

@@ -186,6 +186,17 @@ bool same_places(const SparseMatrix& here, const SparseMatrix& there) {
            here.column == there.column;
 }
 
+/// Solvers may keep where bounds stand as long as the pattern stays.
+void exchange_cones(std::vector<Cone>& here, std::vector<Cone>& there, bool new_places) {
+    const auto is_box = [](const Cone& cone) { return cone.kind == ConeKind::Box; };
+    if (new_places || std::none_of(there.begin(), there.end(), is_box)) return here.swap(there);
+    for (std::size_t c = 0; c < here.size(); ++c) {
+        std::swap(here[c].mu, there[c].mu);
+        std::swap_ranges(here[c].lo.begin(), here[c].lo.end(), there[c].lo.begin());
+        std::swap_ranges(here[c].hi.begin(), here[c].hi.end(), there[c].hi.begin());
+    }
+}
+
 /// An absent matrix becomes zero, rows × columns, and stays absent there.
 void exchange_matrix(SparseMatrix& here, SparseMatrix& there, std::int32_t rows, std::int32_t columns) {
     if (!absent(there)) return std::swap(here, there);
@@ -219,7 +230,7 @@ void PreparedProblem::Implementation::exchange(Problem& other, bool new_places) 
     exchange_matrix(problem.E, other.E, m, m);
     problem.a.swap(other.a);
     problem.b.swap(other.b);
-    problem.cones.swap(other.cones);
+    exchange_cones(problem.cones, other.cones, new_places);
     std::swap(problem.law, other.law);
     problem.name.swap(other.name);
     problem.source.swap(other.source);
