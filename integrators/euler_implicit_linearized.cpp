@@ -3,9 +3,11 @@
 // cone problem a step, contacts and impacts included. Order 1.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
+#include "problem/copy_cone.hpp"
 
 namespace delassus {
 namespace {
@@ -48,27 +50,27 @@ public:
     StepReport step(State& state, double h, StepSolver& solver) override {
         require_step(system_, state, h, "euler_implicit_linearized");
         problem_.name = "step";
+        problem_.law = Law::Associated;
         end_ = state;  // the old q and v at the new time
         end_.t = state.t + h;
         rows_.clear();
+        rows_.measure_speeds_at(state.v.data());
         if (system_.has_unilateral()) system_.collect_unilateral(state, h, rows_);
         assemble_balance(state, h);
         assemble_constraints(state, h);
-        assemble_unilateral(state, h);
+        assemble_unilateral(h);
 
         StepReport report;
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
-        find_last_blocks();
-        start_from_last_impulses(solution_.lambda);
-        report.solved = solver.solve(problem_, solution_, true);
+        report.solved = solver.solve(std::move(problem_), solution_, true);
         if (!report.solved) report.message = solver.effort().unsolved;
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
-        report_reactions(state, solution_.lambda, h, report);
+        report_reactions(solution_.lambda, h, report);
         state = end_;
         keep(solution_.lambda, h);
         return report;
@@ -129,6 +131,11 @@ private:
         std::uint64_t key;
         std::int32_t first, rows;
     };
+    /// What tells whether a unilateral block had an impact in this step.
+    struct Approach {
+        double gap, speed;  ///< gap ≥ 0; the speed of closing
+        bool along_normal, pushed_before;
+    };
 
     void assemble_balance(const State& state, double h) {
         const Tangent tangent = exact_ ? Tangent::Exact : Tangent::Symmetric;
@@ -150,103 +157,83 @@ private:
         H_.finish_into(problem_.H);
     }
 
+    // D takes its arrays from the unilateral rows where there are no others.
     void assemble_constraints(const State& state, double h) {
+        problem_.D.rows = 0;
+        problem_.D.columns = n_;
+        problem_.b.resize(static_cast<std::size_t>(m_) + rows_.rows().size());
+        if (m_ == 0) return;
         D_.begin(m_, n_);
-        if (m_ > 0) {
-            system_.add_constraint_jacobian(end_, 0, D_);
-            system_.constraint(state, before_.data());
-            system_.constraint(end_, after_.data());
-        }
-        problem_.b.clear();
+        system_.add_constraint_jacobian(end_, 0, D_);
+        system_.constraint(state, before_.data());
+        system_.constraint(end_, after_.data());
         for (std::int32_t i = 0; i < m_; ++i) {
             const double drift = std::clamp(before_[i] / h, -recovery_speed_, recovery_speed_);
-            problem_.b.push_back(drift + (after_[i] - before_[i]) / h);
-        }
-        problem_.cones.resize(blocks_.size() + rows_.blocks().size());
-        for (std::size_t k = 0; k < blocks_.size(); ++k) {
-            problem_.cones[k].kind = ConeKind::Free;
-            problem_.cones[k].rows = blocks_[k];
+            problem_.b[i] = drift + (after_[i] - before_[i]) / h;
         }
         D_.finish_into(problem_.D);
     }
 
-    void assemble_unilateral(const State& state, double h) {
-        // Rows are appended to D, which is by compressed rows.
-        auto& D = problem_.D;
-        const auto before = D.entries();
-        const auto& starts = rows_.row_start();
-        D.rows += static_cast<std::int32_t>(rows_.rows().size());
-        D.columns = n_;
-        D.column.insert(D.column.end(), rows_.column().begin(), rows_.column().end());
-        D.value.insert(D.value.end(), rows_.value().begin(), rows_.value().end());
-        for (std::size_t row = 1; row < starts.size(); ++row) D.row_start.push_back(before + starts[row]);
-        std::size_t row = 0, place = blocks_.size();
+    // One walk over the blocks: their cones, b, the impulses they had in the last step as a start, and what is asked of
+    // them after the solve. Blocks come by ascending keys as a rule, as they are kept: then each search for the last
+    // impulses begins where the last one ended.
+    void assemble_unilateral(double h) {
+        rows_.move_into(problem_.D);
+        problem_.cones.resize(blocks_.size() + rows_.blocks().size());
+        for (std::size_t k = 0; k < blocks_.size(); ++k) copy_cone(Cone::free(blocks_[k]), problem_.cones[k]);
+        auto& lambda = solution_.lambda;
+        lambda.resize(problem_.b.size());
+        for (std::int32_t i = 0; i < m_; ++i) lambda[i] = multipliers_.empty() ? 0.0 : last_h_ * multipliers_[i];
+        next_kept_.clear();
+        approaches_.clear();
+        std::int32_t row = 0;
+        Cone* cone = problem_.cones.data() + blocks_.size();
+        auto last = kept_.cbegin();
         for (const auto& block : rows_.blocks()) {
-            Cone& cone = problem_.cones[place++];
-            cone = block.cone;
-            for (auto* bounds : {&cone.lo, &cone.hi})
+            const std::int32_t rows = block.cone.rows;
+            copy_cone(block.cone, *cone);
+            for (auto* bounds : {&cone->lo, &cone->hi})
                 for (double& bound : *bounds) bound *= h;
-            for (std::int32_t i = 0; i < cone.rows; ++i, ++row) problem_.b.push_back(offset(block, i, row, state, h));
+            ++cone;
+            if (last == kept_.end() || last->key > block.key) last = first_kept(block.key);
+            while (last != kept_.end() && last->key < block.key) ++last;
+            const bool known = last != kept_.end() && last->key == block.key;
+            const bool fits = known && last->rows == rows;
+            for (std::int32_t i = 0; i < rows; ++i) {
+                problem_.b[m_ + row + i] = offset(block, i, row + i, h);
+                lambda[m_ + row + i] = fits ? impulses_[last->first + i] : 0.0;
+            }
+            next_kept_.push_back({block.key, row, rows});
+            approaches_.push_back({std::max(rows_.rows()[row].gap, 0.0), -block.speed, block.along_normal(),
+                                   known && impulses_[last->first] > 0.0});
+            row += rows;
         }
     }
 
     // A contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed of Φ/h at
     // least, also where its first speed was less. One that left and comes back within the step, as a ball that bounces
     // low, does so about as fast.
-    void report_reactions(const State& begin, const std::vector<double>& lambda, double h, StepReport& report) const {
-        std::size_t row = 0, number = 0;
-        for (const auto& block : rows_.blocks()) {
-            const double reaction = lambda[static_cast<std::size_t>(m_) + row];
-            const Kept* last = last_of_block_[number++];
+    void report_reactions(const std::vector<double>& lambda, double h, StepReport& report) const {
+        for (std::size_t k = 0; k < next_kept_.size(); ++k) {
+            const double reaction = lambda[m_ + next_kept_[k].first];
+            const auto& [gap, approach, along_normal, pushed_before] = approaches_[k];
             if (reaction != 0.0) ++report.active_blocks;
-            if (block.along_normal() && reaction > 0.0) {
-                const double gap = std::max(rows_.rows()[row].gap, 0.0);
-                const double approach = -rows_.speed(row, begin.v.data());
-                const bool pushed_before = last && impulses_[static_cast<std::size_t>(last->first)] > 0.0;
-                const double speed = std::max(std::abs(approach), gap / h);
-                if ((approach < 0.0 || !pushed_before) && speed > report.impact_speed) {
-                    report.impact_speed = speed;
-                    report.impact_time = approach < 0.0 ? h : gap / speed;
-                }
+            if (!along_normal || !(reaction > 0.0)) continue;
+            const double speed = std::max(std::abs(approach), gap / h);
+            if ((approach < 0.0 || !pushed_before) && speed > report.impact_speed) {
+                report.impact_speed = speed;
+                report.impact_time = approach < 0.0 ? h : gap / speed;
             }
-            row += static_cast<std::size_t>(block.cone.rows);
         }
     }
 
     /// b of row number `row`, the i-th of its block.
-    [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, std::size_t row, const State& state,
-                                double h) const {
+    [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, std::int32_t row, double h) const {
         const auto& [gap, rate] = rows_.rows()[row];
-        if (i == 0 && block.along_normal() && block.restitution > 0.0) {
-            const double speed = rows_.speed(row, state.v.data());
-            if (speed < -restitution_speed_ && gap + h * speed <= 0.0) return rate + block.restitution * speed;
-        }
+        if (i == 0 && block.along_normal() && block.restitution > 0.0 && block.speed < -restitution_speed_ &&
+            gap + h * block.speed <= 0.0)
+            return rate + block.restitution * block.speed;
         return rate + std::max(gap / h, -recovery_speed_);
-    }
-
-    // Blocks come by ascending keys as a rule, as they are kept: then each search begins where the last one ended.
-    void find_last_blocks() {
-        last_of_block_.clear();
-        auto next = kept_.cbegin();
-        for (const auto& block : rows_.blocks()) {
-            if (next == kept_.end() || next->key > block.key) next = first_kept(block.key);
-            while (next != kept_.end() && next->key < block.key) ++next;
-            last_of_block_.push_back(next != kept_.end() && next->key == block.key ? &*next : nullptr);
-        }
-    }
-
-    /// λ ← the impulses of the last step, for the constraints that are still there.
-    void start_from_last_impulses(std::vector<double>& lambda) const {
-        lambda = multipliers_;
-        for (double& value : lambda) value *= last_h_;
-        lambda.resize(static_cast<std::size_t>(m_), 0.0);
-        std::size_t number = 0;
-        for (const auto& block : rows_.blocks()) {
-            const Kept* last = last_of_block_[number++];
-            const bool fits = last && last->rows == block.cone.rows;
-            for (std::int32_t i = 0; i < block.cone.rows; ++i)
-                lambda.push_back(fits ? impulses_[static_cast<std::size_t>(last->first + i)] : 0.0);
-        }
     }
 
     /// The first with a key not less.
@@ -260,12 +247,7 @@ private:
         multipliers_.resize(static_cast<std::size_t>(m_));
         for (std::int32_t i = 0; i < m_; ++i) multipliers_[i] = lambda[i] / h;
         impulses_.assign(lambda.begin() + m_, lambda.end());
-        kept_.clear();
-        std::int32_t first = 0;
-        for (const auto& block : rows_.blocks()) {
-            kept_.push_back({block.key, first, block.cone.rows});
-            first += block.cone.rows;
-        }
+        kept_.swap(next_kept_);
         sort_kept();
     }
     void sort_kept() {
@@ -285,9 +267,10 @@ private:
     UnilateralRows rows_;
     std::vector<double> before_, after_, delta_;
     double last_h_ = 0.0;
-    std::vector<Kept> kept_;                  // by ascending keys
-    std::vector<const Kept*> last_of_block_;  // of the blocks of rows_: null where there was none
+    std::vector<Kept> kept_;  // by ascending keys
     std::vector<double> impulses_;
+    std::vector<Kept> next_kept_;       // of the blocks of rows_, in their order
+    std::vector<Approach> approaches_;  // likewise
     // Kept so that a step like the last allocates nothing.
     Problem problem_;
     Solution solution_;

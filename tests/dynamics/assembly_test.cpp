@@ -2,6 +2,8 @@
 // Matrices and unilateral rows that are assembled again and again.
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "delassus/dynamical_system.hpp"
 #include "delassus/error.hpp"
 
@@ -52,6 +54,40 @@ TEST(UnilateralRows, SortTheColumnsOfARow) {
         EXPECT_EQ(rows.blocks()[1].restitution, 0.25);
         const std::vector<double> v = {1.0, 1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0};
         EXPECT_EQ(rows.speed(0, v.data()), 10.0 + 3.0 + 4.0 + 2.0 * 5.0 + 1.0 + 2.0);
+    }
+}
+
+TEST(UnilateralRows, MoveBelowOtherRowsOrTakeTheirArrays) {
+    const std::vector<double> v = {1.0, 2.0, 3.0};
+    UnilateralRows rows;
+    const auto fill = [&] {
+        rows.clear();
+        rows.measure_speeds_at(v.data());
+        rows.entries(1, std::array{4.0, 5.0});
+        rows.end_row(0.0, 10.0);
+        rows.end_block(Cone::nonnegative(1), 1);
+        rows.entry(0, 6.0);
+        rows.end_row();
+        rows.end_block(Cone::nonnegative(1), 2);
+    };
+    fill();
+    EXPECT_EQ(rows.blocks()[0].speed, 10.0 + 4.0 * 2.0 + 5.0 * 3.0);
+    EXPECT_EQ(rows.blocks()[1].speed, 6.0);
+    SparseMatrix D = SparseMatrix::from_triplets(1, 3, {{0, 2, 7.0}});
+    rows.move_into(D);
+    EXPECT_EQ(D.rows, 3);
+    EXPECT_EQ(D.row_start, (std::vector<std::int32_t>{0, 1, 3, 4}));
+    EXPECT_EQ(D.column, (std::vector<std::int32_t>{2, 1, 2, 0}));
+    EXPECT_EQ(D.value, (std::vector<double>{7.0, 4.0, 5.0, 6.0}));
+    for (int round = 0; round < 3; ++round) {  // what the array held before does not matter
+        fill();
+        D.rows = 0;
+        rows.move_into(D);
+        EXPECT_EQ(D.rows, 2);
+        EXPECT_EQ(D.row_start, (std::vector<std::int32_t>{0, 2, 3}));
+        EXPECT_EQ(D.column, (std::vector<std::int32_t>{1, 2, 0}));
+        EXPECT_EQ(D.value, (std::vector<double>{4.0, 5.0, 6.0}));
+        EXPECT_EQ(rows.blocks().size(), 2U);
     }
 }
 

@@ -4,10 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include "delassus/error.hpp"
+#include "delassus/generate.hpp"
 #include "support/small_problems.hpp"
 
 namespace delassus {
@@ -222,6 +225,83 @@ TEST(Renewal, RefusesWhatIsNotFiniteAndStaysAsItWas) {
     data.D.value[0] = std::nan("");
     EXPECT_THROW(kept.renew(data), InputError);
     EXPECT_EQ(kept.problem().D.value[0], before);
+}
+
+// A meter's own sums tell of values that are not finite, and are not deceived by finite ones that overflow in them.
+TEST(Renewal, RefusesWhatIsNotFiniteWithAMeter) {
+    const Problem first = masses_with_rows({{0, 0, 1.0}, {1, 1, 1.0}}, {Cone::nonnegative(2)});
+    PreparedProblem kept(first);
+    const std::vector<double> x = {0.3, -0.7}, lambda = {0.9, 0.1};
+    const double natural = kept.meter().measure(x, lambda).natural;
+    Problem bad = first;
+    for (double* value : {&bad.D.value[1], &bad.b[0], &bad.a[1]}) {
+        for (const double wrong : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+            const double right = std::exchange(*value, wrong);
+            EXPECT_THROW(kept.renew(bad), InputError);
+            *value = right;
+            EXPECT_EQ(kept.problem().D.value, first.D.value);
+            EXPECT_EQ(kept.problem().b, first.b);
+            EXPECT_EQ(kept.meter().measure(x, lambda).natural, natural);
+        }
+    }
+    Problem large = first;
+    large.D.value[1] = 1e200;
+    EXPECT_NO_THROW(kept.renew(large));
+    EXPECT_EQ(kept.problem().D.value, large.D.value);
+    kept.renew(first);
+    EXPECT_EQ(kept.meter().measure(x, lambda).natural, natural);
+}
+
+TEST(Renewal, LeavesTheFormerArrays) {
+    const Problem first = masses_with_rows({{0, 0, 1.0}, {1, 1, 1.0}}, {Cone::nonnegative(2)});
+    Problem second = first;
+    second.D.value = {2.0, 3.0};
+    PreparedProblem kept(first);
+    kept.renew(std::move(second));
+    EXPECT_EQ(kept.problem().D.value, (std::vector<double>{2.0, 3.0}));
+    EXPECT_EQ(second.D.value, first.D.value);  // NOLINT: what is left is part of the promise
+    EXPECT_EQ(second.E.rows, 0);
+}
+
+TEST(Renewal, KeepsWhereBoundsStand) {
+    const Problem first = masses_with_rows({{0, 0, 1.0}, {1, 1, 1.0}}, {Cone::free(1), Cone::box({-1.0}, {2.0})});
+    Problem second = first;
+    second.cones[1] = Cone::box({-3.0}, {4.0});
+    PreparedProblem kept(first);
+    const double *lo = kept.raw().cones[1].lo, *hi = kept.raw().cones[1].hi;
+    kept.renew(std::move(second));
+    EXPECT_EQ(kept.raw().cones[1].lo, lo);
+    EXPECT_EQ(kept.raw().cones[1].hi, hi);
+    EXPECT_EQ(*lo, -3.0);
+    EXPECT_EQ(*hi, 4.0);
+}
+
+// Contacts of two bodies and of one go through passes of their own; natural() goes through plain products.
+TEST(Errors, OfAPileAreThoseOfPlainProducts) {
+    for (const Law law : {Law::Associated, Law::Coulomb}) {
+        Problem pile = generate_sphere_pile({});
+        pile.law = law;
+        PreparedProblem problem(pile);
+        std::vector<double> x(pile.a.size()), lambda(pile.b.size());
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::sin(static_cast<double>(i));
+        for (std::size_t i = 0; i < lambda.size(); ++i) lambda[i] = std::sin(2.0 + 0.7 * static_cast<double>(i));
+        const Errors errors = problem.meter().measure(x, lambda);
+        EXPECT_NEAR(errors.natural, problem.meter().natural(x.data(), lambda.data()), 1e-13 * errors.natural);
+        std::vector<double> momentum(x.size()), impulse(x.size());
+        pile.H.multiply_add(1.0, x.data(), momentum.data());
+        pile.D.transpose_multiply_add(1.0, lambda.data(), impulse.data());
+        double residual = 0.0, of_momentum = 0.0, of_impulse = 0.0, of_a = 0.0;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            residual = std::hypot(residual, momentum[i] - impulse[i] - pile.a[i]);
+            of_momentum = std::hypot(of_momentum, momentum[i]);
+            of_impulse = std::hypot(of_impulse, impulse[i]);
+            of_a = std::hypot(of_a, pile.a[i]);
+        }
+        EXPECT_NEAR(errors.balance, residual / std::max({of_momentum, of_impulse, of_a}), 1e-12 * errors.balance);
+        // The scaling and ‖S r‖ come from a pass of their own as well, but for a new right-hand side.
+        problem.set_right_hand_side(pile.a, pile.b);
+        EXPECT_NEAR(problem.meter().measure(x, lambda).natural, errors.natural, 1e-13 * errors.natural);
+    }
 }
 
 }  // namespace

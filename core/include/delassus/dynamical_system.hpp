@@ -12,6 +12,7 @@
 // A user's own system derives from DynamicalSystem and works with every timestepper and solver (examples/ode).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -50,6 +51,7 @@ public:
         Cone cone;                 ///< for a box, bounds of the force (N, Nm); a stepper multiplies by h
         double restitution = 0.0;  ///< e in [0, 1] of Newton's law u_n⁺ ≥ −e u_n⁻; normal row of a contact
         std::uint64_t key = 0;     ///< the same constraint has the same key in the next step: for warm starts
+        double speed = 0.0;        ///< of its first row, at the velocities of measure_speeds_at()
 
         /// Whether its first row is the distance of two things that cannot meet.
         [[nodiscard]] bool along_normal() const {
@@ -61,20 +63,24 @@ public:
         double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity
     };
 
+    /// The memory stays for the next rows, and the velocities of measure_speeds_at().
     DELASSUS_API void clear();
+    /// v: of the system's n, there as long as blocks are added; null: speeds of blocks are 0.
+    void measure_speeds_at(const double* v) { velocity_ = v; }
 
     /// Adds entries to the row that end_row() closes, in the columns from `column` on. Columns of one row may come in
     /// any order but not twice.
-    void entries(std::int32_t column, std::span<const double> values) {
-        const std::size_t end = used_ + values.size();
-        if (column_.size() < end) grow(end);
-        for (const double value : values) {
-            column_[used_] = column++;
-            value_[used_++] = value;
-        }
+    void entries(std::int32_t column, std::span<const double> values) { put(column, values); }
+    template <std::size_t size>
+    void entries(std::int32_t column, const std::array<double, size>& values) {
+        put(column, std::span<const double, size>(values));
     }
     void entry(std::int32_t column, double value) { entries(column, {&value, 1}); }
-    DELASSUS_API void end_row(double gap = 0.0, double rate = 0.0);
+    void end_row(double gap = 0.0, double rate = 0.0) {
+        if (!ascending_) sort_row();
+        rows_.push_back({gap, rate});
+        row_start_.push_back(static_cast<std::int32_t>(used_));
+    }
     /// Closes a block of the rows since the last one; throws InputError if their number is not cone.rows.
     DELASSUS_API void end_block(const Cone& cone, std::uint64_t key, double restitution = 0.0);
 
@@ -89,8 +95,25 @@ public:
     /// D_A v + rate of a row; v: of the system's n.
     [[nodiscard]] DELASSUS_API double speed(std::size_t row, const double* v) const;
 
+    /// Puts the rows below those of D, which has as many columns. Below none nothing is copied: the arrays change
+    /// places, and D's serve the next rows. Until clear() only blocks() and rows() are left.
+    DELASSUS_API void move_into(SparseMatrix& D);
+
 private:
+    template <class Values>
+    void put(std::int32_t column, Values values) {
+        const std::size_t end = used_ + values.size();
+        if (column_.size() < end) grow(end);
+        if (used_ > static_cast<std::size_t>(row_start_.back()) && column <= column_[used_ - 1]) ascending_ = false;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            column_[used_ + i] = column + static_cast<std::int32_t>(i);
+            value_[used_ + i] = values[i];
+        }
+        used_ = end;
+    }
     DELASSUS_API void grow(std::size_t entries);
+    /// The entries of the row that is being closed.
+    DELASSUS_API void sort_row();
 
     // Blocks and entries stay where they are when cleared, so that the next step finds their memory.
     std::vector<Block> blocks_;
@@ -99,6 +122,8 @@ private:
     std::vector<double> value_;
     std::vector<std::int32_t> row_start_ = {0};
     std::size_t block_count_ = 0, used_ = 0, rows_in_blocks_ = 0;
+    bool ascending_ = true;  // the columns of the row that is being filled
+    const double* velocity_ = nullptr;
 };
 
 class DELASSUS_API DynamicalSystem {

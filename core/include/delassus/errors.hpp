@@ -52,8 +52,9 @@ public:
 
 private:
     friend class PreparedProblem;
-    /// The problem has new values in the same places.
-    void renew();
+    /// The problem has new values in the same places. Whether all values of D and b are finite; false too if they are
+    /// so large that r or N are not.
+    bool renew();
 
     struct Implementation;
     std::unique_ptr<Implementation> implementation_;

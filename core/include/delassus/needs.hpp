@@ -59,9 +59,11 @@ public:
     /// value that is not finite.
     DELASSUS_API void set_right_hand_side(std::vector<double> a, std::vector<double> b);
 
-    /// Takes another problem in the place of this one. Where its entries stand in the same places, memory and analysis
-    /// are used again, and nothing is allocated as long as H is block-diagonal. Throws as the constructor; this object
-    /// is then as it was.
+    /// Takes another problem in the place of this one, and leaves this one's arrays in it. Where its entries stand in
+    /// the same places, analysis and scratch memory are used again, and nothing is allocated as long as H is
+    /// block-diagonal. Throws as the constructor; both are then as they were.
+    DELASSUS_API void renew(Problem&& problem);
+    /// The same with a copy of the problem.
     DELASSUS_API void renew(const Problem& problem);
 
     /// Changes the friction law.

@@ -48,6 +48,8 @@ public:
     /// configured solver cannot take the problem, InputError if the problem is not valid. A solve that does not reach
     /// its tolerance is counted in effort() and in the answer; the best iterate is in solution.
     DELASSUS_API bool solve(const Problem& problem, Solution& solution, bool warm_start);
+    /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
+    DELASSUS_API bool solve(Problem&& problem, Solution& solution, bool warm_start);
 
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;
     DELASSUS_API void reset_effort();

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "delassus/error.hpp"
+#include "problem/copy_cone.hpp"
 
 namespace delassus {
 
@@ -15,37 +17,62 @@ void UnilateralRows::clear() {
     rows_.clear();
     row_start_.assign(1, 0);
     block_count_ = used_ = rows_in_blocks_ = 0;
+    ascending_ = true;
 }
 
+// An array that comes back from a step is as long as its rows then were. Growing by a share, rather than to all of its
+// memory, writes few zeros where a step has about as many rows as the last.
 void UnilateralRows::grow(std::size_t entries) {
-    entries = std::max(entries, 2 * column_.size());
+    entries = std::max(entries, column_.size() + column_.size() / 8);
     column_.resize(entries);
     value_.resize(entries);
 }
 
-void UnilateralRows::end_row(double gap, double rate) {
-    // Rows come sorted as a rule, and are short.
-    const auto begin = column_.begin() + row_start_.back(), end = column_.begin() + static_cast<std::ptrdiff_t>(used_);
-    for (auto next = std::is_sorted_until(begin, end); next != end; ++next)
-        for (auto k = static_cast<std::size_t>(next - column_.begin());
-             k > static_cast<std::size_t>(row_start_.back()) && column_[k] < column_[k - 1]; --k) {
+void UnilateralRows::sort_row() {
+    // Rows are short, and consist of sorted runs.
+    for (auto last = static_cast<std::size_t>(row_start_.back()) + 1; last < used_; ++last)
+        for (auto k = last; k > static_cast<std::size_t>(row_start_.back()) && column_[k] < column_[k - 1]; --k) {
             std::swap(column_[k], column_[k - 1]);
             std::swap(value_[k], value_[k - 1]);
         }
-    rows_.push_back({gap, rate});
-    row_start_.push_back(static_cast<std::int32_t>(used_));
+    ascending_ = true;
+}
+
+void UnilateralRows::move_into(SparseMatrix& D) {
+    if (D.rows == 0) {
+        D.column.swap(column_);
+        D.value.swap(value_);
+        D.row_start.swap(row_start_);
+        D.column.resize(used_);
+        D.value.resize(used_);
+    } else {
+        const auto before = D.entries();
+        const auto used = static_cast<std::ptrdiff_t>(used_);
+        D.column.insert(D.column.end(), column_.begin(), column_.begin() + used);
+        D.value.insert(D.value.end(), value_.begin(), value_.begin() + used);
+        for (std::size_t row = 1; row < row_start_.size(); ++row) D.row_start.push_back(before + row_start_[row]);
+    }
+    D.rows += static_cast<std::int32_t>(rows_.size());
+    row_start_.assign(1, 0);
+    used_ = 0;
 }
 
 void UnilateralRows::end_block(const Cone& cone, std::uint64_t key, double restitution) {
     const auto given = static_cast<std::int32_t>(rows_.size() - rows_in_blocks_);
     if (given != cone.rows)
         throw InputError(fmt::format("a block of {} rows was given a cone of {}", given, cone.rows));
-    rows_in_blocks_ = rows_.size();
+    const std::size_t first_row = std::exchange(rows_in_blocks_, rows_.size());
     if (block_count_ == blocks_.size()) blocks_.emplace_back();
     Block& block = blocks_[block_count_++];
-    block.cone = cone;
+    copy_cone(cone, block.cone);
     block.restitution = restitution;
     block.key = key;
+    block.speed = velocity_ ? speed(first_row, velocity_) : 0.0;
+    // The processor's own prefetching ends at each page.
+    if (const std::size_t ahead = used_ + 512; ahead < column_.size()) {
+        __builtin_prefetch(&value_[ahead], 1);
+        __builtin_prefetch(&column_[ahead], 1);
+    }
 }
 
 double UnilateralRows::speed(std::size_t row, const double* v) const {

@@ -39,6 +39,68 @@ Island& Islands::next_island() {
     return island;
 }
 
+namespace {
+
+/// Whether all rows from `first` to the one before `last` have their entries in the same columns. Differences are
+/// gathered, which needs no branch a column.
+bool share_columns(const SparseMatrix& D, std::int32_t first, std::int32_t last) {
+    const auto* start = D.row_start.data();
+    const std::int32_t length = start[first + 1] - start[first];
+    const std::int32_t* column = D.column.data() + start[first];
+    for (auto row = first + 1; row < last; ++row) {
+        if (start[row + 1] - start[row] != length) return false;
+        const std::int32_t* other = D.column.data() + start[row];
+        std::int32_t difference = 0;
+        for (std::int32_t k = 0; k < length; ++k) difference |= column[k] ^ other[k];
+        if (difference != 0) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+// The root of all is found once a cone, and columns that it has are told by one look. A contact has the same columns in
+// all of its rows: they are looked at once, and the rows' values only where a column is new.
+void Islands::join_rows(const SparseMatrix& D) {
+    const auto cones = first_row_.size() - 1;
+    cone_column_.assign(cones, -1);  // any column of the cone's rows
+    for (std::size_t c = 0; c < cones; ++c) {
+        const auto first = first_row_[c], last = first_row_[c + 1];
+        // The processor's own prefetching ends at each page.
+        if (const auto ahead = D.row_start[static_cast<std::size_t>(first)] + 1024; ahead < D.entries())
+            __builtin_prefetch(D.column.data() + ahead);
+        std::int32_t top = -1;  // the root of the cone's columns
+        const auto is_joined = [&](std::int32_t column) {
+            return top >= 0 && parent_[static_cast<std::size_t>(column)] == top;
+        };
+        const auto take = [&](std::int32_t column) {
+            if (top < 0) {
+                cone_column_[c] = column;
+                top = root(column);
+                return;
+            }
+            join(top, column);
+            top = root(top);
+            parent_[static_cast<std::size_t>(column)] = top;
+        };
+        const auto begin = D.row_start[static_cast<std::size_t>(first)];
+        const auto end = D.row_start[static_cast<std::size_t>(last)];
+        if (share_columns(D, first, last)) {
+            const auto length = D.row_start[static_cast<std::size_t>(first) + 1] - begin;
+            for (auto k = begin; k < begin + length; ++k) {
+                const auto column = D.column[static_cast<std::size_t>(k)];
+                if (is_joined(column)) continue;
+                bool zero = true;
+                for (auto e = k; zero && e < end; e += length) zero = D.value[static_cast<std::size_t>(e)] == 0.0;
+                if (!zero) take(column);
+            }
+            continue;
+        }
+        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
+            if (!is_joined(D.column[k]) && D.value[k] != 0.0) take(D.column[k]);
+    }
+}
+
 void Islands::find(const Problem& problem) {
     problem_ = &problem;
     count_ = 0;
@@ -51,22 +113,7 @@ void Islands::find(const Problem& problem) {
         for_each_entry(problem.H, i, [&](std::size_t k) {
             if (problem.H.column[k] != i) join(i, problem.H.column[k]);
         });
-    cone_column_.assign(problem.cones.size(), -1);  // any column of the cone's rows
-    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
-        std::int32_t top = -1;  // the root of the cone's columns
-        const auto& D = problem.D;
-        const auto end = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(first_row_[c + 1])]);
-        for (auto k = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(first_row_[c])]); k < end; ++k) {
-            const auto column = D.column[k];
-            if ((top >= 0 && parent_[static_cast<std::size_t>(column)] == top) || D.value[k] == 0.0) continue;
-            if (top < 0) {
-                cone_column_[c] = column;
-            } else {
-                join(top, column);
-            }
-            top = root(column);
-        }
-    }
+    join_rows(problem.D);
 
     touched_.assign(static_cast<std::size_t>(n), 0);  // by root
     for (const auto column : cone_column_)

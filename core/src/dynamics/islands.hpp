@@ -34,6 +34,8 @@ public:
 private:
     std::int32_t root(std::int32_t column);
     void join(std::int32_t first, std::int32_t second);
+    /// Joins the columns of each cone's rows, where these are not zero.
+    void join_rows(const SparseMatrix& D);
     Island& next_island();
 
     const Problem* problem_ = nullptr;

@@ -48,7 +48,8 @@ struct StepSolver::Implementation {
         return solvers[instance];
     }
 
-    bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number);
+    /// Takes the arrays of the problem and leaves others.
+    bool solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -62,6 +63,7 @@ struct StepSolver::Implementation {
     std::set<std::string> loaded;
     Islands islands;
     std::deque<KeptPart> parts;  // by the number of the part
+    Problem given;               // a copy of what solve() must not change
     Solution start;
     SolverEffort effort;
 };
@@ -78,17 +80,17 @@ void StepSolver::leave_nothing_out() {
         self.also_needs |= DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
 }
 
+bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
+    implementation_->given = problem;
+    return solve(std::move(implementation_->given), solution, warm_start);
+}
+
 // The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as
 // long as bodies keep their neighbours, the k-th of the next, and what was prepared and analysed for it is used again.
-bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
+bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     auto& self = *implementation_;
-    if (on_problem && self.config.law && *self.config.law != problem.law) {
-        Problem seen = problem;
-        seen.law = *self.config.law;
-        on_problem(seen);
-    } else if (on_problem) {
-        on_problem(problem);
-    }
+    if (self.config.law) problem.law = *self.config.law;
+    if (on_problem) on_problem(problem);
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
@@ -116,19 +118,17 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
     return solved;
 }
 
-bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& solution, bool warm_start,
-                                            std::size_t number) {
+bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number) {
     if (number == parts.size()) parts.emplace_back();
     auto& kept = parts[number].prepared;
-    const Law law = config.law.value_or(problem.law);
     if (!kept) {
-        kept.emplace(problem, also_needs);
+        kept.emplace(std::move(problem), also_needs);
+        problem = {};
     } else {
-        kept->renew(problem);
+        kept->renew(std::move(problem));
     }
-    if (law != problem.law) kept->set_law(law);
     const PreparedProblem& prepared = *kept;
-    if (leaves_out && problem.m() == 0) {
+    if (leaves_out && prepared.problem().m() == 0) {
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
                               structure == Structure::Definite || structure == Structure::Reduced;

@@ -19,6 +19,15 @@ struct Body {
     std::int32_t position = -1, column = -1;  ///< first entries in q and v; −1 if fixed
 };
 
+/// What a step reads of each body that moves, side by side.
+struct MovingBody {
+    BodyIndex body = -1;
+    std::int32_t position = -1, column = -1;
+    bool diagonal = false;  ///< the inertia
+    double mass = 0.0;
+    Matrix3d inertia = Matrix3d::Identity();
+};
+
 struct Node {
     NodeParameters parameters;
     std::int32_t position = -1, column = -1;

@@ -255,13 +255,16 @@ void MultibodySystem::leave_nothing_out() {
 void MultibodySystem::finish() {
     auto& self = *implementation_;
     self.must_not_be_finished();
-    for (auto& body : self.bodies) {
+    for (std::size_t k = 0; k < self.bodies.size(); ++k) {
+        auto& body = self.bodies[k];
         if (body.parameters.fixed) continue;
         body.position = self.position_size;
         body.column = self.n;
         self.position_size += 7;
         self.n += 6;
         const Matrix3d& J = body.inertia;
+        self.moving.push_back(
+            {static_cast<BodyIndex>(k), body.position, body.column, J.isDiagonal(0.0), body.parameters.mass, J});
         if (!J.isApprox(J(0, 0) * Matrix3d::Identity(), 1e-14)) self.gyroscopic = true;
     }
     for (auto& node : self.nodes) {
@@ -288,10 +291,8 @@ void MultibodySystem::finish() {
 
 void MultibodySystem::Implementation::place(const double* q, const double* v) const {
     must_be_finished();
-    for (std::size_t k = 0; k < bodies.size(); ++k) {
-        const auto& body = bodies[k];
-        if (body.column < 0) continue;
-        auto& place = at[static_cast<BodyIndex>(k)];
+    for (const auto& body : moving) {
+        auto& place = at[body.body];
         const double* from = q + body.position;
         place.x = Eigen::Map<const Vector3d>(from);
         place.A = Quaterniond(from[3], from[4], from[5], from[6]).toRotationMatrix();
@@ -426,8 +427,7 @@ State MultibodySystem::initial_state() const {
 
 void MultibodySystem::increment(const double* q, const double* delta, double* result) const {
     const auto& self = *implementation_;
-    for (const auto& body : self.bodies) {
-        if (body.column < 0) continue;
+    for (const auto& body : self.moving) {
         const double *from = q + body.position, *by = delta + body.column;
         double* to = result + body.position;
         const Quaterniond turned =
@@ -445,8 +445,7 @@ void MultibodySystem::increment(const double* q, const double* delta, double* re
 
 void MultibodySystem::difference(const double* from, const double* to, double* delta) const {
     const auto& self = *implementation_;
-    for (const auto& body : self.bodies) {
-        if (body.column < 0) continue;
+    for (const auto& body : self.moving) {
         const double *a = from + body.position, *b = to + body.position;
         for (int i = 0; i < 3; ++i) delta[body.column + i] = b[i] - a[i];
         const Quaterniond first(a[3], a[4], a[5], a[6]), second(b[3], b[4], b[5], b[6]);
@@ -459,8 +458,7 @@ void MultibodySystem::difference(const double* from, const double* to, double* d
 
 void MultibodySystem::inverse_tangent(const double* delta, std::vector<DiagonalBlock3>& blocks) const {
     blocks.clear();
-    for (const auto& body : implementation_->bodies) {
-        if (body.column < 0) continue;
+    for (const auto& body : implementation_->moving) {
         DiagonalBlock3 block;
         block.first = body.column + 3;
         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(block.value) =

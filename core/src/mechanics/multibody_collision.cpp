@@ -74,6 +74,8 @@ void MultibodySystem::Implementation::make_detector() {
         return;
     }
     if (envelope == 0.0) envelope = envelope_for(setup.shapes);
+    poses.resize(bodies.size() + nodes.size());
+    for (std::size_t k = 0; k < bodies.size(); ++k) poses[k] = bodies[k].parameters.pose;
     detector = make_collision_detector(std::move(setup));
 }
 

@@ -47,11 +47,10 @@ Vector3d at_time(const std::array<Motion, 3>& motions, double t) {
 
 void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) const {
     const auto& self = *implementation_;
-    for (const auto& body : self.bodies) {
-        if (body.column < 0) continue;
-        for (int i = 0; i < 3; ++i) M.add(body.column + i, body.column + i, factor * body.parameters.mass);
+    for (const auto& body : self.moving) {
+        for (int i = 0; i < 3; ++i) M.add(body.column + i, body.column + i, factor * body.mass);
         const Matrix3d& J = body.inertia;
-        if (J.isDiagonal(0.0)) {
+        if (body.diagonal) {
             for (int i = 0; i < 3; ++i) M.add(body.column + 3 + i, body.column + 3 + i, factor * J(i, i));
         } else {
             M.add_block(body.column + 3, body.column + 3, 3, 3, RowMajor3(J).data(), factor);
@@ -64,10 +63,9 @@ void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) 
 
 void MultibodySystem::multiply_mass(const State&, double factor, const double* x, double* result) const {
     const auto& self = *implementation_;
-    for (const auto& body : self.bodies) {
-        if (body.column < 0) continue;
+    for (const auto& body : self.moving) {
         const Eigen::Map<const Vector3d> linear(x + body.column), angular(x + body.column + 3);
-        Eigen::Map<Vector3d>(result + body.column) += factor * body.parameters.mass * linear;
+        Eigen::Map<Vector3d>(result + body.column) += factor * body.mass * linear;
         Eigen::Map<Vector3d>(result + body.column + 3) += factor * (body.inertia * angular);
     }
     for (const auto& node : self.nodes)
@@ -81,11 +79,9 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
     const auto& self = *implementation_;
     self.place(state.q.data(), state.v.data());
     const Vector3d gravity = vector(self.gravity);
-    for (std::size_t k = 0; k < self.bodies.size(); ++k) {
-        const auto& body = self.bodies[k];
-        if (body.column < 0) continue;
-        const Vector3d& omega = self.at[static_cast<BodyIndex>(k)].omega;
-        Eigen::Map<Vector3d>(result + body.column) += factor * body.parameters.mass * gravity;
+    for (const auto& body : self.moving) {
+        const Vector3d& omega = self.at[body.body].omega;
+        Eigen::Map<Vector3d>(result + body.column) += factor * body.mass * gravity;
         Eigen::Map<Vector3d>(result + body.column + 3) -= factor * omega.cross(body.inertia * omega);
     }
     for (const auto& node : self.nodes)
@@ -165,10 +161,9 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
 void MultibodySystem::add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), state.v.data());
-    for (std::size_t k = 0; k < self.bodies.size() && self.gyroscopic; ++k) {
-        const auto& body = self.bodies[k];
-        if (body.column < 0) continue;
-        const Vector3d& omega = self.at[static_cast<BodyIndex>(k)].omega;
+    for (std::size_t k = 0; k < self.moving.size() && self.gyroscopic; ++k) {
+        const auto& body = self.moving[k];
+        const Vector3d& omega = self.at[body.body].omega;
         Matrix3d R = skew(omega) * body.inertia - skew(body.inertia * omega);
         if (tangent == Tangent::Symmetric) {
             R = (0.5 * (R + R.transpose())).eval();

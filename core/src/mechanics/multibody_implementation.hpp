@@ -38,6 +38,7 @@ struct MultibodySystem::Implementation {
 
     // ---- Since finish() ----
     std::int32_t n = 0, position_size = 0, m = 0;
+    std::vector<mechanics::MovingBody> moving;
     bool gyroscopic = false;  // a moving body whose moments differ
     std::unique_ptr<CollisionDetector> detector;
     bool leaves_out = true;  ///< what no contact needs
@@ -47,7 +48,7 @@ struct MultibodySystem::Implementation {
     mutable mechanics::RowVector gradient;
     mutable mechanics::RowMatrix hessian;
     std::vector<ContactPoint> contacts;
-    std::vector<Pose> poses;
+    std::vector<Pose> poses;  // of the detector's bodies; those of fixed ones stay
 
     void must_be_finished() const;
     void must_not_be_finished() const;

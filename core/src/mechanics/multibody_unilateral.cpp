@@ -40,8 +40,10 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     self.collect_limits(h, rows);
     self.collect_motors(state.t + h, rows);
     if (!self.detector) return;
-    self.poses.resize(self.bodies.size() + self.nodes.size());
-    for (std::size_t k = 0; k < self.bodies.size(); ++k) self.poses[k] = self.pose_of(k, state.q.data());
+    for (const auto& body : self.moving) {
+        const double* q = state.q.data() + body.position;
+        self.poses[static_cast<std::size_t>(body.body)] = {{q[0], q[1], q[2]}, {q[3], q[4], q[5], q[6]}};
+    }
     for (std::size_t k = 0; k < self.nodes.size(); ++k)
         self.poses[self.bodies.size() + k].position =
             mechanics::array(self.node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
@@ -132,15 +134,14 @@ MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::p
     return {place.column, &place.A, point - place.x};
 }
 
-void MultibodySystem::Implementation::PointOfOwner::put(const Vector3d& direction, double sign,
-                                                        UnilateralRows& rows) const {
+// Inline in the loop over contacts, which calls it six times for each.
+inline void MultibodySystem::Implementation::PointOfOwner::put(const Vector3d& direction, double sign,
+                                                               UnilateralRows& rows) const {
     if (column < 0) return;
-    std::array<double, 6> values;
-    for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)] = sign * direction[i];
-    if (!A) return rows.entries(column, {values.data(), 3});
+    if (!A) return rows.entries(column, std::array{sign * direction[0], sign * direction[1], sign * direction[2]});
     const Vector3d turning = A->transpose() * arm.cross(direction);
-    for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(3 + i)] = sign * turning[i];
-    rows.entries(column, values);
+    rows.entries(column, std::array{sign * direction[0], sign * direction[1], sign * direction[2], sign * turning[0],
+                                    sign * turning[1], sign * turning[2]});
 }
 
 ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t first, std::int32_t second) const {

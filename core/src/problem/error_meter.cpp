@@ -13,6 +13,7 @@
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/residual.hpp"
 #include "delassus/sdk/saddle_point.hpp"
+#include "problem/dense_rows.hpp"
 #include "problem/prepared_problem.hpp"
 
 namespace delassus {
@@ -70,8 +71,29 @@ struct AnyCone {
         return operations.gap(cone, lambda, u);
     }
 };
+/// Three rows, in the operations of sdk::FrictionCone but without its branches: near a solution of a pile, which of
+/// them a contact takes is a matter of chance, and a guess that fails costs more than the whole projection.
 struct SpatialFriction : sdk::FrictionCone {
     [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
+
+    static void project_with_slope(double slope, double* v) {
+        const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
+        const bool inside = t <= slope * v[0], polar = slope * t <= -v[0];
+        const double normal = (v[0] + slope * t) / (1.0 + slope * slope);
+        const double factor = slope * normal / t;  // not finite for t = 0 alone, which is inside or polar
+        v[0] = inside ? v[0] : polar ? 0.0 : normal;
+        const double kept = inside ? 1.0 : polar ? 0.0 : factor;
+        v[1] *= kept;
+        v[2] *= kept;
+    }
+    static void project(const delassus_cone& cone, double* lambda) { project_with_slope(cone.mu, lambda); }
+    static void project_dual(const delassus_cone& cone, double* u) {
+        if (cone.mu > 0.0) {
+            project_with_slope(1.0 / cone.mu, u);
+        } else {
+            u[0] = std::max(0.0, u[0]);
+        }
+    }
 };
 
 }  // namespace
@@ -82,15 +104,17 @@ struct ErrorMeter::Implementation {
         take_mobility();
     }
 
-    void take_mobility() {
+    /// Whether r and the diagonal of N, which is not negative, came out finite, as their sums tell.
+    bool take_mobility() {
         const Vector* diagonal = &reference.diagonal;
         if (prepared.mobility) {
-            diagonal = &prepared.mobility->free_velocity(view, reference.r);
+            diagonal = &prepared.mobility->free_velocity(view, prepared.shares_columns, reference.r);
         } else {
             reference = prepared.structure == Structure::Unsymmetric ? of_unsymmetric(view) : of_singular(view);
         }
         r_norm = reference.r.norm();
         residual.assign(view, *diagonal, reference.r);
+        return std::isfinite(r_norm) && std::isfinite(diagonal->sum());
     }
 
     /// u = D x + E λ + b, in the scratch vector.
@@ -101,56 +125,64 @@ struct ErrorMeter::Implementation {
         return plain_u;
     }
 
-    /// plain_u, with the De Saxcé term where the law asks for it.
-    const Vector& judged_velocity() const {
-        if (!view.coulomb) return plain_u;
-        judged_u = plain_u;
-        for (const auto& cone : view.cones)
-            if (cone.kind == DELASSUS_CONE_FRICTION)
-                judged_u[cone.first_row] += sdk::FrictionCone::de_saxce(cone, plain_u.data() + cone.first_row);
-        return judged_u;
-    }
-
-    /// One pass over D and E for plain_u, for impulse = Dᵀ λ, and for Errors::rounding, which it returns. A product of
-    /// k terms is off by at most k ε times the product of the absolute values (Higham, Accuracy and Stability of
-    /// Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts for one.
-    double pass_over_rows(const double* x, const double* lambda) const {
-        plain_u.resize(view.m);
-        impulse.setZero(view.n);
-        const delassus_matrix &D = view.raw->D, &E = view.raw->E;
-        double sum = 0.0;
-        for (std::size_t c = 0; c < view.cones.size(); ++c) {
-            const double s = residual.scaling()[c];
-            const auto first = view.cones[c].first_row;
-            for (auto row = first; row < first + view.cones[c].rows; ++row) {
-                double u = view.b[row], magnitude = std::abs(u);
-                for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k) {
-                    const double term = D.value[k] * x[D.column[k]];
-                    u += term;
-                    magnitude += std::abs(term);
-                    impulse[D.column[k]] += D.value[k] * lambda[row];
-                }
-                for (auto k = E.row_start[row]; k < E.row_start[row + 1]; ++k) {
-                    const double term = E.value[k] * lambda[E.column[k]];
-                    u += term;
-                    magnitude += std::abs(term);
-                }
-                plain_u[row] = u;
-                const double scaled = s * magnitude + std::abs(lambda[row]) / s;
-                sum += scaled * scaled;
-            }
-        }
-        return 0.5 * std::numeric_limits<double>::epsilon() * std::sqrt(sum) / residual.reference();
-    }
-
-    /// Squares of what Errors reports of the cones, but for the gap, which is a sum.
-    struct ConeSums {
+    /// What Errors reports, in sums over the cones: of squares, but for the gap.
+    struct Sums {
         double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
+        double velocity = 0.0;  ///< ‖u‖²
+        double rounding = 0.0;
     };
-    /// u: with the De Saxcé term where the law asks for it. trial: memory for the rows of the largest cone.
+
+    /// The rows of one cone, which share their columns, times x, and by λ into the impulse.
+    struct RowsAtSolution {
+        const double *x, *lambda;  // λ: of the cone's rows
+        double *u, *magnitude;     // of the cone's rows
+        Vector& impulse;
+        template <int length>
+        void operator()(const DenseRows<length>& rows) const {
+            using Array = typename DenseRows<length>::Array;
+            const Array x_of_columns = rows.gather(x);
+            Array pushed = Array::Zero();
+            for (std::int32_t i = 0; i < rows.count; ++i) {
+                const auto row = rows.row(i);
+                const Array terms = row * x_of_columns;
+                u[i] += terms.sum();
+                magnitude[i] += terms.abs().sum();
+                pushed += lambda[i] * row;
+            }
+            for (int k = 0; k < length; ++k) impulse[rows.column[k]] += pushed[k];
+        }
+    };
+
+    /// u and the sum of the magnitudes of its terms for the rows of a cone, and its part of impulse = Dᵀ λ.
+    void pass_over_rows(std::size_t c, const double* x, const double* lambda, double* u, double* magnitude) const {
+        const delassus_matrix &D = view.raw->D, &E = view.raw->E;
+        const auto& cone = view.cones[c];
+        const auto first = cone.first_row;
+        for (std::int32_t i = 0; i < cone.rows; ++i) {
+            u[i] = view.b[first + i];
+            magnitude[i] = std::abs(u[i]);
+        }
+        const bool done = prepared.shares_columns[c] && E.entries == 0 &&
+                          for_dense_rows(D, cone, RowsAtSolution{x, lambda + first, u, magnitude, impulse});
+        if (done) return;
+        for (std::int32_t i = 0; i < cone.rows; ++i) {
+            const auto row = first + i;
+            const auto add = [&](double term) {
+                u[i] += term;
+                magnitude[i] += std::abs(term);
+            };
+            for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k) {
+                add(D.value[k] * x[D.column[k]]);
+                impulse[D.column[k]] += D.value[k] * lambda[row];
+            }
+            for (auto k = E.row_start[row]; k < E.row_start[row + 1]; ++k) add(E.value[k] * lambda[E.column[k]]);
+        }
+    }
+
+    /// λ, u: of the cone's rows, u with the De Saxcé term where the law asks for it. trial: memory for as many.
     template <class Projections>
     void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* u, double* trial,
-                  ConeSums& sums) const {
+                  Sums& sums) const {
         const auto& cone = view.cones[c];
         const std::int32_t rows = on.rows(cone);
         const double square = residual.scaling()[c] * residual.scaling()[c];
@@ -159,6 +191,16 @@ struct ErrorMeter::Implementation {
             for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - trial[i]) * (from[i] - trial[i]);
             return sum;
         };
+        double squared_velocity = 0.0;
+        for (std::int32_t i = 0; i < rows; ++i) squared_velocity += u[i] * u[i];
+        sums.velocity += squared_velocity;
+        if (cone.kind == DELASSUS_CONE_FREE) {  // λ cancels; it must not leave its rounding
+            sums.natural += square * squared_velocity;
+        } else {
+            for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - square * u[i];
+            on.project(cone, trial);
+            sums.natural += squared_distance(lambda) / square;
+        }
         for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i];
         on.project(cone, trial);
         sums.cone += squared_distance(lambda) / square;
@@ -171,21 +213,40 @@ struct ErrorMeter::Implementation {
         sums.gap += on.gap(cone, lambda, u);
     }
 
-    [[nodiscard]] ConeSums sums_over_cones(const double* lambda, const Vector& u) const {
-        ConeSums sums;
-        work.resize(view.m);
+    /// One pass over D and E, cone by cone, which leaves the impulse Dᵀ λ as well. On the rounding: a product of k
+    /// terms is off by at most k ε times the product of the absolute values (Higham, Accuracy and Stability of
+    /// Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts for one.
+    [[nodiscard]] Sums sums_over_cones(const double* x, const double* lambda) const {
+        Sums sums;
+        impulse.setZero(view.n);
+        work.resize(3 * largest_cone());
         for (std::size_t c = 0; c < view.cones.size(); ++c) {
             const auto& cone = view.cones[c];
-            const double *lambda_c = lambda + cone.first_row, *u_c = u.data() + cone.first_row;
-            sums.natural += residual.squared_block(c, lambda_c, plain_u.data() + cone.first_row);
-            if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
-                std::array<double, 3> trial;
-                add_cone(SpatialFriction{}, c, lambda_c, u_c, trial.data(), sums);
+            const double* lambda_c = lambda + cone.first_row;
+            double *u = work.data(), *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
+            prefetch_after(view.raw->D, cone.first_row);
+            pass_over_rows(c, x, lambda, u, magnitude);
+            const double s = residual.scaling()[c];
+            for (std::int32_t i = 0; i < cone.rows; ++i) {
+                const double scaled = s * magnitude[i] + std::abs(lambda_c[i]) / s;
+                sums.rounding += scaled * scaled;
+            }
+            const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
+            if (friction && view.coulomb) u[0] += sdk::FrictionCone::de_saxce(cone, u);
+            if (friction && cone.rows == 3) {
+                std::array<double, 3> of_three;
+                add_cone(SpatialFriction{}, c, lambda_c, u, of_three.data(), sums);
             } else {
-                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u_c, work.data(), sums);
+                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, trial, sums);
             }
         }
         return sums;
+    }
+
+    [[nodiscard]] std::int32_t largest_cone() const {
+        std::int32_t rows = 0;
+        for (const auto& cone : view.cones) rows = std::max(rows, cone.rows);
+        return rows;
     }
 
     const PreparedProblem::Implementation& prepared;
@@ -194,17 +255,17 @@ struct ErrorMeter::Implementation {
     sdk::NaturalResidual residual;
     double r_norm = 0.0;
     // Kept so that measuring again allocates nothing.
-    mutable Vector plain_u, judged_u, work, momentum, impulse;
+    mutable Vector plain_u, work, momentum, impulse;
 };
 
 ErrorMeter::ErrorMeter(const PreparedProblem& problem)
     : implementation_(std::make_unique<Implementation>(*problem.implementation_)) {}
 ErrorMeter::~ErrorMeter() = default;
 
-void ErrorMeter::renew() {
+bool ErrorMeter::renew() {
     auto& self = *implementation_;
     std::construct_at(&self.view, self.prepared.raw);  // maps cannot be assigned
-    self.take_mobility();
+    return self.take_mobility();
 }
 
 Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const double> lambda_values) const {
@@ -217,21 +278,20 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
     const VectorView x(x_values.data(), problem.n);
     const VectorView lambda(lambda_values.data(), problem.m);
     Errors errors;
-    errors.rounding = self.pass_over_rows(x.data(), lambda.data());
+    const auto sums = self.sums_over_cones(x.data(), lambda.data());
+    const double reference = self.residual.reference();
+    errors.rounding = 0.5 * std::numeric_limits<double>::epsilon() * std::sqrt(sums.rounding) / reference;
     if (problem.n > 0) {
         Vector& momentum = self.momentum;
         momentum.noalias() = problem.H * x;
         errors.balance = ratio((momentum - self.impulse - problem.a).norm(),
                                std::max({momentum.norm(), self.impulse.norm(), problem.a.norm()}));
     }
-    const Vector& u = self.judged_velocity();
-    const auto sums = self.sums_over_cones(lambda.data(), u);
-    const double reference = self.residual.reference();
     errors.natural = std::sqrt(sums.natural) / reference;
     errors.cone = std::sqrt(sums.cone) / reference;
     errors.dual = std::sqrt(sums.dual) / reference;
     errors.gap = std::abs(sums.gap) / (reference * reference);
-    errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), u.norm()}));
+    errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), std::sqrt(sums.velocity)}));
     return errors;
 }
 

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "problem/dense_rows.hpp"
+
 namespace delassus {
 
 using sdk::Vector;
@@ -24,32 +26,63 @@ void Mobility::factorize(const sdk::ProblemView& problem) {
     inverse_.apply(inverse_diagonal_);
 }
 
-const Vector& Mobility::free_velocity(const sdk::ProblemView& problem, Vector& r) {
+namespace {
+
+/// D v and diag(D W Dᵀ) of a cone's rows, which have their entries in the same columns; W: diagonal.
+struct FreeRows {
+    const Vector &v, &W;
+    double *velocity, *square;  ///< of the first row
+
+    template <int length>
+    void operator()(const DenseRows<length>& rows) const {
+        const auto v_of_columns = rows.gather(v), W_of_columns = rows.gather(W);
+        for (std::int32_t i = 0; i < rows.count; ++i) {
+            const auto row = rows.row(i);
+            velocity[i] = (row * v_of_columns).sum();
+            square[i] = (row.square() * W_of_columns).sum();
+        }
+    }
+};
+
+}  // namespace
+
+const Vector& Mobility::free_velocity(const sdk::ProblemView& problem, std::span<const char> shares_columns,
+                                      Vector& r) {
     const bool new_rows = std::exchange(rows_are_new_, false);
     if (!H_is_diagonal_) {
         if (new_rows) operator_.refresh(problem);
         operator_.free_velocity(problem, r);
         return operator_.diagonal();
     }
-    r = problem.b;
     velocity(problem, nullptr, work_);
     if (!new_rows) {
+        r = problem.b;
         r.noalias() += problem.D * work_;
         return diagonal_;
     }
     // Both in one pass over D.
+    r.resize(problem.m);
     diagonal_.resize(problem.m);
-    for (Eigen::Index row = 0; row < problem.m; ++row) {
-        double velocity = 0.0, square = 0.0;
-        for (sdk::SparseRowsView::InnerIterator entry(problem.D, row); entry; ++entry) {
-            velocity += entry.value() * work_[entry.col()];
-            square += entry.value() * entry.value() * inverse_diagonal_[entry.col()];
-        }
-        for (sdk::SparseRowsView::InnerIterator entry(problem.E, row); entry; ++entry)
-            if (entry.col() == row) square += entry.value();
-        r[row] += velocity;
-        diagonal_[row] = square;
+    const delassus_matrix& D = problem.raw->D;
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        const delassus_cone& cone = problem.cones[c];
+        const auto first = cone.first_row, last = first + cone.rows;
+        prefetch_after(D, first);
+        if (!shares_columns[c] ||
+            !for_dense_rows(D, cone, FreeRows{work_, inverse_diagonal_, r.data() + first, diagonal_.data() + first}))
+            for (auto row = first; row < last; ++row) {
+                double velocity = 0.0, square = 0.0;
+                for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k) {
+                    velocity += D.value[k] * work_[D.column[k]];
+                    square += D.value[k] * D.value[k] * inverse_diagonal_[D.column[k]];
+                }
+                r[row] = velocity;
+                diagonal_[row] = square;
+            }
+        for (auto row = first; row < last; ++row) r[row] += problem.b[row];
     }
+    for (Eigen::Index row = 0; row < problem.m && problem.E.nonZeros() > 0; ++row)
+        diagonal_[row] += problem.E.coeff(row, row);
     return diagonal_;
 }
 

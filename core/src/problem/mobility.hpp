@@ -2,6 +2,8 @@
 // What the host itself asks of a definite H.
 #pragma once
 
+#include <span>
+
 #include "delassus/sdk/delassus_operator.hpp"
 
 namespace delassus {
@@ -19,8 +21,10 @@ public:
     void refresh() { rows_are_new_ = true; }
 
     [[nodiscard]] const sdk::HInverse& inverse() const { return H_is_diagonal_ ? inverse_ : operator_.inverse(); }
-    /// r ← D H⁻¹ a + b, resized to m; the diagonal of N, m, valid until the next call.
-    const sdk::Vector& free_velocity(const sdk::ProblemView& problem, sdk::Vector& r);
+    /// r ← D H⁻¹ a + b, resized to m; the diagonal of N, m, valid until the next call. shares_columns: of cones,
+    /// whether all their rows have entries in the same columns of D.
+    const sdk::Vector& free_velocity(const sdk::ProblemView& problem, std::span<const char> shares_columns,
+                                     sdk::Vector& r);
     /// x ← H⁻¹ (a + Dᵀ λ); resized to n. λ: m, or none for λ = 0.
     void velocity(const sdk::ProblemView& problem, const double* lambda, sdk::Vector& x) const;
 

@@ -128,26 +128,44 @@ const ErrorMeter& PreparedProblem::meter() const {
 }
 
 void PreparedProblem::renew(const Problem& other) {
+    renew(Problem(other));
+}
+
+// Values of rows that are not finite show in the error meter's own pass over them, which saves a pass; finite ones that
+// overflow in it show as well, so that a look at the values decides.
+void PreparedProblem::renew(Problem&& other) {
     auto& self = *implementation_;
     if (!self.same_places_of_H(other)) {
-        *this = PreparedProblem(other, self.also_needs);
+        *this = PreparedProblem(std::move(other), self.also_needs);
+        other = {};
         return;
     }
     const bool new_places = !self.same_places_of_rows(other);
     const bool same_H = self.problem.H.value == other.H.value;
-    if (new_places) {
-        validate(other);
-    } else {
-        validate_values(other, !same_H);
-    }
     const bool same_rows =
         same_H && !new_places && self.problem.D.value == other.D.value && self.problem.E.value == other.E.value;
-    self.copy(other, new_places);
+    const bool small_blocks = self.structure == Structure::Diagonal || self.structure == Structure::Blocks;
+    const bool met_by_meter = self.meter && small_blocks && self.mobility.use_count() == 1 && same_H && !same_rows &&
+                              self.problem.E.entries() == 0 && other.D.rows == other.m();
+    validate(other, {.places = !new_places, .H = same_H, .rows = met_by_meter});
+    self.exchange(other, new_places);
+    if (met_by_meter) {
+        self.mobility->refresh();
+        if (!self.meter->renew()) {
+            self.exchange(other, new_places);
+            self.mobility->refresh();
+            self.meter->renew();
+            validate(other, {.places = true, .H = true});
+            self.exchange(other, new_places);
+            self.mobility->refresh();
+            self.meter->renew();
+        }
+    }
     if (!same_rows) {
         const Structure before = self.structure;
-        if (same_H && self.mobility.use_count() == 1) {
+        if (!met_by_meter && same_H && self.mobility.use_count() == 1) {
             self.mobility->refresh();
-        } else {
+        } else if (!met_by_meter) {
             self.detect_structure();
         }
         self.derive_needs(new_places);
@@ -155,7 +173,7 @@ void PreparedProblem::renew(const Problem& other) {
     } else {
         self.set_law_needs();
     }
-    if (self.meter) self.meter->renew();
+    if (self.meter && !met_by_meter) self.meter->renew();
 }
 
 namespace {
@@ -170,26 +188,26 @@ bool same_places(const SparseMatrix& here, const SparseMatrix& there) {
            here.column == there.column;
 }
 
-/// An absent matrix becomes zero, rows × columns.
-void copy_matrix(const SparseMatrix& from, bool new_places, std::int32_t rows, std::int32_t columns, SparseMatrix& to) {
-    if (new_places && absent(from)) {
-        to.row_start.assign(static_cast<std::size_t>(rows) + 1, 0);
-        to.column.clear();
-    } else if (new_places) {
-        to.row_start = from.row_start;
-        to.column = from.column;
+/// Solvers may keep where bounds stand as long as the pattern stays.
+void exchange_cones(std::vector<Cone>& here, std::vector<Cone>& there, bool new_places) {
+    const auto is_box = [](const Cone& cone) { return cone.kind == ConeKind::Box; };
+    if (new_places || std::none_of(there.begin(), there.end(), is_box)) return here.swap(there);
+    for (std::size_t c = 0; c < here.size(); ++c) {
+        std::swap(here[c].mu, there[c].mu);
+        std::swap_ranges(here[c].lo.begin(), here[c].lo.end(), there[c].lo.begin());
+        std::swap_ranges(here[c].hi.begin(), here[c].hi.end(), there[c].hi.begin());
     }
-    to.rows = rows;
-    to.columns = columns;
-    to.value = from.value;
 }
 
-void copy_cone(const Cone& from, Cone& to) {
-    to.kind = from.kind;
-    to.rows = from.rows;
-    to.mu = from.mu;
-    if (!from.lo.empty() || !to.lo.empty()) to.lo = from.lo;
-    if (!from.hi.empty() || !to.hi.empty()) to.hi = from.hi;
+/// An absent matrix becomes zero, rows × columns, and stays absent there.
+void exchange_matrix(SparseMatrix& here, SparseMatrix& there, std::int32_t rows, std::int32_t columns) {
+    if (!absent(there)) return std::swap(here, there);
+    here.column.clear();
+    here.value.clear();
+    if (here.row_start.size() != static_cast<std::size_t>(rows) + 1 || here.row_start.back() != 0)
+        here.row_start.assign(static_cast<std::size_t>(rows) + 1, 0);
+    here.rows = rows;
+    here.columns = columns;
 }
 
 }  // namespace
@@ -207,22 +225,21 @@ bool PreparedProblem::Implementation::same_places_of_rows(const Problem& other) 
                       });
 }
 
-void PreparedProblem::Implementation::copy(const Problem& other, bool new_places) {
+void PreparedProblem::Implementation::exchange(Problem& other, bool new_places) {
     const auto n = other.n(), m = other.m();
-    problem.H.value = other.H.value;
-    copy_matrix(other.D, new_places, m, n, problem.D);
-    copy_matrix(other.E, new_places, m, m, problem.E);
-    problem.a = other.a;
-    problem.b = other.b;
-    problem.cones.resize(other.cones.size());
-    for (std::size_t c = 0; c < other.cones.size(); ++c) copy_cone(other.cones[c], problem.cones[c]);
-    problem.law = other.law;
-    problem.name = other.name;
-    problem.source = other.source;
-    problem.notes = other.notes;
+    std::swap(problem.H, other.H);
+    exchange_matrix(problem.D, other.D, m, n);
+    exchange_matrix(problem.E, other.E, m, m);
+    problem.a.swap(other.a);
+    problem.b.swap(other.b);
+    exchange_cones(problem.cones, other.cones, new_places);
+    std::swap(problem.law, other.law);
+    problem.name.swap(other.name);
+    problem.source.swap(other.source);
+    problem.notes.swap(other.notes);
     raw.m = m;
-    cones.resize(problem.cones.size());
     point_to_arrays();
+    if (new_places) find_shared_columns();
 }
 
 void PreparedProblem::Implementation::lay_out() {
@@ -230,11 +247,27 @@ void PreparedProblem::Implementation::lay_out() {
     raw.struct_size = sizeof raw;
     raw.n = problem.n();
     raw.m = problem.m();
-    cones.resize(problem.cones.size());
     point_to_arrays();
+    find_shared_columns();
+}
+
+void PreparedProblem::Implementation::find_shared_columns() {
+    const auto& D = problem.D;
+    shares_columns.assign(cones.size(), 0);
+    for (std::size_t c = 0; c < cones.size(); ++c) {
+        const auto first = cones[c].first_row, begin = D.row_start[first], length = D.row_start[first + 1] - begin;
+        bool same = true;
+        for (auto row = first + 1; same && row < first + cones[c].rows; ++row) {
+            const auto* column = D.column.data() + D.row_start[row];
+            same = D.row_start[row + 1] - D.row_start[row] == length &&
+                   std::equal(column, column + length, D.column.data() + begin);
+        }
+        shares_columns[c] = same ? 1 : 0;
+    }
 }
 
 void PreparedProblem::Implementation::point_to_arrays() {
+    cones.resize(problem.cones.size());
     std::int32_t first_row = 0;
     for (std::size_t c = 0; c < cones.size(); ++c) {
         const Cone& cone = problem.cones[c];

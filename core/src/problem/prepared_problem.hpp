@@ -17,6 +17,7 @@ struct PreparedProblem::Implementation {
     std::uint64_t also_needs = 0;
     BlockPartition blocks;
     std::vector<delassus_cone> cones;
+    std::vector<char> shares_columns;  ///< of cones: whether all rows have their entries in D in the same columns
     delassus_problem raw{};
     /// Factored where H is definite or n = 0; null otherwise. The error meter measures with it.
     std::shared_ptr<Mobility> mobility;
@@ -30,8 +31,9 @@ struct PreparedProblem::Implementation {
     [[nodiscard]] bool same_places_of_H(const Problem& other) const;
     /// Whether the entries of D and E, and cones of the same kinds, are in the same places too.
     [[nodiscard]] bool same_places_of_rows(const Problem& other) const;
-    /// Copies a problem with the same places of H.
-    void copy(const Problem& other, bool new_places);
+    /// Exchanges the problem for one with the same places of H.
+    void exchange(Problem& other, bool new_places);
+    void find_shared_columns();
     void detect_structure();
     /// new_places: whether entries of D or E stand elsewhere than at the last call.
     void derive_needs(bool new_places);

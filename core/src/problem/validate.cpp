@@ -16,38 +16,30 @@ namespace {
 /// Refuses with one sentence that begins with the problem's name.
 class Checker {
 public:
-    explicit Checker(const Problem& problem) : problem_(problem) {}
+    Checker(const Problem& problem, const Known& known) : problem_(problem), known_(known) {}
 
     void run() const {
         vector(problem_.a, "a");
-        vector(problem_.b, "b");
+        if (!known_.rows) vector(problem_.b, "b");
         const std::int32_t n = problem_.n();
         const std::int32_t m = problem_.m();
-        matrix(problem_.H, "H", n, n, "n × n");
+        if (!known_.places) places(problem_.H, "H", n, n, "n × n");
+        if (!known_.H) values(problem_.H, "H");
         if (n > 0 && problem_.H.rows == 0) {
             refuse("H is absent, but a has {} entries; give an {} × {} matrix, or an empty a for a reduced problem.", n,
                    n, n);
         }
-        matrix(problem_.D, "D", m, n, "m × n");
-        matrix(problem_.E, "E", m, m, "m × m");
+        if (!known_.places) places(problem_.D, "D", m, n, "m × n");
+        if (!known_.rows) values(problem_.D, "D");
+        if (!known_.places) places(problem_.E, "E", m, m, "m × m");
+        values(problem_.E, "E");
         cones();
         compliance();
-        symmetry_of_H();
+        if (!known_.H || !known_.places) symmetry_of_H();
         if (problem_.law != Law::Associated && problem_.law != Law::Coulomb) {
             refuse("its friction law has the number {}; 0 (associated) and 1 (coulomb) exist.",
                    static_cast<int>(problem_.law));
         }
-    }
-
-    void run_values(bool new_H) const {
-        vector(problem_.a, "a");
-        vector(problem_.b, "b");
-        if (new_H) values(problem_.H, "H");
-        values(problem_.D, "D");
-        values(problem_.E, "E");
-        cones();
-        compliance();
-        if (new_H) symmetry_of_H();
     }
 
 private:
@@ -68,7 +60,7 @@ private:
         }
     }
 
-    void matrix(const SparseMatrix& A, const char* name, std::int32_t rows, std::int32_t columns,
+    void places(const SparseMatrix& A, const char* name, std::int32_t rows, std::int32_t columns,
                 const char* shape) const {
         const bool absent = A.rows == 0 && A.columns == 0;
         if (!absent && (A.rows != rows || A.columns != columns)) {
@@ -106,7 +98,6 @@ private:
                 }
             }
         }
-        values(A, name);
     }
 
     void values(const SparseMatrix& A, const char* name) const {
@@ -204,16 +195,17 @@ private:
     }
 
     const Problem& problem_;
+    const Known known_;
 };
 
 }  // namespace
 
 void validate(const Problem& problem) {
-    Checker(problem).run();
+    validate(problem, {});
 }
 
-void validate_values(const Problem& problem, bool new_H) {
-    Checker(problem).run_values(new_H);
+void validate(const Problem& problem, const Known& known) {
+    Checker(problem, known).run();
 }
 
 }  // namespace delassus

@@ -5,8 +5,14 @@
 
 namespace delassus {
 
-/// As validate(), for a problem whose entries and rows of cones stand where those of a valid one do: only the numbers
-/// are looked at, those of H only if it is new.
-void validate_values(const Problem& problem, bool new_H);
+/// What is known to be right of a problem, and need not be looked at.
+struct Known {
+    bool places = false;  ///< where entries stand, and that the cones' rows are m
+    bool H = false;       ///< the values of H
+    bool rows = false;    ///< the values of D and b
+};
+
+/// As validate(), but for what is known.
+void validate(const Problem& problem, const Known& known);
 
 }  // namespace delassus

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "delassus/problem.hpp"
+
+namespace delassus {
+
+/// to = from, for steps of many contacts: vectors are left alone where neither cone has bounds.
+inline void copy_cone(const Cone& from, Cone& to) {
+    to.kind = from.kind;
+    to.rows = from.rows;
+    to.mu = from.mu;
+    if (!from.lo.empty() || !to.lo.empty()) to.lo = from.lo;
+    if (!from.hi.empty() || !to.hi.empty()) to.hi = from.hi;
+}
+
+}  // namespace delassus
