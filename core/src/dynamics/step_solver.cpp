@@ -48,7 +48,9 @@ struct StepSolver::Implementation {
         return solvers[instance];
     }
 
-    bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number);
+    /// cancelled: as StepSolver::cancelled.
+    bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number,
+                    const std::function<bool()>& cancelled);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -68,6 +70,8 @@ StepSolver::StepSolver(const Registry& registry, SolverConfig config)
     : implementation_(std::make_unique<Implementation>(registry, std::move(config))) {}
 StepSolver::~StepSolver() = default;
 
+RestingParts::~RestingParts() = default;
+
 // The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as
 // long as bodies keep their neighbours, the k-th of the next, and what was prepared and analysed for it is used again.
 bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
@@ -82,12 +86,12 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
-    if (m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
+    if (m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0, cancelled);
 
-    self.islands.find(problem);
+    self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
-    if (list.size() == 1 && list[0].cones.size() == problem.cones.size())
-        return self.solve_part(problem, solution, warm_start, 0);
+    if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
+        return self.solve_part(problem, solution, warm_start, 0, cancelled);
     if (!warm_start) {
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
@@ -99,15 +103,22 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
         if (number == self.parts.size()) self.parts.emplace_back();
         KeptPart& part = self.parts[number];
         self.islands.take(list[number], self.start, part.solution);
-        self.islands.part(list[number], part.data);
-        solved = self.solve_part(part.data, part.solution, warm_start, number) && solved;
+        const std::uint64_t identity = resting && !list[number].cones.empty() ? self.islands.identity(list[number]) : 0;
+        if (identity != 0 && resting->rests(list[number].columns, identity)) {
+            std::fill(part.solution.x.begin(), part.solution.x.end(), 0.0);
+            ++self.effort.resting_parts;
+        } else {
+            self.islands.part(list[number], part.data);
+            solved = self.solve_part(part.data, part.solution, warm_start, number, cancelled) && solved;
+            if (identity != 0) resting->solved(list[number].columns, identity, part.solution.x);
+        }
         self.islands.put(list[number], part.solution, solution);
     }
     return solved;
 }
 
 bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& solution, bool warm_start,
-                                            std::size_t number) {
+                                            std::size_t number, const std::function<bool()>& cancelled) {
     if (number == parts.size()) parts.emplace_back();
     auto& kept = parts[number].prepared;
     const Law law = config.law.value_or(problem.law);
@@ -118,6 +129,7 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
     }
     if (law != problem.law) kept->set_law(law);
     const PreparedProblem& prepared = *kept;
+    if (cancelled && cancelled()) throw StepInterrupted("the step was interrupted");
     if (problem.m() == 0) {
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
@@ -133,7 +145,9 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
     Solver& solver = this->solver(number % most_instances);
     SolveSettings part_settings = settings;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
+    part_settings.cancelled = cancelled;
     const auto report = solver.solve(prepared, solution, part_settings);
+    if (report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     if (report.stages.empty()) loaded.insert(config.name);
     for (const auto& stage : report.stages) loaded.insert(stage.solver);
     ++effort.plugin_solves;

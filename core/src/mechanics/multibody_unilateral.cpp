@@ -151,8 +151,16 @@ ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t f
     return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
 }
 
-void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
+std::uint64_t MultibodySystem::contact_key(const ContactPoint& contact) {
     const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
+    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), contact.feature);
+}
+
+std::array<std::int32_t, 2> MultibodySystem::contact_bodies(const ContactPoint& contact) const {
+    return {implementation_->owner_of(contact.shape_a), implementation_->owner_of(contact.shape_b)};
+}
+
+void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
     std::int32_t last_a = -1, last_b = -1;  // neighbouring contacts are of the same materials as a rule
     ContactMaterial material;
     for (const auto& contact : contacts) {
@@ -168,7 +176,7 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
         };
-        const auto key = key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), contact.feature);
+        const auto key = contact_key(contact);
         put_row(normal);
         rows.end_row(contact.gap);
         if (material.friction == 0.0) {

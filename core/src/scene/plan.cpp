@@ -104,6 +104,7 @@ public:
         constraints();
         contacts();
         matrix();
+        sleeping();
         solvers();
         plan_.left_out.insert(plan_.left_out.begin(), nothing_.begin(), nothing_.end());
         for (const auto& one : system_.left_out) plan_.left_out.push_back({one.what, one.reason});
@@ -237,6 +238,17 @@ private:
             keep("a sparse H", "forces or constraints couple bodies in it; it is factorised");
         } else {
             leave("factorisation of H", "no stiffness couples bodies: H is diagonal by blocks of one body");
+        }
+    }
+
+    void sleeping() {
+        if (const auto& rule = system_.sleeping) {
+            keep("sleeping bodies",
+                 fmt::format("parts slower than {:g} m/s for {:g} s that stay at rest reach no solver until something "
+                             "about them changes",
+                             rule->speed, rule->time));
+        } else {
+            leave("sleeping", "off: bodies at rest are solved for in every step (docs/scenes.md, \"sleeping\")");
         }
     }
 
