@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/feature.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -20,6 +21,15 @@ std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0
     // 4 + 24 + 24 + 12 bits.
     return static_cast<std::uint64_t>(kind) << 60 | (first & 0xffffff) << 36 | (second & 0xffffff) << 12 |
            (third & 0xfff);
+}
+
+/// A feature in 12 bits: its kind, and a vertex (10 bits) or two edges (5 bits each). Features ascend as before, and
+/// points between the same two shapes differ but for polytopes with more vertices or edges than these bits count.
+std::uint64_t short_feature(std::uint32_t feature) {
+    using collision::FeatureKind;
+    const std::uint32_t kind = feature >> 30, of_a = feature >> 15 & 0x7fff, of_b = feature & 0x7fff;
+    const bool edges = kind == static_cast<std::uint32_t>(FeatureKind::Edges);
+    return kind << 10 | (edges ? (of_a & 0x1f) << 5 | (of_b & 0x1f) : (of_a | of_b) & 0x3ff);
 }
 
 }  // namespace
@@ -153,7 +163,7 @@ ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t f
 
 std::uint64_t MultibodySystem::contact_key(const ContactPoint& contact) {
     const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
-    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), contact.feature);
+    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), short_feature(contact.feature));
 }
 
 std::array<std::int32_t, 2> MultibodySystem::contact_bodies(const ContactPoint& contact) const {
