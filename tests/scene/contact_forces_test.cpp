@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
@@ -44,6 +45,9 @@ void expect_weights(const Running& run) {
     const auto forces = run.simulation.contact_forces();
     EXPECT_EQ(forces.size(), run.system().contacts().size());
     EXPECT_GE(forces.size(), 8u);
+    std::set<std::uint64_t> keys;
+    for (const auto& contact : run.system().contacts()) keys.insert(MultibodySystem::contact_key(contact));
+    EXPECT_EQ(keys.size(), forces.size());
     const Vector3 below = force_between(run, "ground", "box_0"), between = force_between(run, "box_0", "box_1");
     for (std::size_t i = 0; i < 2; ++i) {
         EXPECT_NEAR(below[i], 0.0, 1e-6);

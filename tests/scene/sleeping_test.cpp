@@ -205,6 +205,20 @@ loads:
     EXPECT_LT(run.pose("left").position[2], 0.15);
 }
 
+TEST(Sleeping, BallWakesOneStackOfMany) {
+    Running run(read_scene(example_scene("sleeping_stacks")));
+    run_until(run, 0.6);
+    const auto solves = run.simulation.totals().plugin_solves;
+    run_until(run, 1.3);
+    EXPECT_EQ(run.simulation.totals().plugin_solves, solves);
+    std::int64_t fewest = run.simulation.record().sleeping;
+    EXPECT_EQ(fewest, 108);
+    while (!run.simulation.finished()) fewest = std::min(fewest, run.simulation.step().sleeping);
+    EXPECT_LE(fewest, 105);
+    EXPECT_GE(fewest, 96);
+    EXPECT_GE(run.simulation.record().sleeping, 102);
+}
+
 std::vector<std::uint64_t> bits(const std::vector<double>& values) {
     std::vector<std::uint64_t> result;
     for (const double value : values) result.push_back(std::bit_cast<std::uint64_t>(value));
