@@ -48,9 +48,7 @@ struct StepSolver::Implementation {
         return solvers[instance];
     }
 
-    /// cancelled: as StepSolver::cancelled.
-    bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number,
-                    const std::function<bool()>& cancelled);
+    bool solve_part(const Problem& problem, Solution& solution, bool warm_start, std::size_t number);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -83,15 +81,16 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
     } else if (on_problem) {
         on_problem(problem);
     }
+    self.settings.cancelled = cancelled;
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
-    if (m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0, cancelled);
+    if (m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
 
     self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
     if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
-        return self.solve_part(problem, solution, warm_start, 0, cancelled);
+        return self.solve_part(problem, solution, warm_start, 0);
     if (!warm_start) {
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
@@ -109,7 +108,7 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
             ++self.effort.resting_parts;
         } else {
             self.islands.part(list[number], part.data);
-            solved = self.solve_part(part.data, part.solution, warm_start, number, cancelled) && solved;
+            solved = self.solve_part(part.data, part.solution, warm_start, number) && solved;
             if (identity != 0) resting->solved(list[number].columns, identity, part.solution.x);
         }
         self.islands.put(list[number], part.solution, solution);
@@ -118,7 +117,7 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
 }
 
 bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& solution, bool warm_start,
-                                            std::size_t number, const std::function<bool()>& cancelled) {
+                                            std::size_t number) {
     if (number == parts.size()) parts.emplace_back();
     auto& kept = parts[number].prepared;
     const Law law = config.law.value_or(problem.law);
@@ -129,7 +128,7 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
     }
     if (law != problem.law) kept->set_law(law);
     const PreparedProblem& prepared = *kept;
-    if (cancelled && cancelled()) throw StepInterrupted("the step was interrupted");
+    if (settings.cancelled && settings.cancelled()) throw StepInterrupted("the step was interrupted");
     if (problem.m() == 0) {
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
@@ -145,9 +144,8 @@ bool StepSolver::Implementation::solve_part(const Problem& problem, Solution& so
     Solver& solver = this->solver(number % most_instances);
     SolveSettings part_settings = settings;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
-    part_settings.cancelled = cancelled;
     const auto report = solver.solve(prepared, solution, part_settings);
-    if (report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
+    if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     if (report.stages.empty()) loaded.insert(config.name);
     for (const auto& stage : report.stages) loaded.insert(stage.solver);
     ++effort.plugin_solves;
