@@ -148,7 +148,8 @@ TEST(Sleeping, SlowSwingThatWouldGoOnIsNoRest) {
 }
 
 TEST(Sleeping, LoadThatVariesWakes) {
-    // A push that grows by 1 N/s from −1 N: nothing at 1 s, and at 0.6 · 9.81 N · 1 kg the box slides.
+    // A push of t newtons moves nothing for some seconds, and yet nobody may sleep through it; a constant one is slept
+    // on.
     Running varies(parse_scene(stack("", R"(
 loads:
   - {name: push, body: box_0, force: [{linear: {start: 0, rate: 1}}, 0, 0]}
@@ -165,7 +166,7 @@ loads:
     EXPECT_EQ(constant.simulation.record().sleeping, 3);
 }
 
-TEST(Sleeping, MotorThatStartsWakes) {
+TEST(Sleeping, SlowMotorGoesOn) {
     // A motor at the turning point of its sine, quiet for a while, then moving again.
     Running run(parse_scene(std::string(R"(
 step: 0.002
@@ -187,8 +188,8 @@ motors:
     EXPECT_NEAR(farthest, std::sin(0.02), 1e-5);
 }
 
-TEST(Sleeping, PartnerThatLeavesWakes) {
-    // Two weights on a seesaw; a rope lifts one of them slowly: a motor, from 1.5 s on.
+TEST(Sleeping, SeesawTipsWhenAWeightIsLifted) {
+    // Two weights on a seesaw; a rope pulls ever harder on one of them.
     Running run(parse_scene(head + R"(
 bodies:
   - {name: ground, fixed: true, shapes: [{plane: {}, material: stone}]}
