@@ -3,6 +3,7 @@
 #ifdef DELASSUS_HAS_FCL
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
