@@ -83,6 +83,15 @@ public:
         return found != kept_.end() && found->key == key && impulses_[static_cast<std::size_t>(found->first)] > 0.0;
     }
 
+    [[nodiscard]] std::array<double, 3> reaction(std::uint64_t key) const override {
+        std::array<double, 3> force{};
+        const auto found = first_kept(key);
+        if (found == kept_.end() || found->key != key) return force;
+        for (std::size_t i = 0; i < force.size() && static_cast<std::int32_t>(i) < found->rows; ++i)
+            force[i] = impulses_[static_cast<std::size_t>(found->first) + i] / last_h_;
+        return force;
+    }
+
     void restart() override {
         multipliers_.clear();
         kept_.clear();
@@ -307,6 +316,7 @@ const RegisterTimestepper row{
            .doc = "what keeps light bodies under heavy pull stable: the positive part of the reactions' stiffness"}},
      .constraints = true,
      .unilateral = true,
+     .sleeping = true,
      .order = 1,
      .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
          return std::make_unique<EulerImplicitLinearized>(system, values);

@@ -29,7 +29,7 @@ struct RunArguments {
     SceneArguments scene;
     std::filesystem::path output, resume;
     std::int64_t every = 1, dump = 0;
-    bool json = false;
+    bool contact_forces = false, json = false;
 };
 
 double seconds_since(Clock::time_point begin) {
@@ -91,6 +91,14 @@ struct Run {
     int exit_code = exit_solved;
 };
 
+/// Where the system that is farthest behind is.
+Run interrupted_run(const std::vector<Simulation>& simulations) {
+    double t = simulations[0].state().t;
+    for (const auto& simulation : simulations) t = std::min(t, simulation.state().t);
+    return {{"interrupted", fmt::format("stopped at t = {:.9g} s; --resume goes on from there", t), 0.0},
+            exit_not_converged};
+}
+
 /// Steps until the end, an interrupt or a failure.
 Run advance(std::vector<Simulation>& simulations, RunFolder* folder) {
     Run run;
@@ -100,16 +108,15 @@ Run advance(std::vector<Simulation>& simulations, RunFolder* folder) {
     try {
         for (auto next = next_system(simulations); next; next = next_system(simulations)) {
             if (interrupted()) {
-                run.outcome.status = "interrupted";
-                run.outcome.message =
-                    fmt::format("stopped at t = {:.9g} s; --resume goes on from there", simulations[*next].state().t);
-                run.exit_code = exit_not_converged;
+                run = interrupted_run(simulations);
                 break;
             }
             simulations[*next].step();
             if (folder != nullptr) folder->add_step(*next);
             progress.show();
         }
+    } catch (const StepInterrupted& error) {
+        run = interrupted_run(simulations);
     } catch (const StepFailure& error) {
         run.outcome = {"failed", error.what(), 0.0};
         run.exit_code = exit_not_converged;
@@ -143,6 +150,12 @@ void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outco
             fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
         fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
                    totals.worst_penetration, totals.most_contacts);
+        if (system.sleeping) {
+            fmt::print("  sleeping: {} bodies and nodes at the end; {} parts of problems left out\n",
+                       simulation.record().sleeping, totals.resting_parts);
+        } else {
+            fmt::print("  sleeping: off\n");
+        }
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {
@@ -162,6 +175,8 @@ int run(const RunArguments& arguments) {
         throw InputError("--resume goes on in its own folder; leave out -o");
     if (arguments.dump > 0 && arguments.output.empty() && !resume)
         throw InputError("--dump-problems writes into the folder of -o; give one");
+    if (arguments.contact_forces && arguments.output.empty() && !resume)
+        throw InputError("--contact-forces writes into the folder of -o; give one");
 
     Scene scene = read(arguments.scene);
     const Registry registry(absolute(arguments.scene.plugin_path));
@@ -172,13 +187,17 @@ int run(const RunArguments& arguments) {
     std::unique_ptr<RunFolder> folder;
     if (resume) {
         folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every);
+        if (arguments.contact_forces && !folder->contact_forces())
+            throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
+                                         arguments.resume.string()));
     } else if (!arguments.output.empty()) {
         folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
-                                             arguments.every);
+                                             arguments.every, arguments.contact_forces);
     }
     if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
 
     install_interrupt_handler();
+    for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
     install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
     const Run result = advance(simulations, folder.get());
@@ -209,6 +228,8 @@ void add_run(CLI::App& program, Action& action) {
     command->add_option("-o,--output", arguments->output, "Folder for trajectory.h5, VTK files, checkpoint, report")
         ->type_name("DIR");
     command->add_option("--every", arguments->every, "Write the state of every N-th step [1]")->type_name("N");
+    command->add_flag("--contact-forces", arguments->contact_forces,
+                      "Write the bodies and the force of each contact with the state");
     command->add_option("--dump-problems", arguments->dump, "Write the problem of every N-th step as a problem folder")
         ->type_name("N");
     command->add_option("--resume", arguments->resume, "Go on with the run in this folder")->type_name("DIR");

@@ -231,11 +231,12 @@ TEST_F(Axes, ASmallSuiteRunsFromEndToEnd) {
         "    values: [0.001, 0.01]\n"
         "    bounds: {position: {body: stone, at: [0, 0, -0.04905], within: 5e-4}}\n"
         "    timesteppers: [euler_implicit, hht]\n"
-        "  - {name: nothing, scene: empty.yaml, values: [0], bounds: {speed: 0}}\n");
+        "  - {name: nothing, scene: empty.yaml, values: [0], bounds: {speed: 0}}\n"
+        "  - {name: impossible, scene: fall.yaml, set: {step: $(value)}, values: [-1], bounds: {speed: 0}}\n");
     ASSERT_EQ(run_suite(file).exit_code, 0);
     auto set = bench::read_results(folder / "out");
-    ASSERT_EQ(set.cells.size(), 9U);
-    EXPECT_EQ(set.axes.size(), 3U);
+    ASSERT_EQ(set.cells.size(), 10U);
+    EXPECT_EQ(set.axes.size(), 4U);
     const auto outcome = [&](std::size_t k) { return set.cells.at(k).at("outcome").get<std::string>(); };
     for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(outcome(k), "correct") << set.cells[k];
     EXPECT_EQ(outcome(4), "correct") << set.cells[4];     // off by ½ g t h = 4.9e-4 m
@@ -243,11 +244,12 @@ TEST_F(Axes, ASmallSuiteRunsFromEndToEnd) {
     EXPECT_NEAR(set.cells[5].at("figure").get<double>(), 4.905e-3, 1e-9);
     EXPECT_EQ(outcome(6), "correct") << set.cells[6];
     EXPECT_EQ(outcome(7), "correct") << set.cells[7];
-    EXPECT_EQ(outcome(8), "refused") << set.cells[8];
+    EXPECT_EQ(outcome(8), "correct") << set.cells[8];  // nothing moves
+    EXPECT_EQ(outcome(9), "refused") << set.cells[9];
     const std::string summary = content_of(folder / "out" / "summary.md");
     EXPECT_NE(summary.find("### Where methods break"), std::string::npos) << summary;
     const std::string csv = content_of(folder / "out" / "cells.csv");
-    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 10);
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 11);
 
     // What was done is not done again, and --only keeps one axis.
     const auto again = bench({"run", file.string(), "-o", (folder / "out").string(), "--only", "fall", "--plugin-path",

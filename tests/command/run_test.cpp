@@ -107,6 +107,84 @@ TEST(Run, DumpedProblemsCanBeSolved) {
     EXPECT_EQ(Json::parse(solved.out).at("status"), "solved");
 }
 
+TEST(Run, EmptySceneLetsTimePass) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const auto empty = scratch / "empty.yaml";
+    std::ofstream(empty) << "step: 0.1\nend: 1\nbodies: []\n";
+    const auto result = run_command("run " + empty.string() + " --end 0.5 --contact-forces -o " + folder.string());
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.out.find("main: 5 steps of euler_implicit_linearized to t = 0.5 s"), std::string::npos)
+        << result.out;
+    const auto resumed = run_command("run " + empty.string() + " --resume " + folder.string());
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    const Json report = json_of(folder / "report.json");
+    EXPECT_EQ(report.at("status"), "finished");
+    EXPECT_EQ(report.at("systems")[0].at("steps"), 10);
+    EXPECT_EQ(report.at("systems")[0].at("bodies"), Json::object());
+    EXPECT_TRUE(std::filesystem::exists(folder / "trajectory.h5"));
+    EXPECT_EQ(run_command("view " + folder.string()).exit_code, 0);
+    EXPECT_EQ(run_command("plan " + empty.string()).exit_code, 0);
+    for (const char* integrator : {"trapezoidal", "generalized_alpha", "rk4"})
+        EXPECT_EQ(run_command("run " + empty.string() + " --integrator " + integrator).exit_code, 0) << integrator;
+    EXPECT_EQ(run_command("run " + empty.string() + " --tolerance 1e-3").exit_code, 0);
+}
+
+TEST(Run, ContactForcesAreWrittenAndGoOn) {
+    const ScratchFolder scratch;
+    const auto whole = scratch / "whole", parts = scratch / "parts";
+    const std::string arguments = "run " + scene("brick_wall") + " --every 2 ";
+    ASSERT_EQ(run_command(arguments + "--contact-forces --end 0.016 -o " + whole.string()).exit_code, 0);
+    ASSERT_EQ(run_command(arguments + "--contact-forces --end 0.008 -o " + parts.string()).exit_code, 0);
+    const auto resumed = run_command(arguments + "--end 0.016 --resume " + parts.string());
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    EXPECT_EQ(text_of(whole / "scene.pvd"), text_of(parts / "scene.pvd"));
+    EXPECT_NE(text_of(whole / "scene.pvd").find("part=\"1\" file=\"vtk/main.contacts_000004.vtp\""), std::string::npos);
+    for (const auto& entry : std::filesystem::directory_iterator(whole / "vtk"))
+        EXPECT_EQ(text_of(entry.path()), text_of(parts / "vtk" / entry.path().filename().string())) << entry.path();
+
+    const auto without = scratch / "without";
+    ASSERT_EQ(run_command(arguments + "--end 0.008 -o " + without.string()).exit_code, 0);
+    EXPECT_FALSE(std::filesystem::exists(without / "vtk" / "main.contacts_000001.vtp"));
+    const auto late = run_command(arguments + "--contact-forces --end 0.016 --resume " + without.string());
+    EXPECT_EQ(late.exit_code, 2);
+    EXPECT_NE(late.err.find("has no contact forces so far"), std::string::npos) << late.err;
+    EXPECT_EQ(run_command("run " + scene("pendulum") + " --contact-forces").exit_code, 2);
+}
+
+TEST(Run, SummaryAndPlanSayWhetherBodiesSleep) {
+    const std::string settings = " --set 'sleeping={time: 0.02}' ";
+    const auto off = run_command("run " + scene("brick_wall") + " --end 0.01");
+    EXPECT_NE(off.out.find("sleeping: off"), std::string::npos) << off.out;
+    const auto on = run_command("run " + scene("brick_wall") + settings + "--end 0.1");
+    EXPECT_NE(on.out.find("sleeping: 14 bodies and nodes at the end"), std::string::npos) << on.out;
+    const auto report = run_command("run " + scene("brick_wall") + settings + "--end 0.1 --json");
+    const Json sleeping = Json::parse(report.out).at("systems")[0].at("sleeping");
+    EXPECT_EQ(sleeping.at("bodies"), 14);
+    EXPECT_EQ(sleeping.at("time"), 0.02);
+    EXPECT_GT(sleeping.at("resting_parts"), 20);
+    EXPECT_NE(run_command("plan " + scene("brick_wall")).out.find("sleeping: off"), std::string::npos);
+    EXPECT_NE(run_command("plan " + scene("brick_wall") + settings).out.find("sleeping bodies: parts slower than"),
+              std::string::npos);
+    EXPECT_EQ(run_command("run " + scene("pendulum") + " --set sleeping=true --integrator rk4").exit_code, 4);
+}
+
+// The step never ends by itself: its tolerance is beyond double precision, and so are the limits.
+TEST(Run, InterruptEndsAStepWithinASecond) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const std::string arguments =
+        "run " + scene("brick_wall") +
+        " --solver pgs --set solver.tolerance=1e-300 --set solver.max_iterations=1000000000000 -o " + folder.string();
+    const auto result = run_shell(std::string(DELASSUS_COMMAND) + " " + arguments +
+                                  " & sleep 3; kill -INT $!; sleep 1.5; kill -0 $! 2>/dev/null && echo late; wait $!");
+    EXPECT_EQ(result.exit_code, 3) << result.err;
+    EXPECT_EQ(result.out.find("late"), std::string::npos);
+    EXPECT_NE(result.err.find("stopped at t = 0 s; --resume goes on from there"), std::string::npos) << result.err;
+    EXPECT_EQ(json_of(folder / "report.json").at("status"), "interrupted");
+    EXPECT_EQ(json_of(folder / "checkpoint.json").at("systems")[0].at("step"), 0);
+}
+
 TEST(Run, FailedStepSaysWhenAndLeavesTheLastState) {
     const ScratchFolder scratch;
     const auto folder = scratch / "run";

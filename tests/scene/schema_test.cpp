@@ -87,6 +87,7 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["beam"] = "step: 1\nend: 1\nbeams: [{@}]";
     scenes["section"] = "step: 1\nend: 1\nbeams: [{section: {@}}]";
     scenes["step_bounds"] = "step: {@}";
+    scenes["sleeping"] = "sleeping: {@}";
     scenes["tolerance"] = "tolerance: {@}";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;

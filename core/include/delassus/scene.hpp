@@ -36,6 +36,13 @@ struct SceneMaterialPair {
     ContactMaterial contact;
 };
 
+/// When bodies sleep: parts of a system whose bodies and nodes all were slower than `speed` for as long as `time`, and
+/// that stay at rest when let go, are left out of the solver's problems until something about them changes.
+struct SleepingRule {
+    double speed = 1e-3;  ///< m/s, > 0; of a body √(2T/m), the root mean square of its points' speeds
+    double time = 0.5;    ///< s, > 0
+};
+
 /// A system, finished and ready to be simulated, with what the file says about how.
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
@@ -43,10 +50,11 @@ struct SceneSystem {
 
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
-    SolverConfig solver;                 ///< an empty name: `auto`
-    double step = 0.0;                   ///< s, > 0; with `control` the first that is tried
-    std::optional<StepControl> control;  ///< steps follow from a tolerance; none: all are `step` long
-    double end = 0.0;                    ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
+    SolverConfig solver;                   ///< an empty name: `auto`
+    double step = 0.0;                     ///< s, > 0; with `control` the first that is tried
+    std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
+    std::optional<SleepingRule> sleeping;  ///< none: every body is awake
+    double end = 0.0;                      ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
     // What a plan and a report name things by.
     std::vector<BodyParameters> bodies;  ///< by BodyIndex

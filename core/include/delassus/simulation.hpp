@@ -2,6 +2,7 @@
 // Running a system of a scene step by step.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -16,6 +17,8 @@
 
 namespace delassus {
 
+class Sleeping;
+
 /// What is known after a step. Contacts are those that the step's problem was made of: found where the step began.
 struct StepRecord {
     std::int64_t step = 0;       ///< steps taken so far
@@ -26,6 +29,7 @@ struct StepRecord {
     double drift = 0.0;          ///< largest |C| of the bilateral constraints, in their own units (m, rad)
     double penetration = 0.0;    ///< of the deepest contact, m; ≥ 0
     std::int64_t contacts = 0;   ///< and other unilateral blocks in the problem
+    std::int64_t sleeping = 0;   ///< bodies and nodes that sleep
     std::int64_t newton_iterations = 0;
     std::int64_t solver_iterations = 0;
     double natural = 0.0;       ///< largest natural error of the step's solves by a plugin
@@ -36,12 +40,19 @@ struct StepRecord {
     bool solved = true;         ///< every solve reached its tolerance
 };
 
+/// What acts in a contact, as a mean over the last step.
+struct ContactForce {
+    std::array<std::int32_t, 2> bodies{};  ///< as MultibodySystem::contact_bodies()
+    Vector3 force{};                       ///< on the second, world frame, N; on the first the opposite
+};
+
 /// Sums and extremes since the start.
 struct SimulationTotals {
     double start_energy = 0.0, energy = 0.0;  ///< J
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
     std::int64_t most_contacts = 0;
     std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
+    std::int64_t resting_parts = 0;  ///< parts of problems that were left out because their bodies sleep
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;
@@ -53,8 +64,9 @@ struct SimulationTotals {
 struct SimulationState {
     std::int64_t step = 0;
     State state;
-    std::vector<double> memory;   ///< Timestepper::save(), warm starts included
-    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps
+    std::vector<double> memory;    ///< Timestepper::save(), warm starts included
+    std::vector<double> control;   ///< AdaptiveStepping::save(); empty with fixed steps
+    std::vector<double> sleeping;  ///< who sleeps, and how long the others were quiet; empty where none may sleep
     SimulationTotals totals;
 };
 
@@ -64,13 +76,13 @@ public:
     /// is not there, cannot take the system, or has other options.
     DELASSUS_API Simulation(SceneSystem& system, const Registry& registry);
     DELASSUS_API ~Simulation();
-    Simulation(Simulation&&) noexcept = default;
+    DELASSUS_API Simulation(Simulation&&) noexcept;
 
     /// Whether `end` is reached. The last step is shorter where `end` is no multiple of a fixed step.
     [[nodiscard]] DELASSUS_API bool finished() const;
 
-    /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence; everything is then
-    /// as it was before the step.
+    /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence, or StepInterrupted
+    /// where solver().cancelled asks for it; everything is then as it was before the step.
     DELASSUS_API const StepRecord& step();
 
     /// Of the last step; of the initial state before the first.
@@ -78,6 +90,8 @@ public:
     [[nodiscard]] const State& state() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
+    /// Of each of MultibodySystem::contacts(), in their order; 0 for those that the last step did not know.
+    [[nodiscard]] DELASSUS_API std::vector<ContactForce> contact_forces() const;
     [[nodiscard]] StepSolver& solver() { return *solver_; }
 
     [[nodiscard]] DELASSUS_API SimulationState save() const;
@@ -92,6 +106,7 @@ private:
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<AdaptiveStepping> control_;  // empty with fixed steps
+    std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     SimulationState now_;
     StepRecord record_;
     std::vector<double> constraint_;

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "delassus/config.hpp"
+#include "delassus/error.hpp"
 #include "delassus/export.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/registry.hpp"
@@ -21,10 +23,31 @@ namespace delassus {
 struct SolverEffort {
     std::int64_t solves = 0;         ///< calls of solve()
     std::int64_t plugin_solves = 0;  ///< of these (and of their islands), those that went to a plugin
+    std::int64_t resting_parts = 0;  ///< parts with rows that were left out because they stand still
     std::int64_t iterations = 0;     ///< of the plugin
     double seconds = 0.0;            ///< set-up and solve
     double worst_natural = 0.0;      ///< largest natural error of a plugin solve
     std::string unsolved;            ///< the first message of a solve that did not end solved; empty if none
+};
+
+/// The answer of StepSolver::cancelled was yes.
+class DELASSUS_API StepInterrupted : public Error {
+public:
+    using Error::Error;
+};
+
+/// Decides which parts of a step's problem stand still and need no solver. A part is what H and rows connect, with all
+/// columns of a body; parts without rows are not asked about.
+class DELASSUS_API RestingParts {
+public:
+    virtual ~RestingParts();
+    /// A number for each column; neighbours with equal numbers are of one body.
+    [[nodiscard]] virtual std::span<const std::int32_t> bodies() const = 0;
+    /// Whether the part with these columns, ascending, stands still: then its x is 0 and its λ stays as it started.
+    /// identity: a hash of all that the part's solution follows from but H, never 0 or 1.
+    virtual bool rests(std::span<const std::int32_t> columns, std::uint64_t identity) = 0;
+    /// Called with each part that was solved, x being its velocities, which may be changed.
+    virtual void solved(std::span<const std::int32_t> columns, std::uint64_t identity, std::span<double> x) = 0;
 };
 
 /// Problems without rows are solved here: x = H⁻¹ a, block by block where H is block-diagonal, else by a factorisation
@@ -56,6 +79,13 @@ public:
 
     /// Called with every problem before it is solved, e.g. to dump it. May be empty.
     std::function<void(const Problem&)> on_problem;
+
+    /// Asked before each part of a problem and whenever a solver at work shows an iterate; where the answer is yes,
+    /// solve() throws StepInterrupted. May be empty.
+    std::function<bool()> cancelled;
+
+    /// Asked about each part of a problem; null: all of them are solved. Not owned.
+    RestingParts* resting = nullptr;
 
     /// A part of a problem that is solved apart from the rest.
     struct Part {

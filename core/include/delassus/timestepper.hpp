@@ -2,6 +2,7 @@
 // One step of a dynamical system in time, and the table of the methods that can take it (integrators/, one file each).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -54,6 +55,10 @@ public:
     /// Whether the unilateral block with this key pushed in the last step.
     [[nodiscard]] virtual bool pushed(std::uint64_t) const { return false; }
 
+    /// The mean forces of the last step in the rows, at most three, of the unilateral block with this key; 0 where
+    /// there was none.
+    [[nodiscard]] virtual std::array<double, 3> reaction(std::uint64_t) const { return {}; }
+
     /// Reaction forces λ of the bilateral constraints at the end of the last step; m. Empty before the first step.
     [[nodiscard]] const std::vector<double>& multipliers() const { return multipliers_; }
 
@@ -72,6 +77,7 @@ struct TimestepperInfo {
     std::vector<OptionInfo> options;
     bool constraints = false;  ///< takes bilateral constraints
     bool unilateral = false;   ///< takes contacts, stops and bounded motors
+    bool sleeping = false;     ///< one problem a step for velocities: parts that stand still may be left out
     int order = 1;             ///< of convergence, for smooth systems and the default options
     /// system outlives the stepper; the values are checked, one for each option.
     std::unique_ptr<Timestepper> (*make)(DynamicalSystem& system, const std::vector<OptionValue>& values) = nullptr;

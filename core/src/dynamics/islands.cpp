@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "problem/structure.hpp"
+
 namespace delassus {
 
 namespace {
@@ -101,7 +103,7 @@ void Islands::join_rows(const SparseMatrix& D) {
     }
 }
 
-void Islands::find(const Problem& problem) {
+void Islands::find(const Problem& problem, std::span<const std::int32_t> bodies) {
     problem_ = &problem;
     count_ = 0;
     const auto n = problem.n();
@@ -113,6 +115,8 @@ void Islands::find(const Problem& problem) {
         for_each_entry(problem.H, i, [&](std::size_t k) {
             if (problem.H.column[k] != i) join(i, problem.H.column[k]);
         });
+    for (std::size_t i = 1; i < bodies.size(); ++i)
+        if (bodies[i] == bodies[i - 1]) join(static_cast<std::int32_t>(i - 1), static_cast<std::int32_t>(i));
     join_rows(problem.D);
 
     touched_.assign(static_cast<std::size_t>(n), 0);  // by root
@@ -202,6 +206,36 @@ void Islands::part(const Island& island, Problem& part) const {
         }
     }
     end(part.D);
+}
+
+std::uint64_t Islands::identity(const Island& island) const {
+    const Problem& whole = *problem_;
+    Hash hash;
+    hash.add(island.columns);
+    const auto add = [&](const auto& numbers, std::int32_t first, std::int32_t last) {
+        hash.add(numbers.data() + first, static_cast<std::size_t>(last - first) * sizeof numbers[0]);
+    };
+    for (const auto column : island.columns) add(whole.a, column, column + 1);
+    for (const auto c : island.cones) {
+        const auto index = static_cast<std::size_t>(c);
+        const Cone& cone = whole.cones[index];
+        hash.add_size(static_cast<std::uint64_t>(cone.kind));
+        hash.add_size(static_cast<std::uint64_t>(cone.rows));
+        hash.add(&cone.mu, sizeof cone.mu);
+        hash.add(cone.lo);
+        hash.add(cone.hi);
+        const auto first = first_row_[index], last = first_row_[index + 1];
+        // Where the rows stand depends on other parts; how long they are does not.
+        for (auto row = first; row < last; ++row)
+            hash.add_size(static_cast<std::uint64_t>(whole.D.row_start[static_cast<std::size_t>(row) + 1] -
+                                                     whole.D.row_start[static_cast<std::size_t>(row)]));
+        const auto begin = whole.D.row_start[static_cast<std::size_t>(first)];
+        const auto end = whole.D.row_start[static_cast<std::size_t>(last)];
+        add(whole.D.column, begin, end);
+        add(whole.D.value, begin, end);
+        add(whole.b, first, last);
+    }
+    return std::max<std::uint64_t>(hash.value(), 2);
 }
 
 void Islands::take(const Island& island, const Solution& whole, Solution& part) const {

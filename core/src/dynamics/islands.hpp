@@ -21,12 +21,15 @@ struct Island {
 /// changes them. Linear in its entries, all parts together. Arrays are kept from problem to problem.
 class Islands {
 public:
-    /// Finds the parts of a problem, which must outlive their use.
-    void find(const Problem& problem);
+    /// Finds the parts of a problem, which must outlive their use. Neighbouring columns with equal numbers in bodies,
+    /// if it is not empty, are of one part.
+    void find(const Problem& problem, std::span<const std::int32_t> bodies = {});
 
     [[nodiscard]] std::span<const Island> list() const { return {islands_.data(), count_}; }
     /// The problem of one part, in place of what was in part.
     void part(const Island& island, Problem& part) const;
+    /// A hash of a part: its columns, its cones, and their entries in D, a and b. Neither 0 nor 1.
+    [[nodiscard]] std::uint64_t identity(const Island& island) const;
     /// The entries of the whole that belong to a part, and back.
     void take(const Island& island, const Solution& whole, Solution& part) const;
     void put(const Island& island, const Solution& part, Solution& whole) const;

@@ -72,6 +72,8 @@ StepSolver::StepSolver(const Registry& registry, SolverConfig config)
     : implementation_(std::make_unique<Implementation>(registry, std::move(config))) {}
 StepSolver::~StepSolver() = default;
 
+RestingParts::~RestingParts() = default;
+
 void StepSolver::leave_nothing_out() {
     auto& self = *implementation_;
     self.leaves_out = false;
@@ -91,14 +93,15 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     auto& self = *implementation_;
     if (self.config.law) problem.law = *self.config.law;
     if (on_problem) on_problem(problem);
+    self.settings.cancelled = cancelled;
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
     if (!self.leaves_out || m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
 
-    self.islands.find(problem);
+    self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
-    if (list.size() == 1 && list[0].cones.size() == problem.cones.size())
+    if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
         return self.solve_part(problem, solution, warm_start, 0);
     if (!warm_start) {
         solution.x.assign(n, 0.0);
@@ -111,8 +114,15 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
         if (number == self.parts.size()) self.parts.emplace_back();
         KeptPart& part = self.parts[number];
         self.islands.take(list[number], self.start, part.solution);
-        self.islands.part(list[number], part.data);
-        solved = self.solve_part(part.data, part.solution, warm_start, number) && solved;
+        const std::uint64_t identity = resting && !list[number].cones.empty() ? self.islands.identity(list[number]) : 0;
+        if (identity != 0 && resting->rests(list[number].columns, identity)) {
+            std::fill(part.solution.x.begin(), part.solution.x.end(), 0.0);
+            ++self.effort.resting_parts;
+        } else {
+            self.islands.part(list[number], part.data);
+            solved = self.solve_part(part.data, part.solution, warm_start, number) && solved;
+            if (identity != 0) resting->solved(list[number].columns, identity, part.solution.x);
+        }
         self.islands.put(list[number], part.solution, solution);
     }
     return solved;
@@ -128,6 +138,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
         kept->renew(std::move(problem));
     }
     const PreparedProblem& prepared = *kept;
+    if (settings.cancelled && settings.cancelled()) throw StepInterrupted("the step was interrupted");
     if (leaves_out && prepared.problem().m() == 0) {
         const auto structure = prepared.structure();
         const bool definite = structure == Structure::Diagonal || structure == Structure::Blocks ||
@@ -144,6 +155,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     SolveSettings part_settings = settings;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const auto report = solver.solve(prepared, solution, part_settings);
+    if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     if (report.stages.empty()) loaded.insert(config.name);
     for (const auto& stage : report.stages) loaded.insert(stage.solver);
     ++effort.plugin_solves;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/feature.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -20,6 +21,15 @@ std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0
     // 4 + 24 + 24 + 12 bits.
     return static_cast<std::uint64_t>(kind) << 60 | (first & 0xffffff) << 36 | (second & 0xffffff) << 12 |
            (third & 0xfff);
+}
+
+/// A feature in 12 bits: its kind, and a vertex (10 bits) or two edges (5 bits each). Features ascend as before, and
+/// points between the same two shapes differ but for polytopes with more vertices or edges than these bits count.
+std::uint64_t short_feature(std::uint32_t feature) {
+    using collision::FeatureKind;
+    const std::uint32_t kind = feature >> 30, of_a = feature >> 15 & 0x7fff, of_b = feature & 0x7fff;
+    const bool edges = kind == static_cast<std::uint32_t>(FeatureKind::Edges);
+    return kind << 10 | (edges ? (of_a & 0x1f) << 5 | (of_b & 0x1f) : (of_a | of_b) & 0x3ff);
 }
 
 }  // namespace
@@ -152,8 +162,16 @@ ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t f
     return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
 }
 
-void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
+std::uint64_t MultibodySystem::contact_key(const ContactPoint& contact) {
     const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
+    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), short_feature(contact.feature));
+}
+
+std::array<std::int32_t, 2> MultibodySystem::contact_bodies(const ContactPoint& contact) const {
+    return {implementation_->owner_of(contact.shape_a), implementation_->owner_of(contact.shape_b)};
+}
+
+void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
     std::int32_t last_a = -1, last_b = -1;  // neighbouring contacts are of the same materials as a rule
     ContactMaterial material;
     for (const auto& contact : contacts) {
@@ -169,7 +187,7 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
         };
-        const auto key = key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), contact.feature);
+        const auto key = contact_key(contact);
         put_row(normal);
         rows.end_row(contact.gap);
         if (material.friction == 0.0 && leaves_out) {

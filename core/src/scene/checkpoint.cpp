@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 1;
+constexpr int version = 2;
 constexpr std::size_t digits = 16;
 
 // Numbers are their 64 bits in hexadecimal, one after the other: no digit is lost, and zeros keep their signs.
@@ -53,6 +53,7 @@ Json json_of(const SimulationTotals& totals) {
             {"newton_iterations", totals.newton_iterations},
             {"solver_iterations", totals.solver_iterations},
             {"plugin_solves", totals.plugin_solves},
+            {"resting_parts", totals.resting_parts},
             {"unsolved_steps", totals.unsolved_steps},
             {"first_unsolved", totals.first_unsolved}};
 }
@@ -76,6 +77,7 @@ SimulationTotals totals_of(const Json& json) {
     json.at("newton_iterations").get_to(totals.newton_iterations);
     json.at("solver_iterations").get_to(totals.solver_iterations);
     json.at("plugin_solves").get_to(totals.plugin_solves);
+    json.at("resting_parts").get_to(totals.resting_parts);
     json.at("unsolved_steps").get_to(totals.unsolved_steps);
     json.at("first_unsolved").get_to(totals.first_unsolved);
     return totals;
@@ -84,7 +86,11 @@ SimulationTotals totals_of(const Json& json) {
 }  // namespace
 
 void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& file) {
-    Json json = {{"format", format}, {"version", version}, {"scene", checkpoint.scene}, {"systems", Json::array()}};
+    Json json = {{"format", format},
+                 {"version", version},
+                 {"scene", checkpoint.scene},
+                 {"contact_forces", checkpoint.contact_forces},
+                 {"systems", Json::array()}};
     for (const auto& system : checkpoint.systems) {
         const auto& simulation = system.simulation;
         json["systems"].push_back({{"name", system.name},
@@ -95,6 +101,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"v", bits(simulation.state.v)},
                                    {"memory", bits(simulation.memory)},
                                    {"control", bits(simulation.control)},
+                                   {"sleeping", bits(simulation.sleeping)},
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)}});
     }
@@ -109,6 +116,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
         if (json.at("version") != version) throw InputError("it was written by another version of Delassus");
         Checkpoint checkpoint;
         json.at("scene").get_to(checkpoint.scene);
+        json.at("contact_forces").get_to(checkpoint.contact_forces);
         for (const Json& one : json.at("systems")) {
             CheckpointedSystem system;
             one.at("name").get_to(system.name);
@@ -118,6 +126,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             system.simulation.state = {t[0], numbers(one.at("q")), numbers(one.at("v"))};
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
+            system.simulation.sleeping = numbers(one.at("sleeping"));
             system.simulation.totals = totals_of(one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             checkpoint.systems.push_back(std::move(system));

@@ -20,6 +20,7 @@ struct CheckpointedSystem {
 struct Checkpoint {
     std::string scene;  ///< Scene::canonical
     std::vector<CheckpointedSystem> systems;
+    bool contact_forces = false;  ///< whether the frames have them
 };
 
 /// Replaces the file, or leaves the old one: never a half of one.

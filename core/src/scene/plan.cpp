@@ -107,6 +107,7 @@ public:
         constraints();
         contacts();
         matrix();
+        sleeping();
         solvers();
         if (!system_.leave_out) keep("one problem", everything);
         plan_.left_out.insert(plan_.left_out.begin(), nothing_.begin(), nothing_.end());
@@ -246,6 +247,17 @@ private:
             keep("a sparse H", "forces or constraints couple bodies in it; it is factorised");
         } else {
             leave("factorisation of H", "no stiffness couples bodies: H is diagonal by blocks of one body");
+        }
+    }
+
+    void sleeping() {
+        if (const auto& rule = system_.sleeping) {
+            keep("sleeping bodies",
+                 fmt::format("parts slower than {:g} m/s for {:g} s that stay at rest reach no solver until something "
+                             "about them changes",
+                             rule->speed, rule->time));
+        } else {
+            leave("sleeping", "off: bodies at rest are solved for in every step (docs/scenes.md, \"sleeping\")");
         }
     }
 

@@ -40,8 +40,12 @@ void prepare(const fs::path& folder) {
 }  // namespace
 
 RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& scene_text,
-                     std::vector<Simulation>& simulations, std::int64_t every)
-    : folder_(std::move(folder)), scene_(scene.canonical), simulations_(simulations), every_(every) {
+                     std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces)
+    : folder_(std::move(folder)),
+      scene_(scene.canonical),
+      simulations_(simulations),
+      every_(every),
+      contact_forces_(contact_forces) {
     prepare(folder_);
     write_file_atomically(folder_ / "scene.yaml", scene_text);
     frame_times_.resize(simulations.size());
@@ -61,6 +65,7 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation
             fmt::format("the run in {} was of another scene, or with other settings; give the same "
                         "scene, --set, --solver, --integrator and --step (--end may differ)",
                         folder_.string()));
+    contact_forces_ = checkpoint.contact_forces;
     for (std::size_t i = 0; i < simulations.size(); ++i) {
         frame_times_.push_back(std::move(checkpoint.systems[i].frame_times));
         simulations[i].load(std::move(checkpoint.systems[i].simulation));
@@ -75,8 +80,8 @@ void RunFolder::open(const Scene& scene, bool resume) {
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         const SceneSystem& system = scene.systems[i];
         systems.push_back({system.name, system.integrator, system.solver.name, system.system->position_size(),
-                           system.system->n(), system.step, trajectory_model(system), simulations_[i].record().step + 1,
-                           static_cast<std::int64_t>(frame_times_[i].size())});
+                           system.system->n(), system.step, trajectory_model(system), contact_forces_,
+                           simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size())});
         series_.emplace_back(folder_ / "vtk", system.name, *system.system);
     }
     trajectory_ = open_trajectory(folder_ / "trajectory.h5", systems, resume);
@@ -118,17 +123,20 @@ void RunFolder::add_frame(std::size_t system) {
     std::vector<Pose> poses;
     for (BodyIndex body = 0; body < mechanics.body_count(); ++body)
         poses.push_back(mechanics.pose(simulation.state(), body));
-    trajectory_->add_frame(system, simulation.state(), poses, mechanics.contacts());
-    series_[system].write(static_cast<std::int64_t>(frame_times_[system].size()), simulation.state());
+    const auto forces = contact_forces_ ? simulation.contact_forces() : std::vector<ContactForce>{};
+    trajectory_->add_frame(system, simulation.state(), poses, mechanics.contacts(), forces);
+    const auto number = static_cast<std::int64_t>(frame_times_[system].size());
+    series_[system].write(number, simulation.state());
+    if (contact_forces_) series_[system].write_contacts(number, simulation.state().t, mechanics.contacts(), forces);
     frame_times_[system].push_back(simulation.state().t);
 }
 
 void RunFolder::checkpoint() {
     trajectory_->flush();
     std::vector<VtkCollectionPart> parts;
-    Checkpoint checkpoint{scene_, {}};
+    Checkpoint checkpoint{scene_, {}, contact_forces_};
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
-        parts.push_back({&series_[i], &frame_times_[i]});
+        parts.push_back({&series_[i], &frame_times_[i], contact_forces_});
         checkpoint.systems.push_back({simulations_[i].system().name, simulations_[i].save(), frame_times_[i]});
     }
     write_vtk_collection(folder_ / "scene.pvd", "vtk", parts);

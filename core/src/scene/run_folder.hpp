@@ -20,11 +20,13 @@ namespace delassus {
 class DELASSUS_API RunFolder {
 public:
     /// Begins a new run in the folder, which must be absent, empty, or hold an earlier run, which is removed.
-    /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder.
+    /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder. contact_forces: whether frames
+    /// have them.
     RunFolder(std::filesystem::path folder, const Scene& scene, const std::string& scene_text,
-              std::vector<Simulation>& simulations, std::int64_t every);
-    /// Goes on with the run in the folder: puts the simulations where its checkpoint is, and cuts off what was written
-    /// after it. Throws InputError if there is none or if it belongs to another scene.
+              std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces = false);
+    /// Goes on with the run in the folder, with contact forces if it has them: puts the simulations where its
+    /// checkpoint is, and cuts off what was written after it. Throws InputError if there is none or if it belongs to
+    /// another scene.
     RunFolder(std::filesystem::path folder, const Scene& scene, std::vector<Simulation>& simulations,
               std::int64_t every);
     ~RunFolder();
@@ -40,6 +42,8 @@ public:
     /// Everything on disk, up to the last step taken.
     void checkpoint();
 
+    [[nodiscard]] bool contact_forces() const { return contact_forces_; }
+
     void write_report(const std::string& json) const;
 
 private:
@@ -50,6 +54,7 @@ private:
     std::string scene_;
     std::vector<Simulation>& simulations_;
     std::int64_t every_;
+    bool contact_forces_ = false;
     std::vector<std::vector<double>> frame_times_;
     std::vector<VtkSeries> series_;
     std::unique_ptr<TrajectoryWriter> trajectory_;

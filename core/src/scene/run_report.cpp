@@ -42,6 +42,11 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
              {"tolerance", system.control
                                ? Json{{"absolute", system.control->absolute}, {"relative", system.control->relative}}
                                : Json(nullptr)},
+             {"sleeping", system.sleeping ? Json{{"speed", system.sleeping->speed},
+                                                 {"time", system.sleeping->time},
+                                                 {"bodies", simulation.record().sleeping},
+                                                 {"resting_parts", totals.resting_parts}}
+                                          : Json(nullptr)},
              {"end", system.end},
              {"steps", simulation.record().step},
              {"rejected", totals.rejected},

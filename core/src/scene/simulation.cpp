@@ -8,8 +8,10 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "scene/sleeping.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
+#include "support/frames.hpp"
 
 namespace delassus {
 namespace {
@@ -18,6 +20,17 @@ using Clock = std::chrono::steady_clock;
 
 /// Remaining times within this fraction of a step are whole steps that rounding spoiled.
 constexpr double rounding_of_step = 1e-9;
+
+/// Throws Unsupported if the system's timestepper solves for more than the velocities of one step.
+void require_sleeping(const SceneSystem& system) {
+    std::vector<std::string> able;
+    for (const TimestepperInfo& one : timesteppers()) {
+        if (one.sleeping && one.name == system.integrator) return;
+        if (one.sleeping) able.push_back(one.name);
+    }
+    throw Unsupported(fmt::format("{} cannot leave out bodies that sleep. Can: {}; or leave out \"sleeping\"",
+                                  system.integrator, fmt::join(able, ", ")));
+}
 
 }  // namespace
 
@@ -32,6 +45,13 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
         if (system.control)
             control_ = std::make_unique<AdaptiveStepping>(*system.system, *timestepper_, *system.control);
+        if (system.sleeping) {
+            require_sleeping(system);
+            if (control_)
+                throw InputError("bodies may sleep with a fixed step only; give a \"step\", no \"tolerance\"");
+            sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
+            solver_->resting = sleeping_.get();
+        }
     } catch (const InputError& error) {
         throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));
     } catch (const Unsupported& error) {
@@ -45,6 +65,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
 }
 
 Simulation::~Simulation() = default;
+Simulation::Simulation(Simulation&&) noexcept = default;
 
 bool Simulation::finished() const {
     // The last of steps that are chosen ends at `end` itself.
@@ -57,7 +78,9 @@ AdaptiveStepReport Simulation::advance(State& state) {
     const double remaining = system_->end - state.t;
     AdaptiveStepReport report;
     report.h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
+    if (sleeping_) sleeping_->begin_step(report.h);
     report.step = timestepper_->step(state, report.h, *solver_);
+    if (sleeping_) sleeping_->end_step(now_.state, state);
     return report;
 }
 
@@ -73,6 +96,7 @@ void Simulation::measure() {
     if (!constraint_.empty()) mechanics.constraint(state, constraint_.data());
     record_.drift = 0.0;
     for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
+    record_.sleeping = sleeping_ ? sleeping_->count() : 0;
 }
 
 const StepRecord& Simulation::step() {
@@ -82,11 +106,13 @@ const StepRecord& Simulation::step() {
     };
     State next = now_.state;
     const std::vector<double> memory = timestepper_->save();
+    const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
     AdaptiveStepReport taken;
     solver_->reset_effort();
     const auto undo = [&] {
         timestepper_->restart();
         timestepper_->load(memory);
+        if (sleeping_) sleeping_->load(sleeping);
     };
     try {
         taken = advance(next);
@@ -98,6 +124,9 @@ const StepRecord& Simulation::step() {
     } catch (const InputError& error) {
         undo();
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+    } catch (const StepInterrupted& error) {
+        undo();
+        throw StepInterrupted(fmt::format("{}: {}", where(), error.what()));
     } catch (const StepFailure& error) {
         undo();
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
@@ -137,6 +166,7 @@ const StepRecord& Simulation::step() {
     totals.newton_iterations += record_.newton_iterations;
     totals.solver_iterations += record_.solver_iterations;
     totals.plugin_solves += effort.plugin_solves;
+    totals.resting_parts += effort.resting_parts;
     totals.solver_seconds += effort.seconds;
     totals.seconds += record_.seconds;
     if (!report.solved) {
@@ -146,10 +176,24 @@ const StepRecord& Simulation::step() {
     return record_;
 }
 
+std::vector<ContactForce> Simulation::contact_forces() const {
+    const MultibodySystem& mechanics = *system_->system;
+    std::vector<ContactForce> forces;
+    for (const ContactPoint& contact : mechanics.contacts()) {
+        Eigen::Vector3d normal(contact.normal.data()), first, second;
+        tangents(normal, first, second);  // the directions of the contact's rows
+        const auto [n, t, s] = timestepper_->reaction(MultibodySystem::contact_key(contact));
+        const Eigen::Vector3d force = n * normal + t * first + s * second;
+        forces.push_back({mechanics.contact_bodies(contact), {force[0], force[1], force[2]}});
+    }
+    return forces;
+}
+
 SimulationState Simulation::save() const {
     SimulationState result = now_;
     result.memory = timestepper_->save();
     if (control_) result.control = control_->save();
+    if (sleeping_) result.sleeping = sleeping_->save();
     return result;
 }
 
@@ -162,9 +206,11 @@ void Simulation::load(SimulationState state) {
     timestepper_->restart();
     timestepper_->load(state.memory);
     if (control_) control_->load(state.control);
+    if (sleeping_) sleeping_->load(state.sleeping);
     now_ = std::move(state);
     now_.memory.clear();
     now_.control.clear();
+    now_.sleeping.clear();
     record_ = {};
     measure();
 }

@@ -2,6 +2,7 @@
 #include "scene/system_reader.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "config/sections.hpp"
 
@@ -17,6 +18,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"step", [this](const YAML::Node& n) { read_step(n); }},
         {"tolerance", [this](const YAML::Node& n) { read_tolerance(n); }},
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
+        {"sleeping", [this](const YAML::Node& n) { read_sleeping(n); }},
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
         {"leave_out",
@@ -46,7 +48,9 @@ void SystemReader::build(const YAML::Node& place) {
     read_items("elastic_meshes", &SystemReader::read_elastic_mesh);
     read_items("cables", &SystemReader::read_cable);
     read_items("beams", &SystemReader::read_beam);
-    if (result_.bodies.empty() && result_.system->node_count() == 0)
+    // Empty lists are as good as others: a scene may have nothing in it. One that names none is not meant so.
+    const std::array<std::string_view, 5> moving = {"bodies", "nodes", "elastic_blocks", "elastic_meshes", "beams"};
+    if (std::none_of(moving.begin(), moving.end(), [&](std::string_view key) { return lists_.contains(key); }))
         missing("bodies", "bodies: [{name: ball, mass: 1, …}]");
     read_items("joints", &SystemReader::read_joint);
     read_items("motors", &SystemReader::read_motor);
@@ -103,6 +107,18 @@ void SystemReader::read_tolerance(const YAML::Node& node) {
           }},
          {"relative", [&](const YAML::Node& n) { control_.relative = nonnegative_number(source_, n, "relative"); }}});
     if (!absolute) source_.refuse(node, "\"tolerance\" lacks the key \"absolute\"");
+}
+
+// sleeping: true, or sleeping: {speed, time}
+void SystemReader::read_sleeping(const YAML::Node& node) {
+    if (node.IsScalar()) {
+        if (truth(source_, node, "sleeping")) result_.sleeping.emplace();
+        return;
+    }
+    SleepingRule& rule = result_.sleeping.emplace();
+    read_map(source_, node, "\"sleeping\"",
+             {{"speed", [&](const YAML::Node& n) { rule.speed = positive_number(source_, n, "speed"); }},
+              {"time", [&](const YAML::Node& n) { rule.time = positive_number(source_, n, "time"); }}});
 }
 
 void SystemReader::build_step(const YAML::Node& place) {

@@ -34,6 +34,18 @@ private:
     std::string bytes_;
 };
 
+/// A file of one piece. head: the piece's counts, as attributes; body: its elements.
+std::string polydata(double t, const std::string& head, const std::string& body, const Appended& data) {
+    return fmt::format(
+               "<?xml version=\"1.0\"?>\n"
+               "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+               "<PolyData>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
+               "format=\"ascii\">{:.17g}</DataArray>\n</FieldData>\n<Piece {}>\n",
+               t, head) +
+           body + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_" + data.bytes() +
+           "\n</AppendedData>\n</VTKFile>\n";
+}
+
 /// How far from the origin bodies and shapes reach at the start, for the size at which planes are drawn.
 double extent_of(const MultibodySystem& system) {
     double extent = 1.0;
@@ -55,6 +67,10 @@ VtkSeries::VtkSeries(std::filesystem::path folder, std::string name, const Multi
 
 std::string VtkSeries::file_name(std::int64_t number) const {
     return fmt::format("{}_{:06}.vtp", name_, number);
+}
+
+std::string VtkSeries::contacts_file_name(std::int64_t number) const {
+    return fmt::format("{}.contacts_{:06}.vtp", name_, number);
 }
 
 void VtkSeries::write(std::int64_t number, const State& state) const {
@@ -120,16 +136,11 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
         add_node_cell(triangle);
     }
     Appended data;
-    std::string xml = fmt::format(
-        "<?xml version=\"1.0\"?>\n"
-        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-        "<PolyData>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
-        "format=\"ascii\">{:.17g}</DataArray>\n</FieldData>\n"
-        "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"{}\" NumberOfStrips=\"0\" "
-        "NumberOfPolys=\"{}\">\n",
-        state.t, points.size() / 3, vertex_ends.size(), line_ends.size(), corner_ends.size());
-    xml += "<CellData>\n" + data.add("body", "Int32", 1, body_of_cell) + data.add("speed", "Float32", 1, speed) +
-           "</CellData>\n";
+    const std::string head = fmt::format(
+        R"(NumberOfPoints="{}" NumberOfVerts="{}" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="{}")",
+        points.size() / 3, vertex_ends.size(), line_ends.size(), corner_ends.size());
+    std::string xml = "<CellData>\n" + data.add("body", "Int32", 1, body_of_cell) +
+                      data.add("speed", "Float32", 1, speed) + "</CellData>\n";
     xml += "<Points>\n" + data.add("points", "Float32", 3, points) + "</Points>\n";
     xml += "<Verts>\n" + data.add("connectivity", "Int32", 1, vertices) + data.add("offsets", "Int32", 1, vertex_ends) +
            "</Verts>\n";
@@ -137,9 +148,35 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
            "</Lines>\n";
     xml += "<Polys>\n" + data.add("connectivity", "Int32", 1, corners) + data.add("offsets", "Int32", 1, corner_ends) +
            "</Polys>\n";
-    xml +=
-        "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_" + data.bytes() + "\n</AppendedData>\n</VTKFile>\n";
-    write_file_atomically(folder_ / file_name(number), xml);
+    write_file_atomically(folder_ / file_name(number), polydata(state.t, head, xml, data));
+}
+
+void VtkSeries::write_contacts(std::int64_t number, double t, const std::vector<ContactPoint>& contacts,
+                               const std::vector<ContactForce>& forces) const {
+    std::vector<float> points, force, gap;
+    std::vector<std::int32_t> first, second, vertices, ends;
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+        const ContactPoint& contact = contacts[i];
+        for (std::size_t k = 0; k < 3; ++k) {
+            points.push_back(static_cast<float>(0.5 * (contact.point_a[k] + contact.point_b[k])));
+            force.push_back(static_cast<float>(forces[i].force[k]));
+        }
+        gap.push_back(static_cast<float>(contact.gap));
+        first.push_back(forces[i].bodies[0]);
+        second.push_back(forces[i].bodies[1]);
+        vertices.push_back(static_cast<std::int32_t>(i));
+        ends.push_back(static_cast<std::int32_t>(i + 1));
+    }
+    Appended data;
+    const std::string head = fmt::format(
+        R"(NumberOfPoints="{0}" NumberOfVerts="{0}" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="0")",
+        contacts.size());
+    std::string xml = "<PointData>\n" + data.add("force", "Float32", 3, force) + data.add("gap", "Float32", 1, gap) +
+                      data.add("first", "Int32", 1, first) + data.add("second", "Int32", 1, second) + "</PointData>\n";
+    xml += "<Points>\n" + data.add("points", "Float32", 3, points) + "</Points>\n";
+    xml += "<Verts>\n" + data.add("connectivity", "Int32", 1, vertices) + data.add("offsets", "Int32", 1, ends) +
+           "</Verts>\n";
+    write_file_atomically(folder_ / contacts_file_name(number), polydata(t, head, xml, data));
 }
 
 void write_vtk_collection(const std::filesystem::path& file, const std::string& folder,
@@ -147,10 +184,16 @@ void write_vtk_collection(const std::filesystem::path& file, const std::string& 
     std::string xml =
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
         "<Collection>\n";
+    const auto add = [&](double t, std::size_t part, const std::string& name) {
+        xml += fmt::format("<DataSet timestep=\"{:.17g}\" part=\"{}\" file=\"{}/{}\"/>\n", t, part, folder, name);
+    };
     for (std::size_t part = 0; part < parts.size(); ++part)
-        for (std::size_t i = 0; i < parts[part].times->size(); ++i)
-            xml += fmt::format("<DataSet timestep=\"{:.17g}\" part=\"{}\" file=\"{}/{}\"/>\n", (*parts[part].times)[i],
-                               part, folder, parts[part].series->file_name(static_cast<std::int64_t>(i)));
+        for (std::size_t i = 0; i < parts[part].times->size(); ++i) {
+            const double t = (*parts[part].times)[i];
+            const auto number = static_cast<std::int64_t>(i);
+            add(t, part, parts[part].series->file_name(number));
+            if (parts[part].contacts) add(t, parts.size() + part, parts[part].series->contacts_file_name(number));
+        }
     write_file_atomically(file, xml + "</Collection>\n</VTKFile>\n");
 }
 

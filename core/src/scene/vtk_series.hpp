@@ -9,6 +9,7 @@
 
 #include "delassus/export.hpp"
 #include "delassus/multibody.hpp"
+#include "delassus/simulation.hpp"
 
 namespace delassus {
 
@@ -22,7 +23,13 @@ public:
     /// made of nodes), speed (of its mass centre, or the mean of the nodes', m/s).
     void write(std::int64_t number, const State& state) const;
 
+    /// Writes the contacts of frame `number` at the time t (s) as vertices, midway between the surfaces. Point data:
+    /// force (N), gap (m), first and second (bodies, as in ContactForce). forces: one for each contact.
+    void write_contacts(std::int64_t number, double t, const std::vector<ContactPoint>& contacts,
+                        const std::vector<ContactForce>& forces) const;
+
     [[nodiscard]] std::string file_name(std::int64_t number) const;
+    [[nodiscard]] std::string contacts_file_name(std::int64_t number) const;
 
 private:
     std::filesystem::path folder_;
@@ -38,6 +45,7 @@ private:
 struct VtkCollectionPart {
     const VtkSeries* series;
     const std::vector<double>* times;  ///< of the frames 0, 1, …
+    bool contacts = false;             ///< whether each frame has its contacts in a file of their own
 };
 
 /// The .pvd: folder is that of the .vtp files, relative to the collection's.

@@ -21,6 +21,7 @@ struct TrajectorySystem {
     std::int32_t positions = 0, velocities = 0;  ///< sizes of q and v
     double step = 0.0;                           ///< s
     TrajectoryModel model;
+    bool contact_forces = false;         ///< whether frames have the forces of contacts
     std::int64_t steps = 0, frames = 0;  ///< rows to keep of a file that is there; 0: a new file
 };
 
@@ -29,9 +30,9 @@ public:
     virtual ~TrajectoryWriter() = default;
     /// system: its place in the list that the writer was made with.
     virtual void add_step(std::size_t system, const StepRecord& record) = 0;
-    /// poses: of all bodies. contacts: of the step that led here.
+    /// poses: of all bodies. contacts: of the step that led here. forces: in them, if the system has contact_forces.
     virtual void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
-                           const std::vector<ContactPoint>& contacts) = 0;
+                           const std::vector<ContactPoint>& contacts, const std::vector<ContactForce>& forces) = 0;
     /// Puts everything on disk. Throws InputError if that fails, e.g. on a full disk.
     virtual void flush() = 0;
 };

@@ -12,7 +12,7 @@ namespace {
 
 using hdf5::Handle;
 
-constexpr std::size_t step_columns = 12;
+constexpr std::size_t step_columns = 13;
 
 class SystemFile {
 public:
@@ -37,6 +37,7 @@ public:
         step({"drift", "m, rad", "largest violation of a bilateral constraint"});
         step({"penetration", "m", "depth of the deepest contact where the step began"});
         step({"contacts", "1", "contacts and other unilateral blocks in the step's problem", true});
+        step({"sleeping", "1", "bodies and nodes that sleep", true});
         step({"newton_iterations", "1", "linear or cone problems solved", true});
         step({"solver_iterations", "1", "iterations of the solver plugin", true});
         step({"natural", "1", "largest natural error of the step's solves"});
@@ -60,13 +61,18 @@ public:
         frame({"contact_end", "1", "where the contacts of the frame end in contacts/point", true});
         const Handle contacts = group_in(group.get(), "contacts", resume, file);
         contacts_before_ = static_cast<std::int64_t>(frames_.back().last());
-        contacts_.reserve(3);
+        contacts_.reserve(5);
         const auto contact = [&](const Column& column, std::vector<hsize_t> shape = {}) {
             contacts_.emplace_back(contacts.get(), column, std::move(shape), resume, contacts_before_, file);
         };
         contact({"point", "m", "midway between the two surfaces"}, {3});
         contact({"normal", "1", "unit vector from the first surface to the second"}, {3});
         contact({"gap", "m", "distance of the surfaces where the step began; negative in penetration"});
+        if (!system.contact_forces) return;
+        contact({"bodies", "1", "of the first and the second surface, -1 the world; nodes are counted on after bodies",
+                 true},
+                {2});
+        contact({"force", "N", "mean force of the step on the second, world frame; on the first the opposite"}, {3});
     }
 
     void add_step(const StepRecord& record) {
@@ -78,6 +84,7 @@ public:
         steps_[i++].add(record.drift);
         steps_[i++].add(record.penetration);
         steps_[i++].add(static_cast<double>(record.contacts));
+        steps_[i++].add(static_cast<double>(record.sleeping));
         steps_[i++].add(static_cast<double>(record.newton_iterations));
         steps_[i++].add(static_cast<double>(record.solver_iterations));
         steps_[i++].add(record.natural);
@@ -86,7 +93,8 @@ public:
         if (++waiting_ >= 1000) write();
     }
 
-    void add_frame(const State& state, const std::vector<Pose>& poses, const std::vector<ContactPoint>& contacts) {
+    void add_frame(const State& state, const std::vector<Pose>& poses, const std::vector<ContactPoint>& contacts,
+                   const std::vector<ContactForce>& forces) {
         std::size_t i = 0;
         frames_[i++].add(state.t);
         if (!state.q.empty()) {
@@ -101,6 +109,10 @@ public:
             for (std::size_t k = 0; k < 3; ++k) contacts_[0].add(0.5 * (contact.point_a[k] + contact.point_b[k]));
             contacts_[1].add(contact.normal.data(), 3);
             contacts_[2].add(contact.gap);
+        }
+        for (const auto& force : forces) {
+            for (const auto body : force.bodies) contacts_[3].add(static_cast<double>(body));
+            contacts_[4].add(force.force.data(), 3);
         }
         contacts_before_ += static_cast<std::int64_t>(contacts.size());
         frames_.back().add(static_cast<double>(contacts_before_));
@@ -138,8 +150,8 @@ public:
 
     void add_step(std::size_t system, const StepRecord& record) override { systems_[system].add_step(record); }
     void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
-                   const std::vector<ContactPoint>& contacts) override {
-        systems_[system].add_frame(state, poses, contacts);
+                   const std::vector<ContactPoint>& contacts, const std::vector<ContactForce>& forces) override {
+        systems_[system].add_frame(state, poses, contacts, forces);
     }
     void flush() override {
         for (auto& system : systems_) system.write();
