@@ -6,6 +6,7 @@
 
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
+#include "dynamics/linearization.hpp"
 
 namespace delassus {
 namespace {
@@ -29,6 +30,8 @@ namespace {
 //     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most η_s
 //
 // Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻.
+//
+// How far f(q⁺, v⁺, t⁺) is from the linear model is measured after the step (dynamics/linearization.hpp).
 class EulerImplicitLinearized : public Timestepper {
 public:
     EulerImplicitLinearized(DynamicalSystem& system, const std::vector<OptionValue>& values)
@@ -37,6 +40,7 @@ public:
           restitution_speed_(values[1].real),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
+          linearization_(system, values[4].real),
           blocks_(system.constraint_blocks()),
           n_(system.n()),
           m_(system.m()) {
@@ -68,6 +72,7 @@ public:
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
+        if (linearization_.wanted()) judge_linearization(state, h, report);
         report_reactions(state, solution_.lambda, h, report);
         state = end_;
         keep(solution_.lambda, h);
@@ -145,9 +150,25 @@ private:
             H_.add_matrix(R);
             system_.add_stiffness(end_, h * h, tangent, H_);
         }
+        G_.begin(n_, n_);
         if (constraint_stiffness_ && !multipliers_.empty())
-            system_.add_definite_constraint_stiffness(end_, multipliers_.data(), h * h, H_);
+            system_.add_definite_constraint_stiffness(end_, multipliers_.data(), h * h, G_);
+        H_.add_matrix(G_.finish());
         H_.finish_into(problem_.H);
+    }
+
+    // The impulse of the forces as the linear model has them, h f − h² K v⁺ − h R (v⁺ − v), is a + M (v⁺ − v) − M v⁺
+    // less what else stands in H v⁺: a − H v⁺ + h² G v⁺ + M (v⁺ − v), with a and H as they were assembled.
+    void judge_linearization(const State& begin, double h, StepReport& report) {
+        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = end_.v[i] - begin.v[i];
+        impulse_ = problem_.a;
+        problem_.H.multiply_add(-1.0, end_.v.data(), impulse_.data());
+        G_.finish().multiply_add(1.0, end_.v.data(), impulse_.data());
+        system_.multiply_mass(begin, 1.0, delta_.data(), impulse_.data());
+        force_.assign(static_cast<std::size_t>(n_), 0.0);
+        system_.add_force(end_, h, force_.data());
+        report.linearization = linearization_.error(begin, end_, h, force_, impulse_, problem_.H);
+        linearization_.judge(report.linearization, begin, h, "euler_implicit_linearized");
     }
 
     void assemble_constraints(const State& state, double h) {
@@ -192,7 +213,7 @@ private:
 
     // A contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed of Φ/h at
     // least, also where its first speed was less. One that left and comes back within the step, as a ball that bounces
-    // low, does so about as fast.
+    // low, does so about as fast. One that penetrates gives the energy λ_n (u_n + u_n⁺)/2 where it pushes apart.
     void report_reactions(const State& begin, const std::vector<double>& lambda, double h, StepReport& report) const {
         std::size_t row = 0, number = 0;
         for (const auto& block : rows_.blocks()) {
@@ -200,6 +221,11 @@ private:
             const Kept* last = last_of_block_[number++];
             if (reaction != 0.0) ++report.active_blocks;
             if (block.along_normal() && reaction > 0.0) {
+                if (rows_.rows()[row].gap < 0.0) {
+                    const double mean_speed =
+                        0.5 * (rows_.speed(row, begin.v.data()) + rows_.speed(row, end_.v.data()));
+                    report.recovered += std::max(reaction * mean_speed, 0.0);
+                }
                 const double gap = std::max(rows_.rows()[row].gap, 0.0);
                 const double approach = -rows_.speed(row, begin.v.data());
                 const bool pushed_before = last && impulses_[static_cast<std::size_t>(last->first)] > 0.0;
@@ -279,11 +305,12 @@ private:
     double recovery_speed_, restitution_speed_;
     bool exact_;
     bool constraint_stiffness_;
+    Linearization linearization_;
     std::vector<std::int32_t> blocks_;
     std::int32_t n_, m_;
-    MatrixAssembler H_, R_, D_;
+    MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
-    std::vector<double> before_, after_, delta_;
+    std::vector<double> before_, after_, delta_, impulse_, force_;
     double last_h_ = 0.0;
     std::vector<Kept> kept_;                  // by ascending keys
     std::vector<const Kept*> last_of_block_;  // of the blocks of rows_: null where there was none
@@ -321,7 +348,8 @@ const RegisterTimestepper row{
            .type = DELASSUS_OPTION_CHOICE,
            .default_value = "definite",
            .choices = {"definite", "none"},
-           .doc = "what keeps light bodies under heavy pull stable: the positive part of the reactions' stiffness"}},
+           .doc = "what keeps light bodies under heavy pull stable: the positive part of the reactions' stiffness"},
+          linearization_option()},
      .constraints = true,
      .unilateral = true,
      .order = 1,

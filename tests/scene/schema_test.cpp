@@ -88,6 +88,7 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["section"] = "step: 1\nend: 1\nbeams: [{section: {@}}]";
     scenes["step_bounds"] = "step: {@}";
     scenes["tolerance"] = "tolerance: {@}";
+    scenes["limits"] = "limits: {@}";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;
 }

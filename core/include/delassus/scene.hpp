@@ -5,6 +5,7 @@
 
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,6 +37,13 @@ struct SceneMaterialPair {
     ContactMaterial contact;
 };
 
+/// What a run must not exceed; a step that does is a failure. Infinity: no limit.
+struct RunLimits {
+    /// Growth of energy, as a share of the kinetic energy that the motion can have had (core/src/scene/energy_guard.hpp).
+    double energy_growth = 1.0;
+    double drift = std::numeric_limits<double>::infinity();  ///< of bilateral constraints, m or rad
+};
+
 /// A system, finished and ready to be simulated, with what the file says about how.
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
@@ -46,6 +54,7 @@ struct SceneSystem {
     SolverConfig solver;                 ///< an empty name: `auto`
     double step = 0.0;                   ///< s, > 0; with `control` the first that is tried
     std::optional<StepControl> control;  ///< steps follow from a tolerance; none: all are `step` long
+    RunLimits limits;
     double end = 0.0;                    ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
     // What a plan and a report name things by.

@@ -21,6 +21,7 @@ struct StepRecord {
     std::int64_t step = 0;       ///< steps taken so far
     double t = 0.0;              ///< s
     double energy = 0.0;         ///< J; NaN where the system does not know it
+    double kinetic = 0.0;        ///< of it, kinetic energy, J
     Vector3 momentum{};          ///< kg m/s
     Vector3 angular_momentum{};  ///< about the origin, kg m²/s
     double drift = 0.0;          ///< largest |C| of the bilateral constraints, in their own units (m, rad)
@@ -34,12 +35,19 @@ struct StepRecord {
     bool impact = false;        ///< a short step of the step control, for a contact that closed
     double seconds = 0.0;       ///< of wall time, everything included
     bool solved = true;         ///< every solve reached its tolerance
+    double linearization = 0.0;  ///< of a linearised method: what its forces were off by (StepReport)
 };
 
 /// Sums and extremes since the start.
 struct SimulationTotals {
     double start_energy = 0.0, energy = 0.0;  ///< J
+    double start_kinetic = 0.0;               ///< J
+    double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
+    double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
+    double growth = 0.0;                      ///< largest rise of the energy above its start and `recovered`, J
+    double growth_share = 0.0;  ///< the largest, of what energy there can have been to move (running.md); 0: not judged
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
+    double worst_linearization = 0.0;
     std::int64_t most_contacts = 0;
     std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
@@ -58,19 +66,21 @@ struct SimulationState {
     SimulationTotals totals;
 };
 
+class EnergyGuard;
+
 class Simulation {
 public:
     /// system and registry outlive the simulation. Throws InputError or Unsupported for an integrator or a solver that
     /// is not there, cannot take the system, or has other options.
     DELASSUS_API Simulation(SceneSystem& system, const Registry& registry);
     DELASSUS_API ~Simulation();
-    Simulation(Simulation&&) noexcept = default;
+    DELASSUS_API Simulation(Simulation&&) noexcept;
 
     /// Whether `end` is reached. The last step is shorter where `end` is no multiple of a fixed step.
     [[nodiscard]] DELASSUS_API bool finished() const;
 
     /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence; everything is then
-    /// as it was before the step.
+    /// as it was before the step. A step beyond the system's limits is a StepFailure.
     DELASSUS_API const StepRecord& step();
 
     /// Of the last step; of the initial state before the first.
@@ -80,12 +90,18 @@ public:
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
     [[nodiscard]] StepSolver& solver() { return *solver_; }
 
+    /// What a user should know of a run so far that did not fail; a sentence each.
+    [[nodiscard]] DELASSUS_API std::vector<std::string> warnings() const;
+
     [[nodiscard]] DELASSUS_API SimulationState save() const;
     /// Throws InputError if the sizes are not the system's.
     DELASSUS_API void load(SimulationState state);
 
 private:
-    void measure();
+    /// record_ ← what is known of a state after so many steps.
+    void measure(const State& state, std::int64_t step);
+    /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
+    void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     AdaptiveStepReport advance(State& state);
 
     SceneSystem* system_;
@@ -95,6 +111,7 @@ private:
     SimulationState now_;
     StepRecord record_;
     std::vector<double> constraint_;
+    std::unique_ptr<EnergyGuard> guard_;
 };
 
 }  // namespace delassus

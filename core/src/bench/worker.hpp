@@ -19,7 +19,7 @@
 //   {"do": "plan", "scene", "settings", "plugin_path"}
 //       plan      systems: what the scene needs and what is left out
 //   {"do": "simulate", "scene", "settings", "end", "timestepper", "step", "solver", "repeats", "plugin_path", "state",
-//    "reference"}
+//    "reference", "watch", "reverse", "body"}
 //       scene     hash, title, step, end
 //       refused   message
 //       begin     a run begins

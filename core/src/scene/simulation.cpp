@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "scene/energy_guard.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
 
@@ -38,12 +39,15 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     }
     now_.state = system.system->initial_state();
     constraint_.resize(static_cast<std::size_t>(system.system->m()));
-    measure();
+    guard_ = std::make_unique<EnergyGuard>(system);
+    measure(now_.state, now_.step);
     now_.totals.start_energy = now_.totals.energy = record_.energy;
+    now_.totals.start_kinetic = record_.kinetic;
     now_.totals.worst_drift = record_.drift;
 }
 
 Simulation::~Simulation() = default;
+Simulation::Simulation(Simulation&&) noexcept = default;
 
 bool Simulation::finished() const {
     // The last of steps that are chosen ends at `end` itself.
@@ -60,18 +64,41 @@ AdaptiveStepReport Simulation::advance(State& state) {
     return report;
 }
 
-void Simulation::measure() {
+void Simulation::measure(const State& state, std::int64_t step) {
     const MultibodySystem& mechanics = *system_->system;
-    const State& state = now_.state;
-    record_.step = now_.step;
+    record_.step = step;
     record_.t = state.t;
     record_.energy = mechanics.energy(state);
+    record_.kinetic = mechanics.kinetic_energy(state);
     const auto momentum = mechanics.momentum(state);
     record_.momentum = momentum[0];
     record_.angular_momentum = momentum[1];
     if (!constraint_.empty()) mechanics.constraint(state, constraint_.data());
     record_.drift = 0.0;
     for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
+}
+
+void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const {
+    const RunLimits& limits = system_->limits;
+    if (record_.drift > limits.drift)
+        throw StepFailure(
+            fmt::format("the constraints have drifted by {:.3g}, where limits.drift is {:.3g}: the step of {:.3g} s is "
+                        "too long for {}",
+                        record_.drift, limits.drift, taken.h, system_->integrator));
+    if (!guard_->watches(totals)) return;
+    const double start_potential = totals.start_energy - totals.start_kinetic;
+    totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
+    totals.recovered += taken.step.recovered;
+    const double growth = record_.energy - totals.start_energy - totals.recovered;
+    const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
+    totals.growth = std::max(totals.growth, growth);
+    if (growth > 0.0) totals.growth_share = std::max(totals.growth_share, growth / scale);
+    if (growth > limits.energy_growth * scale)
+        throw StepFailure(fmt::format(
+            "the energy has grown from {:.6g} J at the start to {:.6g} J though nothing supplies any (what can have "
+            "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
+            "damps (limits.energy_growth: {:.3g})",
+            totals.start_energy, record_.energy, scale, taken.h, system_->integrator, limits.energy_growth));
 }
 
 const StepRecord& Simulation::step() {
@@ -82,8 +109,11 @@ const StepRecord& Simulation::step() {
     State next = now_.state;
     const std::vector<double> memory = timestepper_->save();
     AdaptiveStepReport taken;
+    SimulationTotals judged = now_.totals;
+    const StepRecord last = record_;
     solver_->reset_effort();
     const auto undo = [&] {
+        record_ = last;
         timestepper_->restart();
         timestepper_->load(memory);
     };
@@ -91,6 +121,8 @@ const StepRecord& Simulation::step() {
         taken = advance(next);
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
+        measure(next, now_.step + 1);
+        judge(taken, judged);
     } catch (const Unsupported& error) {
         undo();
         throw Unsupported(fmt::format("{}: {}", where(), error.what()));
@@ -104,6 +136,7 @@ const StepRecord& Simulation::step() {
     const StepReport& report = taken.step;
     const std::string place = where();
     now_.state = std::move(next);
+    now_.totals = std::move(judged);
     ++now_.step;
 
     record_.contacts = report.unilateral_blocks;
@@ -118,7 +151,7 @@ const StepRecord& Simulation::step() {
     record_.h = taken.h;
     record_.rejected = taken.rejected;
     record_.impact = taken.impact;
-    measure();
+    record_.linearization = report.linearization;
     record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
     auto& totals = now_.totals;
@@ -126,6 +159,7 @@ const StepRecord& Simulation::step() {
     totals.worst_drift = std::max(totals.worst_drift, record_.drift);
     totals.worst_penetration = std::max(totals.worst_penetration, record_.penetration);
     totals.worst_natural = std::max(totals.worst_natural, record_.natural);
+    totals.worst_linearization = std::max(totals.worst_linearization, record_.linearization);
     if (!taken.impact) {
         totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
         totals.largest_step = std::max(totals.largest_step, taken.h);
@@ -143,6 +177,18 @@ const StepRecord& Simulation::step() {
         if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
     }
     return record_;
+}
+
+std::vector<std::string> Simulation::warnings() const {
+    /// Of what can have moved: a growth that a plot would show.
+    constexpr double visible_share = 0.05;
+    std::vector<std::string> sentences;
+    if (const auto& totals = now_.totals; totals.growth_share > visible_share)
+        sentences.push_back(
+            fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
+                        "moved, though nothing supplies any: the steps are long for {}",
+                        system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    return sentences;
 }
 
 SimulationState Simulation::save() const {
@@ -165,7 +211,7 @@ void Simulation::load(SimulationState state) {
     now_.memory.clear();
     now_.control.clear();
     record_ = {};
-    measure();
+    measure(now_.state, now_.step);
 }
 
 }  // namespace delassus

@@ -2,6 +2,7 @@
 #include "scene/system_reader.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "config/sections.hpp"
 
@@ -19,6 +20,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
+        {"limits", [this](const YAML::Node& n) { read_limits(n); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
     for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
                              "cables", "beams", "joints", "motors", "springs", "bushings", "loads", "keep_apart"})
@@ -100,6 +102,18 @@ void SystemReader::read_tolerance(const YAML::Node& node) {
           }},
          {"relative", [&](const YAML::Node& n) { control_.relative = nonnegative_number(source_, n, "relative"); }}});
     if (!absolute) source_.refuse(node, "\"tolerance\" lacks the key \"absolute\"");
+}
+
+// limits: {energy_growth: 1, drift: null}
+void SystemReader::read_limits(const YAML::Node& node) {
+    const auto limit = [&](double& target, std::string_view key) -> Handler {
+        return [this, &target, key](const YAML::Node& n) {
+            target = n.IsNull() ? std::numeric_limits<double>::infinity() : positive_number(source_, n, key);
+        };
+    };
+    read_map(source_, node, "\"limits\"",
+             {{"energy_growth", limit(result_.limits.energy_growth, "energy_growth")},
+              {"drift", limit(result_.limits.drift, "drift")}});
 }
 
 void SystemReader::build_step(const YAML::Node& place) {

@@ -25,6 +25,9 @@ constexpr double balance_floor = 1e-12;
 /// and up to this natural error at most.
 constexpr double rounding_slack = 32.0;
 constexpr double rounding_limit = 1e-10;
+/// Beyond so many times the tolerance, rounding leaves a claim nothing to stand on: reactions that are so large against
+/// what they correct that adding a velocity to one of them changes nothing meet any tolerance.
+constexpr double lost_in_rounding = 10.0;
 
 /// What rounding alone may contribute to Errors::balance at this (x, λ): ε ‖|H||x| + |D|ᵀ|λ| + |a|‖ over the divisor of
 /// the balance, with the unit roundoff ε. With a stiff H, ‖|H||x|‖ is far above ‖Hx‖, and x rounded to double cannot
@@ -176,6 +179,15 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
                 "tolerance {:.2e}",
                 info().name, report.error.natural, report.error.balance, settings.tolerance);
         }
+    }
+    if (report.status == Status::Solved &&
+        report.error.rounding > lost_in_rounding * std::max(settings.tolerance, rounding_limit)) {
+        report.status = Status::NumericalFailure;
+        report.message = fmt::format(
+            "the natural error is {:.2e}, but rounding alone may leave {:.1e} of it, the tolerance is {:.2e}: the "
+            "reactions are too large against the velocities that they correct (masses, or lengths, of too different "
+            "sizes for double precision)",
+            report.error.natural, report.error.rounding, settings.tolerance);
     }
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
     return report;
