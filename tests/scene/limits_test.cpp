@@ -88,8 +88,9 @@ TEST(EnergyGuard, IsSwitchedOffByNull) {
 }
 
 TEST(EnergyGuard, LeavesMotorsAndLoadsAlone) {
-    Running motor = running(std::string(pendulum) + "motors: [{name: m, joint: hinge, speed: {linear: {start: 0, rate: 5}}}]\n",
-                            "euler_implicit_linearized", 0.001, {{"end", "2"}});
+    Running motor =
+        running(std::string(pendulum) + "motors: [{name: m, joint: hinge, speed: {linear: {start: 0, rate: 5}}}]\n",
+                "euler_implicit_linearized", 0.001, {{"end", "2"}});
     EXPECT_EQ(failure_of(motor), "");
     Running load = running(std::string(pendulum) + "loads: [{name: f, body: bob, torque: [0, -50, 0]}]\n", "hht", 0.001,
                            {{"end", "1"}});
@@ -98,7 +99,8 @@ TEST(EnergyGuard, LeavesMotorsAndLoadsAlone) {
 }
 
 TEST(EnergyGuard, WarnsOfAGrowthThatIsSeen) {
-    // An oscillation of ω = 10 rad/s grows by (1 + h²ω²)^(1/2) a step, its energy by e^(0.5) − 1 = 65 % in 1/2 s at 10 ms.
+    // An oscillation of ω = 10 rad/s grows by (1 + h²ω²)^(1/2) a step, its energy by e^(0.5) − 1 = 65 % in 1/2 s at 10
+    // ms.
     const std::string block =
         "step: 0.01\nend: 0.5\ngravity: [0, 0, 0]\n"
         "bodies: [{name: b, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, velocity: [1, 0, 0]}]\n"
@@ -234,7 +236,8 @@ TEST(Limits, AreRefusedWhereTheyMakeNoSense) {
         }
         return {};
     };
-    EXPECT_TRUE(says(sentence_of("{energy_growth: -1}"), "s, line 1: \"energy_growth\" is")) << sentence_of("{energy_growth: -1}");
+    EXPECT_TRUE(says(sentence_of("{energy_growth: -1}"), "s, line 1: \"energy_growth\" is"))
+        << sentence_of("{energy_growth: -1}");
     EXPECT_TRUE(says(sentence_of("{drift: 0}"), "s, line 1: \"drift\" is")) << sentence_of("{drift: 0}");
     EXPECT_TRUE(says(sentence_of("{energy: 1}"), "\"limits\" has no key \"energy\"; did you mean \"energy_growth\"?"))
         << sentence_of("{energy: 1}");

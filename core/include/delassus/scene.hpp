@@ -39,7 +39,7 @@ struct SceneMaterialPair {
 
 /// What a run must not exceed; a step that does is a failure. Infinity: no limit.
 struct RunLimits {
-    /// Growth of energy, as a share of the kinetic energy that the motion can have had (core/src/scene/energy_guard.hpp).
+    /// Growth of energy that nothing supplies, as a share of what can have moved (docs/running.md).
     double energy_growth = 1.0;
     double drift = std::numeric_limits<double>::infinity();  ///< of bilateral constraints, m or rad
 };
@@ -54,7 +54,7 @@ struct SceneSystem {
     SolverConfig solver;                 ///< an empty name: `auto`
     double step = 0.0;                   ///< s, > 0; with `control` the first that is tried
     std::optional<StepControl> control;  ///< steps follow from a tolerance; none: all are `step` long
-    RunLimits limits;
+    RunLimits limits;                    ///< what a run must not exceed
     double end = 0.0;                    ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
     // What a plan and a report name things by.

@@ -29,12 +29,12 @@ struct StepRecord {
     std::int64_t contacts = 0;   ///< and other unilateral blocks in the problem
     std::int64_t newton_iterations = 0;
     std::int64_t solver_iterations = 0;
-    double natural = 0.0;       ///< largest natural error of the step's solves by a plugin
-    double h = 0.0;             ///< size of the step, s
-    std::int64_t rejected = 0;  ///< trials of the step control that were thrown away
-    bool impact = false;        ///< a short step of the step control, for a contact that closed
-    double seconds = 0.0;       ///< of wall time, everything included
-    bool solved = true;         ///< every solve reached its tolerance
+    double natural = 0.0;        ///< largest natural error of the step's solves by a plugin
+    double h = 0.0;              ///< size of the step, s
+    std::int64_t rejected = 0;   ///< trials of the step control that were thrown away
+    bool impact = false;         ///< a short step of the step control, for a contact that closed
+    double seconds = 0.0;        ///< of wall time, everything included
+    bool solved = true;          ///< every solve reached its tolerance
     double linearization = 0.0;  ///< of a linearised method: what its forces were off by (StepReport)
 };
 

@@ -92,8 +92,7 @@ struct Run {
 class SceneRun {
 public:
     /// registry outlives it.
-    SceneRun(Scene scene, const Registry& registry, double time_limit)
-        : scene_(std::move(scene)), registry_(registry) {
+    SceneRun(Scene scene, const Registry& registry, double time_limit) : scene_(std::move(scene)), registry_(registry) {
         const auto begin = Clock::now();
         simulations_.reserve(scene_.systems.size());
         for (auto& system : scene_.systems) simulations_.emplace_back(system, registry);
@@ -315,7 +314,8 @@ void simulate(const Channel& channel, const Json& request) {
         SceneRun first = prepare();
         const auto body = request.at("body").get<std::string>();
         if (!body.empty()) static_cast<void>(first.place(body));
-        const Run run = first.run(!state_file.empty(), request.at("watch").get<bool>(), request.at("reverse").get<bool>());
+        const Run run =
+            first.run(!state_file.empty(), request.at("watch").get<bool>(), request.at("reverse").get<bool>());
         Json answer = totals_of(first.simulations());
         answer["status"] = run.status;
         answer["message"] = run.message;

@@ -64,8 +64,9 @@ OptionInfo linearization_option() {
             .default_value = "0.1",
             .minimum = 0.0,
             .maximum = HUGE_VAL,
-            .doc = "a step fails whose linear model of the forces is off by more, as a share of the velocities; inf: "
-                   "not measured"};
+            .doc =
+                "a step fails whose linear model of the forces is off by more, as a share of the velocities; inf: "
+                "not measured"};
 }
 
 }  // namespace delassus

@@ -264,11 +264,12 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
             if (linearization_.wanted()) {
                 const Vector force = h * trial_residual.force,
                              linear = h * (trial_residual.inertia - trial_residual.reaction);
-                report.linearization = linearization_.error(
-                    begin, trial.state, h, {force.data(), static_cast<std::size_t>(n_)},
-                    {linear.data(), static_cast<std::size_t>(n_)}, kept_.H);
+                report.linearization =
+                    linearization_.error(begin, trial.state, h, {force.data(), static_cast<std::size_t>(n_)},
+                                         {linear.data(), static_cast<std::size_t>(n_)}, kept_.H);
                 linearization_.judge(report.linearization, begin, h, settings_.method);
             }
+            judge_turns(begin, h, trial.delta);
             point = trial;
             return;
         }
@@ -313,8 +314,8 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
                     settings_.max_iterations, rho, threshold, exact_ ? "" : " or jacobian: exact"));
 }
 
-// exp is one to one for turns by less than 2π only, where T is singular: a body that turns further in a step comes to the
-// same orientation by a shorter way, with other velocities, and Newton's method finds one of these ends or another.
+// exp is one to one for turns by less than 2π only, where T is singular: a body that turns further in a step comes to
+// the same orientation by a shorter way, with other velocities, and Newton's method finds one of these ends or another.
 void Newton::judge_turns(const State& begin, double h, const Vector& delta) {
     if (std::isinf(settings_.largest_turn)) return;
     system_.inverse_tangent(delta.data(), blocks_);

@@ -27,9 +27,9 @@ struct NewtonSettings {
     Reuse reuse = Reuse::Full;
     double tolerance = 1e-10;
     int max_iterations = 20;
-    bool linearized = false;  ///< one iteration; what it left is measured against linearization_limit
+    bool linearized = false;                ///< one iteration; what it left is measured against linearization_limit
     double linearization_limit = HUGE_VAL;  ///< of its error (dynamics/linearization.hpp)
-    double largest_turn = HUGE_VAL;  ///< of a body in a step, rad
+    double largest_turn = HUGE_VAL;         ///< of a body in a step, rad
 };
 
 /// v = v₀ + γ′ Δ and v̇ = v̇₀ + β′ Δ in a step whose positions are q = q_n ∘ exp(Δ).
