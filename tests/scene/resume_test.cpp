@@ -84,9 +84,9 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
     EXPECT_EQ(told("{"), "the checkpoint is damaged");
     EXPECT_EQ(told("{\"format\": \"x\", \"version\": 1}"),
               "the checkpoint cannot be used: it is no checkpoint of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 2}"),
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 1}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 1, \"scene\": \"\", \"systems\": [{\"name\": "
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 2, \"scene\": \"\", \"systems\": [{\"name\": "
                    "\"a\", \"step\": 1, \"t\": \"3ff\"}]}"),
               "the checkpoint cannot be used: a number is damaged");
 }

@@ -30,7 +30,8 @@ double Linearization::error(const State& begin, const State& end, double h, std:
     system_.add_mass(end, 1.0, M_);
     const SparseMatrix& M = M_.finish();
     double largest = 0.0;
-    for (const double value : end.q) largest = std::max(largest, std::abs(value));
+    for (const auto* q : {&begin.q, &end.q})
+        for (const double value : *q) largest = std::max(largest, std::abs(value));
     const double digits = 10.0 * std::numeric_limits<double>::epsilon() * largest;
     double difference = 0.0, rounding = 0.0, before = 0.0, after = 0.0, forces = 0.0;
     for (std::int32_t i = 0; i < n; ++i) {
