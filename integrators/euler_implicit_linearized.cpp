@@ -7,6 +7,7 @@
 
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
+#include "dynamics/linearization.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -31,6 +32,8 @@ namespace {
 //     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most η_s
 //
 // Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻.
+//
+// How far f(q⁺, v⁺, t⁺) is from the linear model is measured after the step (dynamics/linearization.hpp).
 class EulerImplicitLinearized : public Timestepper {
 public:
     EulerImplicitLinearized(DynamicalSystem& system, const std::vector<OptionValue>& values)
@@ -39,6 +42,7 @@ public:
           restitution_speed_(values[1].real),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
+          linearization_(system, values[4].real),
           blocks_(system.constraint_blocks()),
           n_(system.n()),
           m_(system.m()) {
@@ -64,12 +68,15 @@ public:
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
-        report.solved = solver.solve(std::move(problem_), solution_, true);
+        // H and a are looked at once more where the linearisation is judged; else the problem changes hands.
+        report.solved = linearization_.wanted() ? solver.solve(problem_, solution_, true)
+                                                : solver.solve(std::move(problem_), solution_, true);
         if (!report.solved) report.message = solver.effort().unsolved;
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
+        if (linearization_.wanted()) judge_linearization(state, h, report);
         report_reactions(solution_.lambda, h, report);
         state = end_;
         keep(solution_.lambda, h);
@@ -146,6 +153,13 @@ private:
         bool along_normal, pushed_before;
     };
 
+    /// The normal row of a unilateral block that penetrates.
+    struct Penetrating {
+        std::size_t block;  ///< its number
+        double rate;        ///< of the row
+        std::size_t end;    ///< of its entries, which begin where those of the one before end
+    };
+
     void assemble_balance(const State& state, double h) {
         const Tangent tangent = exact_ ? Tangent::Exact : Tangent::Symmetric;
         H_.begin(n_, n_);
@@ -161,9 +175,25 @@ private:
             H_.add_matrix(R);
             system_.add_stiffness(end_, h * h, tangent, H_);
         }
+        G_.begin(n_, n_);
         if (constraint_stiffness_ && !multipliers_.empty())
-            system_.add_definite_constraint_stiffness(end_, multipliers_.data(), h * h, H_);
+            system_.add_definite_constraint_stiffness(end_, multipliers_.data(), h * h, G_);
+        H_.add_matrix(G_.finish());
         H_.finish_into(problem_.H);
+    }
+
+    // The impulse of the forces as the linear model has them, h f − h² K v⁺ − h R (v⁺ − v), is a + M (v⁺ − v) − M v⁺
+    // less what else stands in H v⁺: a − H v⁺ + h² G v⁺ + M (v⁺ − v), with a and H as they were assembled.
+    void judge_linearization(const State& begin, double h, StepReport& report) {
+        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = end_.v[i] - begin.v[i];
+        impulse_ = problem_.a;
+        problem_.H.multiply_add(-1.0, end_.v.data(), impulse_.data());
+        G_.finish().multiply_add(1.0, end_.v.data(), impulse_.data());
+        system_.multiply_mass(begin, 1.0, delta_.data(), impulse_.data());
+        force_.assign(static_cast<std::size_t>(n_), 0.0);
+        system_.add_force(end_, h, force_.data());
+        report.linearization = linearization_.error(begin, end_, h, force_, impulse_, problem_.H);
+        linearization_.judge(report.linearization, begin, h, "euler_implicit_linearized");
     }
 
     // D takes its arrays from the unilateral rows where there are no others.
@@ -187,6 +217,7 @@ private:
     // them after the solve. Blocks come by ascending keys as a rule, as they are kept: then each search for the last
     // impulses begins where the last one ended.
     void assemble_unilateral(double h) {
+        keep_penetrating();
         rows_.move_into(problem_.D);
         problem_.cones.resize(blocks_.size() + rows_.blocks().size());
         for (std::size_t k = 0; k < blocks_.size(); ++k) copy_cone(Cone::free(blocks_[k]), problem_.cones[k]);
@@ -221,7 +252,7 @@ private:
 
     // A contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed of Φ/h at
     // least, also where its first speed was less. One that left and comes back within the step, as a ball that bounces
-    // low, does so about as fast.
+    // low, does so about as fast. One that penetrates gives the energy λ_n (u_n + u_n⁺)/2 where it pushes apart.
     void report_reactions(const std::vector<double>& lambda, double h, StepReport& report) const {
         for (std::size_t k = 0; k < next_kept_.size(); ++k) {
             const double reaction = lambda[m_ + next_kept_[k].first];
@@ -233,6 +264,33 @@ private:
                 report.impact_speed = speed;
                 report.impact_time = approach < 0.0 ? h : gap / speed;
             }
+        }
+        std::size_t entry = 0;
+        for (const auto& [block, rate, end] : penetrating_) {
+            double speed = rate;
+            for (; entry < end; ++entry) speed += penetrating_value_[entry] * end_.v[penetrating_column_[entry]];
+            const double reaction = lambda[m_ + next_kept_[block].first];
+            report.recovered += std::max(0.5 * reaction * (speed - approaches_[block].speed), 0.0);
+        }
+    }
+
+    // Normal rows that penetrate, before the rows go into the problem.
+    void keep_penetrating() {
+        penetrating_.clear();
+        penetrating_column_.clear();
+        penetrating_value_.clear();
+        std::size_t row = 0;
+        for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
+            const auto& block = rows_.blocks()[k];
+            if (block.along_normal() && rows_.rows()[row].gap < 0.0) {
+                const auto first = rows_.row_start()[row], last = rows_.row_start()[row + 1];
+                penetrating_column_.insert(penetrating_column_.end(), rows_.column().begin() + first,
+                                           rows_.column().begin() + last);
+                penetrating_value_.insert(penetrating_value_.end(), rows_.value().begin() + first,
+                                          rows_.value().begin() + last);
+                penetrating_.push_back({k, rows_.rows()[row].rate, penetrating_value_.size()});
+            }
+            row += static_cast<std::size_t>(block.cone.rows);
         }
     }
 
@@ -270,16 +328,20 @@ private:
     double recovery_speed_, restitution_speed_;
     bool exact_;
     bool constraint_stiffness_;
+    Linearization linearization_;
     std::vector<std::int32_t> blocks_;
     std::int32_t n_, m_;
-    MatrixAssembler H_, R_, D_;
+    MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
-    std::vector<double> before_, after_, delta_;
+    std::vector<double> before_, after_, delta_, impulse_, force_;
     double last_h_ = 0.0;
     std::vector<Kept> kept_;  // by ascending keys
     std::vector<double> impulses_;
     std::vector<Kept> next_kept_;       // of the blocks of rows_, in their order
     std::vector<Approach> approaches_;  // likewise
+    std::vector<Penetrating> penetrating_;
+    std::vector<std::int32_t> penetrating_column_;
+    std::vector<double> penetrating_value_;
     // Kept so that a step like the last allocates nothing.
     Problem problem_;
     Solution solution_;
@@ -289,31 +351,32 @@ private:
 const RegisterTimestepper row{
     {.name = "euler_implicit_linearized",
      .description = "linearised implicit Euler for contacts, impacts and constraints; one problem a step",
-     .options =
-         {{.key = "recovery_speed",
-           .type = DELASSUS_OPTION_REAL,
-           .default_value = "inf",
-           .minimum = 0.0,
-           .maximum = HUGE_VAL,
-           .unit = "m/s",
-           .doc = "largest speed with which errors of position are corrected"},
-          {.key = "restitution_speed",
-           .type = DELASSUS_OPTION_REAL,
-           .default_value = "0",
-           .minimum = 0.0,
-           .maximum = HUGE_VAL,
-           .unit = "m/s",
-           .doc = "contacts that close slower than this do not bounce"},
-          {.key = "jacobian",
-           .type = DELASSUS_OPTION_CHOICE,
-           .default_value = "symmetric",
-           .choices = {"symmetric", "exact"},
-           .doc = "tangent of gyroscopic and follower forces; with contacts always symmetric"},
-          {.key = "constraint_stiffness",
-           .type = DELASSUS_OPTION_CHOICE,
-           .default_value = "definite",
-           .choices = {"definite", "none"},
-           .doc = "what keeps light bodies under heavy pull stable: the positive part of the reactions' stiffness"}},
+     .options = {{.key = "recovery_speed",
+                  .type = DELASSUS_OPTION_REAL,
+                  .default_value = "inf",
+                  .minimum = 0.0,
+                  .maximum = HUGE_VAL,
+                  .unit = "m/s",
+                  .doc = "largest speed with which errors of position are corrected"},
+                 {.key = "restitution_speed",
+                  .type = DELASSUS_OPTION_REAL,
+                  .default_value = "0",
+                  .minimum = 0.0,
+                  .maximum = HUGE_VAL,
+                  .unit = "m/s",
+                  .doc = "contacts that close slower than this do not bounce"},
+                 {.key = "jacobian",
+                  .type = DELASSUS_OPTION_CHOICE,
+                  .default_value = "symmetric",
+                  .choices = {"symmetric", "exact"},
+                  .doc = "tangent of gyroscopic and follower forces; with contacts always symmetric"},
+                 {.key = "constraint_stiffness",
+                  .type = DELASSUS_OPTION_CHOICE,
+                  .default_value = "definite",
+                  .choices = {"definite", "none"},
+                  .doc =
+                      "what keeps light bodies under heavy pull stable: the positive part of the reactions' stiffness"},
+                 linearization_option()},
      .constraints = true,
      .unilateral = true,
      .sleeping = true,

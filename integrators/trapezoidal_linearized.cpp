@@ -18,7 +18,7 @@ namespace {
 const RegisterTimestepper row{
     {.name = "trapezoidal_linearized",
      .description = "trapezoidal rule with one linear problem a step; no damping, its multipliers oscillate",
-     .options = {jacobian_option("exact")},
+     .options = {jacobian_option("exact"), linearization_option(), newton_options().back()},  // largest_turn
      .constraints = true,
      .unilateral = false,
      .order = 2,
@@ -28,7 +28,9 @@ const RegisterTimestepper row{
                                                                 .exact = values[0].text == "exact",
                                                                 .reuse = Reuse::Full,
                                                                 .max_iterations = 1,
-                                                                .linearized = true});
+                                                                .linearized = true,
+                                                                .linearization_limit = values[1].real,
+                                                                .largest_turn = values[2].real});
      }}};
 
 }  // namespace

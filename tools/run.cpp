@@ -150,12 +150,11 @@ void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outco
             fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
         fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
                    totals.worst_penetration, totals.most_contacts);
-        if (system.sleeping) {
+        if (system.sleeping)
             fmt::print("  sleeping: {} bodies and nodes at the end; {} parts of problems left out\n",
                        simulation.record().sleeping, totals.resting_parts);
-        } else {
-            fmt::print("  sleeping: off\n");
-        }
+        if (totals.worst_linearization > 0.0)
+            fmt::print("  worst linearisation error {:.1e}\n", totals.worst_linearization);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {
@@ -215,6 +214,8 @@ int run(const RunArguments& arguments) {
     } else {
         print_summary(simulations, result.outcome);
     }
+    for (const auto& simulation : simulations)
+        for (const auto& warning : simulation.warnings()) fmt::print(stderr, "delassus: {}\n", warning);
     if (!result.outcome.message.empty()) fmt::print(stderr, "delassus: {}\n", result.outcome.message);
     return result.exit_code;
 }

@@ -89,6 +89,7 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["step_bounds"] = "step: {@}";
     scenes["sleeping"] = "sleeping: {@}";
     scenes["tolerance"] = "tolerance: {@}";
+    scenes["limits"] = "limits: {@}";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;
 }

@@ -101,10 +101,12 @@ TEST_P(StiffPendulum, KeepsItsLengthForTenSeconds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, StiffPendulum,
-                         testing::Values(Method{"euler_implicit_linearized", 0.01, 2e-5},
+                         testing::Values(Method{"euler_implicit_linearized(linearization_limit=inf)", 0.01, 2e-5},
                                          Method{"euler_implicit", 0.002, 3e-7}, Method{"hht", 0.002, 3e-7},
                                          Method{"generalized_alpha", 0.002, 3e-7}),
-                         [](const auto& chosen) { return std::string(chosen.param.integrator); });
+                         [](const auto& chosen) {
+                             return std::string(chosen.param.integrator, std::strcspn(chosen.param.integrator, "("));
+                         });
 
 }  // namespace
 }  // namespace delassus::tests

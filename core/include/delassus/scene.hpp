@@ -5,6 +5,7 @@
 
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,6 +44,13 @@ struct SleepingRule {
     double time = 0.5;    ///< s, > 0
 };
 
+/// What a run must not exceed; a step that does is a failure. Infinity: no limit.
+struct RunLimits {
+    /// Growth of energy that nothing supplies, as a share of what can have moved (docs/running.md).
+    double energy_growth = 1.0;
+    double drift = std::numeric_limits<double>::infinity();  ///< of bilateral constraints, m or rad
+};
+
 /// A system, finished and ready to be simulated, with what the file says about how.
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
@@ -54,6 +62,7 @@ struct SceneSystem {
     double step = 0.0;                     ///< s, > 0; with `control` the first that is tried
     std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
     std::optional<SleepingRule> sleeping;  ///< none: every body is awake
+    RunLimits limits;                      ///< what a run must not exceed
     double end = 0.0;                      ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
     // What a plan and a report name things by.

@@ -24,6 +24,7 @@ struct StepRecord {
     std::int64_t step = 0;       ///< steps taken so far
     double t = 0.0;              ///< s
     double energy = 0.0;         ///< J; NaN where the system does not know it
+    double kinetic = 0.0;        ///< of it, kinetic energy, J
     Vector3 momentum{};          ///< kg m/s
     Vector3 angular_momentum{};  ///< about the origin, kg m²/s
     double drift = 0.0;          ///< largest |C| of the bilateral constraints, in their own units (m, rad)
@@ -32,12 +33,13 @@ struct StepRecord {
     std::int64_t sleeping = 0;   ///< bodies and nodes that sleep
     std::int64_t newton_iterations = 0;
     std::int64_t solver_iterations = 0;
-    double natural = 0.0;       ///< largest natural error of the step's solves by a plugin
-    double h = 0.0;             ///< size of the step, s
-    std::int64_t rejected = 0;  ///< trials of the step control that were thrown away
-    bool impact = false;        ///< a short step of the step control, for a contact that closed
-    double seconds = 0.0;       ///< of wall time, everything included
-    bool solved = true;         ///< every solve reached its tolerance
+    double natural = 0.0;        ///< largest natural error of the step's solves by a plugin
+    double h = 0.0;              ///< size of the step, s
+    std::int64_t rejected = 0;   ///< trials of the step control that were thrown away
+    bool impact = false;         ///< a short step of the step control, for a contact that closed
+    double seconds = 0.0;        ///< of wall time, everything included
+    bool solved = true;          ///< every solve reached its tolerance
+    double linearization = 0.0;  ///< of a linearised method: what its forces were off by (StepReport)
 };
 
 /// What acts in a contact, as a mean over the last step.
@@ -49,7 +51,13 @@ struct ContactForce {
 /// Sums and extremes since the start.
 struct SimulationTotals {
     double start_energy = 0.0, energy = 0.0;  ///< J
+    double start_kinetic = 0.0;               ///< J
+    double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
+    double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
+    double growth = 0.0;                      ///< largest rise of the energy above its start and `recovered`, J
+    double growth_share = 0.0;  ///< the largest, of what energy there can have been to move (running.md); 0: not judged
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
+    double worst_linearization = 0.0;
     std::int64_t most_contacts = 0;
     std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
     std::int64_t resting_parts = 0;  ///< parts of problems that were left out because their bodies sleep
@@ -70,6 +78,8 @@ struct SimulationState {
     SimulationTotals totals;
 };
 
+class EnergyGuard;
+
 class Simulation {
 public:
     /// system and registry outlive the simulation. Throws InputError or Unsupported for an integrator or a solver that
@@ -82,7 +92,8 @@ public:
     [[nodiscard]] DELASSUS_API bool finished() const;
 
     /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence, or StepInterrupted
-    /// where solver().cancelled asks for it; everything is then as it was before the step.
+    /// where solver().cancelled asks for it; everything is then as it was before the step. A step beyond the system's
+    /// limits is a StepFailure.
     DELASSUS_API const StepRecord& step();
 
     /// Of the last step; of the initial state before the first.
@@ -94,12 +105,18 @@ public:
     [[nodiscard]] DELASSUS_API std::vector<ContactForce> contact_forces() const;
     [[nodiscard]] StepSolver& solver() { return *solver_; }
 
+    /// What a user should know of a run so far that did not fail; a sentence each.
+    [[nodiscard]] DELASSUS_API std::vector<std::string> warnings() const;
+
     [[nodiscard]] DELASSUS_API SimulationState save() const;
     /// Throws InputError if the sizes are not the system's.
     DELASSUS_API void load(SimulationState state);
 
 private:
-    void measure();
+    /// record_ ← what is known of a state after so many steps.
+    void measure(const State& state, std::int64_t step);
+    /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
+    void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     AdaptiveStepReport advance(State& state);
 
     SceneSystem* system_;
@@ -110,6 +127,7 @@ private:
     SimulationState now_;
     StepRecord record_;
     std::vector<double> constraint_;
+    std::unique_ptr<EnergyGuard> guard_;
 };
 
 }  // namespace delassus

@@ -43,8 +43,8 @@ std::string text_of(const SceneSource& scene) {
     return command;
 }
 
-bool bounds_velocity(const std::vector<Bound>& bounds) {
-    return std::any_of(bounds.begin(), bounds.end(), [](const Bound& bound) { return bound.measure == "velocity"; });
+bool is_bounded(const std::vector<Bound>& bounds, std::string_view measure) {
+    return std::any_of(bounds.begin(), bounds.end(), [&](const Bound& bound) { return bound.measure == measure; });
 }
 
 Json row_of(const SuiteAxis& axis, const CellTask& task, const std::string& from, const std::string& status,
@@ -122,6 +122,7 @@ Json run_cell(const WorkerSettings& worker, const Suite& suite, const CellTask& 
         request.time_limit = axis.time_limit;
         request.repeats = 0;
         request.watch = true;
+        request.reverse = is_bounded(bounds, "reversal");
         request.body = axis.body;
         const SimulationMeasurement run = simulate(worker, request);
         std::optional<std::array<double, 3>> place;
@@ -135,7 +136,7 @@ Json run_cell(const WorkerSettings& worker, const Suite& suite, const CellTask& 
     request.settings = {axis.tolerance, axis.time_limit, suite.max_iterations, 0, axis.law};
     Measurement run;
     try {
-        if (bounds_velocity(bounds)) {
+        if (is_bounded(bounds, "velocity")) {
             const ProblemFacts facts = describe(worker, request.problem, axis.law);
             // One that nobody confirms could make a right answer look wrong.
             const Reference reference =

@@ -48,6 +48,7 @@ SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateReque
     question["time_limit"] = request.time_limit;
     question["repeats"] = request.repeats;
     question["watch"] = request.watch;
+    question["reverse"] = request.reverse;
     question["body"] = request.body;
     question["state"] = request.state.string();
     question["reference"] = request.reference.string();

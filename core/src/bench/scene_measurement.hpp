@@ -38,6 +38,7 @@ struct SimulateRequest {
     double time_limit = 0.0;  ///< s of stepping
     int repeats = 1;
     bool watch = false;               ///< look at every step of the first run, for `watched`
+    bool reverse = false;             ///< go back with turned velocities after it, for `watched` too
     std::string body;                 ///< whose place at the end is wanted; empty: none
     std::filesystem::path state;      ///< file for the end's state, to be a reference; may be empty
     std::filesystem::path reference;  ///< such a file, to measure the end against; may be empty

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "delassus/simulation.hpp"
 #include "problem/structure.hpp"
@@ -59,6 +60,8 @@ struct Watch {
     double momentum = 0.0, angular_momentum = 0.0;  ///< ‖change‖ since the start
     double speed = 0.0;                             ///< largest entry of |v|
     double end_speed = 0.0;                         ///< the same at the end
+    /// Largest entry of the way from the start to where the run comes that goes back from its end; NaN: not asked for.
+    double reversal = std::numeric_limits<double>::quiet_NaN();
 
     /// NaN stays, once it is there.
     static void raise(double& worst, double value) {
@@ -89,7 +92,8 @@ struct Run {
 
 class SceneRun {
 public:
-    SceneRun(Scene scene, const Registry& registry, double time_limit) : scene_(std::move(scene)) {
+    /// registry outlives it.
+    SceneRun(Scene scene, const Registry& registry, double time_limit) : scene_(std::move(scene)), registry_(registry) {
         const auto begin = Clock::now();
         simulations_.reserve(scene_.systems.size());
         for (auto& system : scene_.systems) simulations_.emplace_back(system, registry);
@@ -97,8 +101,8 @@ public:
         time_limit_ = time_limit;
     }
 
-    /// extent, watch: measure them as well, on a clock that stands still.
-    Run run(bool extent, bool watch) {
+    /// extent, watch: measure them as well, on a clock that stands still. reverse: and Watch::reversal.
+    Run run(bool extent, bool watch, bool reverse) {
         std::vector<State> start;
         for (const auto& simulation : simulations_) start.push_back(simulation.state());
         try {
@@ -124,6 +128,7 @@ public:
             run_.status = "failed";
             run_.message = failure.what();
         }
+        if (run_.status == "finished" && reverse) go_back(start);
         if (run_.status == "finished") judge();
         run_.extent = {std::sqrt(run_.extent.displacement), std::sqrt(run_.extent.speed)};
         return run_;
@@ -189,6 +194,30 @@ private:
         extent.speed = std::max(extent.speed, mass_norm_squared(system, now, now.v));
     }
 
+    /// From the end with all velocities turned, by as many steps: in a system without damping and without forces that
+    /// depend on time or velocity that is the way back.
+    void go_back(const std::vector<State>& start) {
+        run_.watch.reversal = 0.0;
+        for (std::size_t i = 0; i < simulations_.size(); ++i) {
+            Simulation back(scene_.systems[i], registry_);
+            SimulationState turned = back.save();
+            turned.state.q = simulations_[i].state().q;
+            turned.state.v = simulations_[i].state().v;
+            for (double& entry : turned.state.v) entry = -entry;
+            back.load(std::move(turned));
+            try {
+                while (!back.finished()) back.step();
+            } catch (const StepFailure& failure) {
+                run_.status = "failed";
+                run_.message = std::string("on the way back, ") + failure.what();
+                return;
+            }
+            std::vector<double> delta(start[i].v.size());
+            scene_.systems[i].system->difference(start[i].q.data(), back.state().q.data(), delta.data());
+            for (const double entry : delta) Watch::raise(run_.watch.reversal, std::abs(entry));
+        }
+    }
+
     void judge() {
         const auto finite = [](const std::vector<double>& values) {
             return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
@@ -207,6 +236,7 @@ private:
     }
 
     Scene scene_;
+    const Registry& registry_;
     std::vector<Simulation> simulations_;
     Run run_;
     double time_limit_ = 0.0;
@@ -253,7 +283,8 @@ Json watched(const Watch& watch, const Json& totals) {
             {"end_speed", json_number(watch.end_speed)},
             {"drift", totals.at("drift")},
             {"penetration", totals.at("penetration")},
-            {"natural", totals.at("natural")}};
+            {"natural", totals.at("natural")},
+            {"reversal", json_number(watch.reversal)}};
 }
 
 }  // namespace
@@ -293,7 +324,8 @@ void simulate(const Channel& channel, const Json& request) {
         const auto body = request.at("body").get<std::string>();
         if (!body.empty()) static_cast<void>(first.place(body));
         first.count_rows();
-        const Run run = first.run(!state_file.empty(), request.at("watch").get<bool>());
+        const Run run =
+            first.run(!state_file.empty(), request.at("watch").get<bool>(), request.at("reverse").get<bool>());
         Json answer = totals_of(first.simulations());
         answer["most_rows"] = first.rows();
         answer["status"] = run.status;
@@ -310,7 +342,7 @@ void simulate(const Channel& channel, const Json& request) {
         if (!complete) return;
         for (int k = 0; k < request.at("repeats").get<int>() && !interrupted(); ++k) {
             SceneRun again = prepare();
-            const Run repeated = again.run(false, false);
+            const Run repeated = again.run(false, false, false);
             channel.send("repeat", {{"setup", repeated.setup}, {"seconds", repeated.seconds}});
         }
     } catch (const Unsupported& refusal) {

@@ -112,7 +112,8 @@ const std::vector<Measure>& measures() {
                                                {"momentum", "kg m/s", false, true},
                                                {"angular_momentum", "kg m²/s", false, true},
                                                {"drift", "m, rad", false, true},
-                                               {"penetration", "m", false, true}};
+                                               {"penetration", "m", false, true},
+                                               {"reversal", "m, rad", false, true}};
     return table;
 }
 

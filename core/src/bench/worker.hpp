@@ -19,7 +19,7 @@
 //   {"do": "plan", "scene", "settings", "end", "forced", "plugin_path"}
 //       plan      systems: what the scene needs and what is left out
 //   {"do": "simulate", "scene", "settings", "end", "forced", "timestepper", "step", "solver", "repeats", "plugin_path",
-//    "state", "reference"}
+//    "state", "reference", "watch", "reverse", "body"}
 //       scene     hash, title, step, end
 //       refused   message
 //       begin     a run begins

@@ -242,6 +242,8 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         report_.step.solved = trial.first.solved && trial.second.solved;
         report_.step.message = trial.first.solved ? trial.second.message : trial.first.message;
         report_.step.unilateral_blocks = std::max(trial.first.unilateral_blocks, trial.second.unilateral_blocks);
+        report_.step.linearization = std::max(trial.first.linearization, trial.second.linearization);
+        report_.step.recovered = trial.first.recovered + trial.second.recovered;
         report_.h = h;
         state = std::move(trial.end);
         if (h == remaining) state.t = end;

@@ -33,6 +33,7 @@ namespace delassus {
 Newton::Newton(DynamicalSystem& system, NewtonSettings settings)
     : system_(system),
       settings_(std::move(settings)),
+      linearization_(system, settings_.linearization_limit),
       exact_(settings_.exact),
       cones_(free_cones(system)),
       n_(system.n()),
@@ -260,6 +261,15 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
         threshold = settings_.tolerance * sigma + digits;
         if (settings_.linearized) {
             if (!std::isfinite(trial_rho)) fail("the end of the step is not finite");
+            if (linearization_.wanted()) {
+                const Vector force = h * trial_residual.force,
+                             linear = h * (trial_residual.inertia - trial_residual.reaction);
+                report.linearization =
+                    linearization_.error(begin, trial.state, h, {force.data(), static_cast<std::size_t>(n_)},
+                                         {linear.data(), static_cast<std::size_t>(n_)}, kept_.H);
+                linearization_.judge(report.linearization, begin, h, settings_.method);
+            }
+            judge_turns(begin, h, trial.delta);
             point = trial;
             return;
         }
@@ -290,6 +300,7 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
         const double rest = (theta < 0.5 ? theta / (1.0 - theta) : 1.0) * part * size(x);
         rho = trial_rho;
         if (rho <= threshold && rest <= threshold) {
+            judge_turns(begin, h, point.delta);
             report.solved = solved_before;
             report.message = message_before;
             return;
@@ -301,6 +312,22 @@ void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& p
         fmt::format("after {} iterations of Newton's method the scaled residual is {:.1e}, where {:.1e} is asked for; "
                     "a smaller step{} may help",
                     settings_.max_iterations, rho, threshold, exact_ ? "" : " or jacobian: exact"));
+}
+
+// exp is one to one for turns by less than 2π only, where T is singular: a body that turns further in a step comes to
+// the same orientation by a shorter way, with other velocities, and Newton's method finds one of these ends or another.
+void Newton::judge_turns(const State& begin, double h, const Vector& delta) {
+    if (std::isinf(settings_.largest_turn)) return;
+    system_.inverse_tangent(delta.data(), blocks_);
+    for (const auto& block : blocks_) {
+        const double turn = delta.segment<3>(block.first).norm();
+        if (turn <= settings_.largest_turn) continue;
+        kept_.valid = false;
+        throw StepFailure(fmt::format(
+            "{} cannot take the step from t = {:.9g} with h = {:.9g}: a body turns by {:.3g} rad in it, where "
+            "largest_turn is {:.3g}; take shorter steps",
+            settings_.method, begin.t, h, turn, settings_.largest_turn));
+    }
 }
 
 // ---- Memory ----
@@ -391,7 +418,14 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
          .default_value = "50",
          .minimum = 1.0,
          .maximum = 1e6,
-         .doc = "linear problems in a step before it fails"}};
+         .doc = "linear problems in a step before it fails"},
+        {.key = "largest_turn",
+         .type = DELASSUS_OPTION_REAL,
+         .default_value = "6.283185307179586",
+         .minimum = 0.0,
+         .maximum = HUGE_VAL,
+         .unit = "rad",
+         .doc = "a step fails in which a body turns further; beyond a whole turn the end of a step is not unique"}};
     options.insert(options.end(), own.begin(), own.end());
     return options;
 }
@@ -404,7 +438,8 @@ NewtonSettings newton_settings(std::string method, const std::vector<OptionValue
                                                     : Reuse::Adaptive,
             .tolerance = values[2].real,
             .max_iterations = static_cast<int>(values[3].integer),
-            .linearized = false};
+            .linearized = false,
+            .largest_turn = values[4].real};
 }
 
 }  // namespace delassus

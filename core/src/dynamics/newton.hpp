@@ -2,6 +2,7 @@
 // Newton's method for the end of an implicit step, shared by the methods in integrators/ (internal).
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "delassus/export.hpp"
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
+#include "dynamics/linearization.hpp"
 
 namespace delassus {
 
@@ -25,7 +27,9 @@ struct NewtonSettings {
     Reuse reuse = Reuse::Full;
     double tolerance = 1e-10;
     int max_iterations = 20;
-    bool linearized = false;  ///< one iteration, and no question whether it was enough
+    bool linearized = false;                ///< one iteration; what it left is measured against linearization_limit
+    double linearization_limit = HUGE_VAL;  ///< of its error (dynamics/linearization.hpp)
+    double largest_turn = HUGE_VAL;         ///< of a body in a step, rad
 };
 
 /// v = v₀ + γ′ Δ and v̇ = v̇₀ + β′ Δ in a step whose positions are q = q_n ∘ exp(Δ).
@@ -82,9 +86,12 @@ private:
     void assemble(const StepPoint& point, StepSlopes slopes);
     void scale();
     [[nodiscard]] double merit(const StepResidual& residual, double s) const;
+    /// Throws StepFailure where a body turns too far in Δ.
+    void judge_turns(const State& begin, double h, const Vector& delta);
 
     DynamicalSystem& system_;
     NewtonSettings settings_;
+    Linearization linearization_;
     bool exact_;  // the matrix in use: the derivative, or its symmetric part
     std::vector<Cone> cones_;
     std::int32_t n_, m_;
@@ -99,7 +106,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own = {});
 /// Their values, the first ones of the table's.
 NewtonSettings newton_settings(std::string method, const std::vector<OptionValue>& values);
 /// How many values these are.
-constexpr std::size_t newton_option_count = 4;
+constexpr std::size_t newton_option_count = 5;
 
 /// The row of the option `jacobian`.
 OptionInfo jacobian_option(std::string default_value);

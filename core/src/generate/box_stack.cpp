@@ -19,7 +19,7 @@ const Field<P> kFields[] = {
     {"mass_ratio", &P::mass_ratio, 1e-12, 1e12, "", "mass of the top box over that of the lowest"},
     {"heavy_top", &P::heavy_top, 0, 1, "", "1: only the top box has another mass; 0: geometric grading"},
     {"gap", &P::gap, 0, 1e3, "m", "between faces"},
-    {"mu", &P::mu, 0, 10, "", "friction coefficient; 0: one nonnegative row a contact"},
+    {"mu", &P::mu, 0, 1e4, "", "friction coefficient; 0: one nonnegative row a contact"},
     {"speed", &P::speed, 0, 1e3, "m/s", "amplitude of random velocities"},
     {"glue", &P::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},

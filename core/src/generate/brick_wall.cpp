@@ -18,7 +18,7 @@ const Field<P> kFields[] = {
     {"height", &P::height, 1e-6, 1e6, "m", "edge of a brick along z"},
     {"density", &P::density, 1e-3, 1e6, "kg/m^3", "of the bricks"},
     {"head_joints", &P::head_joints, 0, 1, "", "1: four contacts on each upright face between neighbours too"},
-    {"mu", &P::mu, 0, 10, "", "friction coefficient; 0: one nonnegative row a contact"},
+    {"mu", &P::mu, 0, 1e4, "", "friction coefficient; 0: one nonnegative row a contact"},
     {"push", &P::push, -1e3, 1e3, "m/s", "velocity along y of the brick nearest the middle: a blow"},
     {"speed", &P::speed, 0, 1e3, "m/s", "amplitude of random velocities"},
     {"glue", &P::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},

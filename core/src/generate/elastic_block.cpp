@@ -22,7 +22,7 @@ const Field<P> kFields[] = {
     {"damping_stiffness", &P::damping_stiffness, 0, 1e3, "s", "beta of Rayleigh's damping"},
     {"squeeze", &P::squeeze, -10, 10, "", "initial compression over that of a column under its own weight"},
     {"gap", &P::gap, 0, 1e3, "m", "under the lowest nodes"},
-    {"mu", &P::mu, 0, 10, "", "friction coefficient; 0: one nonnegative row a contact"},
+    {"mu", &P::mu, 0, 1e4, "", "friction coefficient; 0: one nonnegative row a contact"},
     {"slide", &P::slide, -1e3, 1e3, "m/s", "initial velocity along x"},
     {"fall", &P::fall, -1e3, 1e3, "m/s", "initial velocity along -z"},
     {"speed", &P::speed, 0, 1e3, "m/s", "amplitude of random velocities"},

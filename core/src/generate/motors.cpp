@@ -20,7 +20,7 @@ const Field<P> kFields[] = {
     {"bushing", &P::bushing, 0, 1e15, "N/m", "stiffness of a hinge's bearing; 0: rigid"},
     {"knee_clearance", &P::knee_clearance, 0, 1, "rad", "angle of each knee from its stop"},
     {"gap", &P::gap, 0, 1e3, "m", "under the feet"},
-    {"mu", &P::mu, 0, 10, "", "friction coefficient; 0: one nonnegative row a contact"},
+    {"mu", &P::mu, 0, 1e4, "", "friction coefficient; 0: one nonnegative row a contact"},
     {"speed", &P::speed, 0, 1e3, "m/s", "amplitude of random velocities"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &P::step, 1e-9, 10, "s", "time step h"},

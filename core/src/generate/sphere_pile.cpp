@@ -21,7 +21,7 @@ const Field<P> kFields[] = {
     {"density", &P::density, 1e-3, 1e6, "kg/m^3", "of the spheres"},
     {"jitter", &P::jitter, 0, 0.2, "", "radii are smaller by a random share up to this"},
     {"envelope", &P::envelope, 0, 0.5, "", "pairs with a gap up to this multiple of the radius are contacts"},
-    {"mu", &P::mu, 0, 10, "", "friction coefficient; 0: one nonnegative row a contact"},
+    {"mu", &P::mu, 0, 1e4, "", "friction coefficient; 0: one nonnegative row a contact"},
     {"speed", &P::speed, 0, 1e3, "m/s", "amplitude of random velocities"},
     {"glue", &P::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},

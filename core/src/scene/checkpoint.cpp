@@ -46,7 +46,8 @@ std::vector<double> numbers(const Json& json) {
 Json json_of(const SimulationTotals& totals) {
     return {{"reals", bits({totals.start_energy, totals.energy, totals.worst_drift, totals.worst_penetration,
                             totals.worst_natural, totals.seconds, totals.solver_seconds, totals.smallest_step,
-                            totals.largest_step})},
+                            totals.largest_step, totals.start_kinetic, totals.potential_drop, totals.recovered,
+                            totals.growth, totals.growth_share, totals.worst_linearization})},
             {"rejected", totals.rejected},
             {"impacts", totals.impacts},
             {"most_contacts", totals.most_contacts},
@@ -61,7 +62,7 @@ Json json_of(const SimulationTotals& totals) {
 SimulationTotals totals_of(const Json& json) {
     SimulationTotals totals;
     const auto reals = numbers(json.at("reals"));
-    if (reals.size() != 9) throw InputError("the totals are not complete");
+    if (reals.size() != 15) throw InputError("the totals are not complete");
     totals.start_energy = reals[0];
     totals.energy = reals[1];
     totals.worst_drift = reals[2];
@@ -71,6 +72,12 @@ SimulationTotals totals_of(const Json& json) {
     totals.solver_seconds = reals[6];
     totals.smallest_step = reals[7];
     totals.largest_step = reals[8];
+    totals.start_kinetic = reals[9];
+    totals.potential_drop = reals[10];
+    totals.recovered = reals[11];
+    totals.growth = reals[12];
+    totals.growth_share = reals[13];
+    totals.worst_linearization = reals[14];
     json.at("rejected").get_to(totals.rejected);
     json.at("impacts").get_to(totals.impacts);
     json.at("most_contacts").get_to(totals.most_contacts);

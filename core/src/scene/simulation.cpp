@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "scene/energy_guard.hpp"
 #include "scene/sleeping.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
@@ -59,8 +60,10 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     }
     now_.state = system.system->initial_state();
     constraint_.resize(static_cast<std::size_t>(system.system->m()));
-    measure();
+    guard_ = std::make_unique<EnergyGuard>(system);
+    measure(now_.state, now_.step);
     now_.totals.start_energy = now_.totals.energy = record_.energy;
+    now_.totals.start_kinetic = record_.kinetic;
     now_.totals.worst_drift = record_.drift;
 }
 
@@ -84,12 +87,12 @@ AdaptiveStepReport Simulation::advance(State& state) {
     return report;
 }
 
-void Simulation::measure() {
+void Simulation::measure(const State& state, std::int64_t step) {
     const MultibodySystem& mechanics = *system_->system;
-    const State& state = now_.state;
-    record_.step = now_.step;
+    record_.step = step;
     record_.t = state.t;
     record_.energy = mechanics.energy(state);
+    record_.kinetic = mechanics.kinetic_energy(state);
     const auto momentum = mechanics.momentum(state);
     record_.momentum = momentum[0];
     record_.angular_momentum = momentum[1];
@@ -97,6 +100,29 @@ void Simulation::measure() {
     record_.drift = 0.0;
     for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
     record_.sleeping = sleeping_ ? sleeping_->count() : 0;
+}
+
+void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const {
+    const RunLimits& limits = system_->limits;
+    if (record_.drift > limits.drift)
+        throw StepFailure(
+            fmt::format("the constraints have drifted by {:.3g}, where limits.drift is {:.3g}: the step of {:.3g} s is "
+                        "too long for {}",
+                        record_.drift, limits.drift, taken.h, system_->integrator));
+    if (!guard_->watches(totals)) return;
+    const double start_potential = totals.start_energy - totals.start_kinetic;
+    totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
+    totals.recovered += taken.step.recovered;
+    const double growth = record_.energy - totals.start_energy - totals.recovered;
+    const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
+    totals.growth = std::max(totals.growth, growth);
+    if (growth > 0.0) totals.growth_share = std::max(totals.growth_share, growth / scale);
+    if (growth > limits.energy_growth * scale)
+        throw StepFailure(fmt::format(
+            "the energy has grown from {:.6g} J at the start to {:.6g} J though nothing supplies any (what can have "
+            "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
+            "damps (limits.energy_growth: {:.3g})",
+            totals.start_energy, record_.energy, scale, taken.h, system_->integrator, limits.energy_growth));
 }
 
 const StepRecord& Simulation::step() {
@@ -108,8 +134,11 @@ const StepRecord& Simulation::step() {
     const std::vector<double> memory = timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
     AdaptiveStepReport taken;
+    SimulationTotals judged = now_.totals;
+    const StepRecord last = record_;
     solver_->reset_effort();
     const auto undo = [&] {
+        record_ = last;
         timestepper_->restart();
         timestepper_->load(memory);
         if (sleeping_) sleeping_->load(sleeping);
@@ -118,6 +147,8 @@ const StepRecord& Simulation::step() {
         taken = advance(next);
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
+        measure(next, now_.step + 1);
+        judge(taken, judged);
     } catch (const Unsupported& error) {
         undo();
         throw Unsupported(fmt::format("{}: {}", where(), error.what()));
@@ -134,6 +165,7 @@ const StepRecord& Simulation::step() {
     const StepReport& report = taken.step;
     const std::string place = where();
     now_.state = std::move(next);
+    now_.totals = std::move(judged);
     ++now_.step;
 
     record_.contacts = report.unilateral_blocks;
@@ -148,7 +180,7 @@ const StepRecord& Simulation::step() {
     record_.h = taken.h;
     record_.rejected = taken.rejected;
     record_.impact = taken.impact;
-    measure();
+    record_.linearization = report.linearization;
     record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
     auto& totals = now_.totals;
@@ -156,6 +188,7 @@ const StepRecord& Simulation::step() {
     totals.worst_drift = std::max(totals.worst_drift, record_.drift);
     totals.worst_penetration = std::max(totals.worst_penetration, record_.penetration);
     totals.worst_natural = std::max(totals.worst_natural, record_.natural);
+    totals.worst_linearization = std::max(totals.worst_linearization, record_.linearization);
     if (!taken.impact) {
         totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
         totals.largest_step = std::max(totals.largest_step, taken.h);
@@ -189,6 +222,18 @@ std::vector<ContactForce> Simulation::contact_forces() const {
     return forces;
 }
 
+std::vector<std::string> Simulation::warnings() const {
+    /// Of what can have moved: a growth that a plot would show.
+    constexpr double visible_share = 0.05;
+    std::vector<std::string> sentences;
+    if (const auto& totals = now_.totals; totals.growth_share > visible_share)
+        sentences.push_back(
+            fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
+                        "moved, though nothing supplies any: the steps are long for {}",
+                        system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    return sentences;
+}
+
 SimulationState Simulation::save() const {
     SimulationState result = now_;
     result.memory = timestepper_->save();
@@ -212,7 +257,7 @@ void Simulation::load(SimulationState state) {
     now_.control.clear();
     now_.sleeping.clear();
     record_ = {};
-    measure();
+    measure(now_.state, now_.step);
 }
 
 }  // namespace delassus

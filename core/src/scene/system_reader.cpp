@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "config/sections.hpp"
 
@@ -23,6 +24,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
         {"leave_out",
          [this](const YAML::Node& n) { result_.leave_out = value<bool>(source_, n, "leave_out", "true or false"); }},
+        {"limits", [this](const YAML::Node& n) { read_limits(n); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
     for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
                              "cables", "beams", "joints", "motors", "springs", "bushings", "loads", "keep_apart"})
@@ -119,6 +121,18 @@ void SystemReader::read_sleeping(const YAML::Node& node) {
     read_map(source_, node, "\"sleeping\"",
              {{"speed", [&](const YAML::Node& n) { rule.speed = positive_number(source_, n, "speed"); }},
               {"time", [&](const YAML::Node& n) { rule.time = positive_number(source_, n, "time"); }}});
+}
+
+// limits: {energy_growth: 1, drift: null}
+void SystemReader::read_limits(const YAML::Node& node) {
+    const auto limit = [&](double& target, std::string_view key) -> Handler {
+        return [this, &target, key](const YAML::Node& n) {
+            target = n.IsNull() ? std::numeric_limits<double>::infinity() : positive_number(source_, n, key);
+        };
+    };
+    read_map(source_, node, "\"limits\"",
+             {{"energy_growth", limit(result_.limits.energy_growth, "energy_growth")},
+              {"drift", limit(result_.limits.drift, "drift")}});
 }
 
 void SystemReader::build_step(const YAML::Node& place) {

@@ -31,6 +31,7 @@ private:
     void read_step(const YAML::Node& node);
     void read_tolerance(const YAML::Node& node);
     void read_sleeping(const YAML::Node& node);
+    void read_limits(const YAML::Node& node);
     /// One step for all, or the control of steps.
     void build_step(const YAML::Node& place);
     void read_materials(const YAML::Node& node);

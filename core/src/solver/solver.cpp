@@ -25,6 +25,23 @@ constexpr double balance_floor = 1e-12;
 /// and up to this natural error at most.
 constexpr double rounding_slack = 32.0;
 constexpr double rounding_limit = 1e-10;
+/// A claim is lost where natural is so many times smaller than it can be.
+constexpr double lost_in_rounding = 10.0;
+
+/// What natural is at least, by what does not add velocities to reactions. With R = z − P(z − F) its map for z = S⁻¹λ
+/// and F = S u, P(z − F) − (z − F) = F − R lies in Υ* and is orthogonal to P(z − F) = z − R (Moreau), so that
+///
+///     ‖R‖ ≥ dist(F, Υ*)      and      ‖R‖ ‖z + F‖ + ‖R‖² ≥ |⟨z, F⟩|
+///
+/// are Errors::dual and Errors::gap. In numbers, reactions that are large enough swallow a velocity to the last digit:
+/// then R is 0, whatever u. rounding/ε is ‖z‖/‖S r‖ or more. A box has no Υ*, and a gap of another kind.
+double least_natural(const Problem& problem, const Errors& error) {
+    for (const Cone& cone : problem.cones)
+        if (cone.kind == ConeKind::Box) return 0.0;
+    constexpr double unit_roundoff = 0.5 * std::numeric_limits<double>::epsilon();
+    const double by_gap = error.rounding > 0.0 ? unit_roundoff * error.gap / error.rounding : 0.0;
+    return std::max(error.dual, by_gap);
+}
 
 /// What rounding alone may contribute to Errors::balance at this (x, λ): ε ‖|H||x| + |D|ᵀ|λ| + |a|‖ over the divisor of
 /// the balance, with the unit roundoff ε. With a stiff H, ‖|H||x|‖ is far above ‖Hx‖, and x rounded to double cannot
@@ -176,6 +193,16 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
                 "tolerance {:.2e}",
                 info().name, report.error.natural, report.error.balance, settings.tolerance);
         }
+    }
+    if (const double least = report.status == Status::Solved ? least_natural(problem.problem(), report.error) : 0.0;
+        least > lost_in_rounding * natural_bound) {
+        report.status = Status::NumericalFailure;
+        report.message = fmt::format(
+            "the natural error is {:.2e} in numbers and {:.1e} or more in truth, the tolerance {:.2e}: the reactions "
+            "are "
+            "so large against the velocities that they correct that these are lost in rounding (masses or lengths of "
+            "too different sizes)",
+            report.error.natural, least, settings.tolerance);
     }
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
     return report;

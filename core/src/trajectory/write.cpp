@@ -43,6 +43,8 @@ public:
         step({"natural", "1", "largest natural error of the step's solves"});
         step({"seconds", "s", "wall time of the step"});
         step({"solved", "1", "1 if every solve reached its tolerance", true});
+        step(
+            {"linearization", "1", "what the forces of a linearised method were off by, as a share of the velocities"});
         const Handle frames = group_in(group.get(), "frames", resume, file);
         const auto frame = [&](const Column& column, std::vector<hsize_t> shape = {}) {
             frames_.emplace_back(frames.get(), column, std::move(shape), resume, system.frames, file);
@@ -90,6 +92,7 @@ public:
         steps_[i++].add(record.natural);
         steps_[i++].add(record.seconds);
         steps_[i++].add(record.solved ? 1.0 : 0.0);
+        steps_[i++].add(record.linearization);
         if (++waiting_ >= 1000) write();
     }
 

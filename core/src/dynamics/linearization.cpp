@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/linearization.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace delassus {
+
+namespace {
+
+double diagonal_entry(const SparseMatrix& A, std::int32_t row) {
+    const auto first = A.column.begin() + A.row_start[static_cast<std::size_t>(row)],
+               last = A.column.begin() + A.row_start[static_cast<std::size_t>(row) + 1];
+    const auto found = std::lower_bound(first, last, row);
+    return found != last && *found == row ? A.value[static_cast<std::size_t>(found - A.column.begin())] : 0.0;
+}
+
+}  // namespace
+
+Linearization::Linearization(DynamicalSystem& system, double limit)
+    : system_(system), limit_(limit), wanted_(std::isfinite(limit) && system.has_stiffness()) {}
+
+double Linearization::error(const State& begin, const State& end, double h, std::span<const double> force,
+                            std::span<const double> linear, const SparseMatrix& H) {
+    const auto n = static_cast<std::int32_t>(linear.size());
+    M_.begin(n, n);
+    system_.add_mass(end, 1.0, M_);
+    const SparseMatrix& M = M_.finish();
+    double largest = 0.0;
+    for (const auto* q : {&begin.q, &end.q})
+        for (const double value : *q) largest = std::max(largest, std::abs(value));
+    const double digits = 10.0 * std::numeric_limits<double>::epsilon() * largest;
+    double difference = 0.0, rounding = 0.0, before = 0.0, after = 0.0, forces = 0.0;
+    for (std::int32_t i = 0; i < n; ++i) {
+        const double mass = diagonal_entry(M, i);
+        if (!(mass > 0.0)) continue;
+        const auto squared = [](double value) { return value * value; };
+        const auto k = static_cast<std::size_t>(i);
+        difference += squared(force[k] - linear[k]) / mass;
+        rounding += squared(digits / h * (diagonal_entry(H, i) - mass)) / mass;
+        forces += squared(linear[k]) / mass;
+        before += squared(begin.v[k]) * mass;
+        after += squared(end.v[k]) * mass;
+    }
+    const double scale = std::sqrt(std::max({before, after, forces}));
+    const double error = std::max(std::sqrt(difference) - std::sqrt(rounding), 0.0);
+    return error > 0.0 ? error / scale : 0.0;
+}
+
+void Linearization::judge(double error, const State& begin, double h, std::string_view method) const {
+    if (error <= limit_) return;
+    throw StepFailure(fmt::format(
+        "{} cannot take the step from t = {:.9g} with h = {:.9g}: its linear model is off by forces that are {:.2g} of "
+        "the velocities in a step, where linearization_limit is {:.2g}; take shorter steps, a method that iterates "
+        "(euler_implicit), or a joint in place of a very stiff part",
+        method, begin.t, h, error, limit_));
+}
+
+OptionInfo linearization_option() {
+    return {.key = "linearization_limit",
+            .type = DELASSUS_OPTION_REAL,
+            .default_value = "0.1",
+            .minimum = 0.0,
+            .maximum = HUGE_VAL,
+            .doc =
+                "a step fails whose linear model of the forces is off by more, as a share of the velocities; inf: "
+                "not measured"};
+}
+
+}  // namespace delassus

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Energy that nothing supplies: the sign of a step that is too long for its method (internal).
+#pragma once
+
+#include "delassus/scene.hpp"
+
+namespace delassus {
+
+struct SimulationTotals;
+
+// Where no motor and no load gives energy, E = K + V never exceeds E₀ in truth: joints and contacts take energy or
+// leave it. Kinetic energy comes from the start or from the potential, so that
+//
+//     A = K₀ + max_k (V₀ − V_k)⁺ + W
+//
+// is the most that there can have been up to now, W being what contacts gave by pushing apart what penetrated. Methods
+// err: a growth by some percent of A is an inaccuracy, one by A itself means that the motion is not that of the system.
+// Judged is E − E₀ − W against limit · max(A, floor), with floor = ½ ‖2 h g‖²_M + 1e-10 |E₀|: what moves less than a
+// free fall for two steps is at rest as far as a step can tell (a stiff part that starts off its equilibrium
+// overshoots by about that), and energies of far bodies are rounded.
+class EnergyGuard {
+public:
+    /// system outlives it.
+    explicit EnergyGuard(const SceneSystem& system);
+
+    /// Whether energy is known, and nothing supplies any.
+    [[nodiscard]] bool watches(const SimulationTotals& totals) const;
+
+    /// max(A, floor); longest_step: of the run, s.
+    [[nodiscard]] double scale(const SimulationTotals& totals, double longest_step) const;
+
+private:
+    const SceneSystem* system_;
+    double fall_;  // ½ ‖2 g‖²_M, of a step of 1 s
+};
+
+}  // namespace delassus

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where a run must not go on: energy that nothing supplies, drift, a linear model that is far off, turns that cannot be
+// told (docs/running.md, docs/integrators.md).
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "delassus/error.hpp"
+#include "support/run_command.hpp"
+#include "support/scenes.hpp"
+
+namespace delassus::tests {
+namespace {
+
+constexpr double g = 9.81;
+
+Running running(const std::string& yaml, const std::string& integrator, double step,
+                std::vector<std::pair<std::string, std::string>> values = {}) {
+    SceneOverrides overrides;
+    overrides.integrator = integrator;
+    overrides.step = step;
+    overrides.values = std::move(values);
+    return Running(parse_scene(yaml, "limits", overrides));
+}
+
+/// The sentence of the step that fails; empty if none does.
+std::string failure_of(Running& run) {
+    try {
+        run.finish();
+    } catch (const StepFailure& failure) {
+        return failure.what();
+    }
+    return {};
+}
+
+bool says(const std::string& sentence, const std::string& part) {
+    return sentence.find(part) != std::string::npos;
+}
+
+// A bob of 1 kg on a spring of 1 m, let go from the horizontal.
+std::string spring_pendulum(double stiffness) {
+    return "step: 0.001\nend: 0.5\n"
+           "bodies: [{name: bob, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, position: [1, 0, 0]}]\n"
+           "springs: [{name: rod, second: bob, first_point: [0, 0, 0], stiffness: " +
+           std::to_string(stiffness) + "}]\n";
+}
+
+constexpr const char* pendulum =
+    "step: 0.001\nend: 10\n"
+    "bodies: [{name: bob, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, position: [1, 0, 0]}]\n"
+    "joints: [{name: hinge, kind: revolute, second: bob, point: [0, 0, 0], axis: [0, 1, 0]}]\n";
+
+constexpr const char* brick =
+    "step: 0.001\nend: 0.1\ngravity: [0, 0, 0]\n"
+    "bodies: [{name: brick, mass: 1, inertia: {xx: 1, yy: 2, zz: 3}, angular_velocity: [100, 0, 1.0e4]}]\n";
+
+// ---- Energy ----
+
+TEST(EnergyGuard, EndsARunBeyondTheStabilityLimitWithItsLastGoodState) {
+    // h ω = 1: explicit Euler multiplies the oscillation by √2 a step.
+    Running run = running(spring_pendulum(1e6), "euler_explicit", 0.001);
+    const std::string sentence = failure_of(run);
+    EXPECT_TRUE(says(sentence, "nothing supplies any")) << sentence;
+    EXPECT_TRUE(says(sentence, "too long for euler_explicit")) << sentence;
+    const Simulation& simulation = run.simulation;
+    EXPECT_GT(simulation.record().step, 5);
+    EXPECT_LT(simulation.state().t, 0.2);
+    // All is as before the step that failed: the energy has not yet grown by what can have moved.
+    EXPECT_EQ(simulation.record().energy, simulation.totals().energy);
+    EXPECT_EQ(simulation.record().energy, run.system().energy(simulation.state()));
+    EXPECT_LT(simulation.totals().growth_share, 1.0);
+    EXPECT_NEAR(simulation.state().t, 0.001 * static_cast<double>(simulation.record().step), 1e-12);
+}
+
+TEST(EnergyGuard, TrapezoidalRuleWithAJointEndsWithAReason) {
+    Running run = running(pendulum, "trapezoidal", 0.01);
+    const std::string sentence = failure_of(run);
+    EXPECT_TRUE(says(sentence, "nothing supplies any")) << sentence;
+    // 9.81 J can have moved, so no more than twice that was ever taken for good.
+    EXPECT_LT(run.simulation.totals().energy, 2.1 * g);
+}
+
+TEST(EnergyGuard, IsSwitchedOffByNull) {
+    Running run = running(spring_pendulum(1e6), "euler_explicit", 0.001, {{"limits", "{energy_growth: null}"}});
+    EXPECT_EQ(failure_of(run), "");
+    EXPECT_GT(run.simulation.totals().energy, 1e100);
+}
+
+TEST(EnergyGuard, LeavesMotorsAndLoadsAlone) {
+    Running motor =
+        running(std::string(pendulum) + "motors: [{name: m, joint: hinge, speed: {linear: {start: 0, rate: 5}}}]\n",
+                "euler_implicit_linearized", 0.001, {{"end", "2"}});
+    EXPECT_EQ(failure_of(motor), "");
+    Running load = running(std::string(pendulum) + "loads: [{name: f, body: bob, torque: [0, -50, 0]}]\n", "hht", 0.001,
+                           {{"end", "1"}});
+    EXPECT_EQ(failure_of(load), "");
+    EXPECT_GT(load.simulation.totals().energy, 20.0);
+}
+
+TEST(EnergyGuard, WarnsOfAGrowthThatIsSeen) {
+    // An oscillation of ω = 10 rad/s grows by (1 + h²ω²)^(1/2) a step, its energy by e^(0.5) − 1 = 65 % in 1/2 s at 10
+    // ms.
+    const std::string block =
+        "step: 0.01\nend: 0.5\ngravity: [0, 0, 0]\n"
+        "bodies: [{name: b, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, velocity: [1, 0, 0]}]\n"
+        "bushings: [{name: m, second: b, point: [0, 0, 0], stiffness: [100, 100, 100]}]\n";
+    Running run = running(block, "euler_explicit", 0.01);
+    EXPECT_EQ(failure_of(run), "");
+    EXPECT_NEAR(run.simulation.totals().growth_share, std::exp(0.5) - 1.0, 0.05);
+    ASSERT_EQ(run.simulation.warnings().size(), 1U);
+    EXPECT_TRUE(says(run.simulation.warnings()[0], "the energy rose")) << run.simulation.warnings()[0];
+    Running fine = running(block, "rk4", 0.01);
+    EXPECT_EQ(failure_of(fine), "");
+    EXPECT_TRUE(fine.simulation.warnings().empty());
+}
+
+TEST(EnergyGuard, GoesOnFromACheckpointAsIfItHadNotStopped) {
+    Running whole = running(spring_pendulum(1e6), "euler_explicit", 0.001);
+    const std::string sentence = failure_of(whole);
+    Running first = running(spring_pendulum(1e6), "euler_explicit", 0.001);
+    for (int step = 0; step < 5; ++step) first.simulation.step();
+    Running second = running(spring_pendulum(1e6), "euler_explicit", 0.001);
+    second.simulation.load(first.simulation.save());
+    EXPECT_EQ(failure_of(second), sentence);
+    EXPECT_EQ(second.simulation.totals().potential_drop, whole.simulation.totals().potential_drop);
+}
+
+#ifdef DELASSUS_HAS_FCL
+// A ball that starts 1 cm deep in the ground is thrown out with depth/h = 10 m/s: 50 J that the contact gave.
+TEST(EnergyGuard, CountsWhatContactsGiveThatPushApart) {
+    const std::string ball =
+        "step: 0.001\nend: 0.1\ngravity: [0, 0, 0]\n"
+        "bodies: [{name: ground, fixed: true, shapes: [{plane: {}}]},\n"
+        "         {name: ball, mass: 1, position: [0, 0, 0.09], shapes: [{sphere: {radius: 0.1}}]}]\n";
+    Running run = running(ball, "euler_implicit_linearized", 0.001);
+    EXPECT_EQ(failure_of(run), "");
+    EXPECT_NEAR(run.simulation.totals().recovered, 50.0, 1e-4);
+    EXPECT_NEAR(run.simulation.totals().energy, 50.0, 1e-4);
+    EXPECT_LT(run.simulation.totals().growth_share, 1e-6);
+    EXPECT_TRUE(run.simulation.warnings().empty());
+}
+#endif
+
+// ---- Drift ----
+
+TEST(DriftLimit, EndsARun) {
+    Running run = running(pendulum, "euler_implicit_linearized", 0.1, {{"limits", "{drift: 0.01}"}});
+    const std::string sentence = failure_of(run);
+    EXPECT_TRUE(says(sentence, "limits.drift is 0.01")) << sentence;
+    EXPECT_LE(run.simulation.totals().worst_drift, 0.01);
+}
+
+// ---- Linear models ----
+
+TEST(LinearizationLimit, MeasuresTheShareThatIsLostInARadian) {
+    // h ω = 10: η = (h ω)² φ/2 with φ the angle of a step.
+    Running run = running(spring_pendulum(1e8), "euler_implicit_linearized(linearization_limit=1)", 0.001);
+    double speed = 0.0;
+    while (!run.simulation.finished()) {
+        run.simulation.step();
+        const auto v = run.velocities("bob")[0];
+        speed = std::hypot(v[0], v[1], v[2]);
+        // Not at the first steps, where the way of a step is bent by gravity as much as by the spring.
+        if (run.simulation.state().t < 0.1) continue;
+        const double expected = 0.5 * 100.0 * 0.001 * speed;
+        EXPECT_NEAR(run.simulation.record().linearization, expected, 0.1 * expected) << run.simulation.state().t;
+    }
+    EXPECT_GT(run.simulation.totals().worst_linearization, 0.1);
+}
+
+TEST(LinearizationLimit, EndsARunThatWouldHangBack) {
+    for (const char* method : {"euler_implicit_linearized", "trapezoidal_linearized"}) {
+        Running run = running(spring_pendulum(1e14), method, 0.001);
+        const std::string sentence = failure_of(run);
+        EXPECT_TRUE(says(sentence, "linear model is off")) << method << ": " << sentence;
+        EXPECT_TRUE(says(sentence, "linearization_limit")) << sentence;
+        EXPECT_LE(run.simulation.totals().worst_linearization, 0.1);
+        Running unwatched = running(spring_pendulum(1e10), std::string(method) + "(linearization_limit=inf)", 0.001);
+        EXPECT_EQ(failure_of(unwatched), "");
+        EXPECT_EQ(unwatched.simulation.totals().worst_linearization, 0.0);
+    }
+}
+
+TEST(LinearizationLimit, IsSilentWhereForcesAreLinear) {
+    // At rest on a bushing of h ω = 1e4, and under a joint without any stiffness.
+    const std::string block =
+        "step: 0.01\nend: 0.5\n"
+        "bodies: [{name: b, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, position: [3, 0, 0]}]\n"
+        "bushings: [{name: m, second: b, point: [3, 0, 0], stiffness: [1.0e12, 1.0e12, 1.0e12],\n"
+        "            turn_stiffness: [1, 1, 1]}]\n";
+    Running stiff = running(block, "euler_implicit_linearized", 0.01);
+    EXPECT_EQ(failure_of(stiff), "");
+    EXPECT_LT(stiff.simulation.totals().worst_linearization, 1e-3);
+    Running joint = running(pendulum, "euler_implicit_linearized", 0.01);
+    EXPECT_EQ(failure_of(joint), "");
+    EXPECT_EQ(joint.simulation.totals().worst_linearization, 0.0);
+}
+
+TEST(LinearizationLimit, ShortensStepsByTolerance) {
+    SceneOverrides overrides;
+    overrides.integrator = "euler_implicit_linearized";
+    overrides.tolerance = 1e-2;
+    overrides.end = 0.2;
+    std::string scene = spring_pendulum(1e8);
+    scene.replace(scene.find("step: 0.001\n"), 12, "");
+    Running run(parse_scene(scene, "limits", overrides));
+    EXPECT_EQ(failure_of(run), "");
+    EXPECT_LE(run.simulation.totals().worst_linearization, 0.1);
+}
+
+// ---- Turns ----
+
+TEST(LargestTurn, EndsARunThatCannotTellThem) {
+    for (const char* method : {"euler_implicit", "trapezoidal", "newmark", "hht", "generalized_alpha"}) {
+        Running run = running(brick, method, 0.001);
+        const std::string sentence = failure_of(run);
+        EXPECT_FALSE(sentence.empty()) << method;
+        EXPECT_LT(run.simulation.record().step, 3) << method;
+    }
+    Running run = running(brick, "trapezoidal", 0.001);
+    const std::string sentence = failure_of(run);
+    EXPECT_TRUE(says(sentence, "a body turns by 10 rad in it, where largest_turn is 6.28")) << sentence;
+    Running unwatched = running(brick, "trapezoidal(largest_turn=inf)", 0.001);
+    EXPECT_EQ(failure_of(unwatched), "");
+}
+
+// ---- The scene's key ----
+
+TEST(Limits, AreRefusedWhereTheyMakeNoSense) {
+    const auto sentence_of = [](const std::string& limits) -> std::string {
+        try {
+            static_cast<void>(parse_scene("limits: " + limits + "\n" + pendulum, "s"));
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return {};
+    };
+    EXPECT_TRUE(says(sentence_of("{energy_growth: -1}"), "s, line 1: \"energy_growth\" is"))
+        << sentence_of("{energy_growth: -1}");
+    EXPECT_TRUE(says(sentence_of("{drift: 0}"), "s, line 1: \"drift\" is")) << sentence_of("{drift: 0}");
+    EXPECT_TRUE(says(sentence_of("{energy: 1}"), "\"limits\" has no key \"energy\"; did you mean \"energy_growth\"?"))
+        << sentence_of("{energy: 1}");
+    EXPECT_TRUE(says(sentence_of("1"), "\"limits\" must be a map")) << sentence_of("1");
+    EXPECT_EQ(sentence_of("{energy_growth: 0.5, drift: null}"), "");
+}
+
+}  // namespace
+}  // namespace delassus::tests
