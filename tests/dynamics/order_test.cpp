@@ -67,10 +67,11 @@ std::vector<Case> cases() {
         bool oscillates = false;
     };
     const std::vector<Method> explicit_ones = {{"euler_explicit", {}, 1}, {"rk4", {}, 4}};
+    // The coarsest steps are too long to be trusted, but show the order.
     const std::vector<Method> others = {{"euler_implicit_linearized", {}, 1},
                                         {"euler_implicit", {}, 1},
                                         {"trapezoidal", {}, 2, true},
-                                        {"trapezoidal_linearized", {}, 2, true},
+                                        {"trapezoidal_linearized", {{"linearization_limit", "inf"}}, 2, true},
                                         {"newmark", {}, 2, true},
                                         {"newmark", {{"gamma", "0.6"}, {"beta", "0.3025"}}, 1},
                                         {"hht", {{"alpha", "-0.1"}}, 2},

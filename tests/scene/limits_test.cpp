@@ -89,7 +89,8 @@ TEST(EnergyGuard, IsSwitchedOffByNull) {
 
 TEST(EnergyGuard, LeavesMotorsAndLoadsAlone) {
     Running motor =
-        running(std::string(pendulum) + "motors: [{name: m, joint: hinge, speed: {linear: {start: 0, rate: 5}}}]\n",
+        running(std::string(pendulum) +
+                    "motors: [{name: m, joint: hinge, motion: {linear: {start: 0, rate: 5}}, speed: true}]\n",
                 "euler_implicit_linearized", 0.001, {{"end", "2"}});
     EXPECT_EQ(failure_of(motor), "");
     Running load = running(std::string(pendulum) + "loads: [{name: f, body: bob, torque: [0, -50, 0]}]\n", "hht", 0.001,
@@ -239,7 +240,7 @@ TEST(Limits, AreRefusedWhereTheyMakeNoSense) {
     EXPECT_TRUE(says(sentence_of("{energy_growth: -1}"), "s, line 1: \"energy_growth\" is"))
         << sentence_of("{energy_growth: -1}");
     EXPECT_TRUE(says(sentence_of("{drift: 0}"), "s, line 1: \"drift\" is")) << sentence_of("{drift: 0}");
-    EXPECT_TRUE(says(sentence_of("{energy: 1}"), "\"limits\" has no key \"energy\"; did you mean \"energy_growth\"?"))
+    EXPECT_TRUE(says(sentence_of("{energy: 1}"), "\"limits\" has no key \"energy\"; there are energy_growth, drift"))
         << sentence_of("{energy: 1}");
     EXPECT_TRUE(says(sentence_of("1"), "\"limits\" must be a map")) << sentence_of("1");
     EXPECT_EQ(sentence_of("{energy_growth: 0.5, drift: null}"), "");

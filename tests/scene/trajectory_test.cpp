@@ -114,6 +114,7 @@ State run_into(const std::filesystem::path& folder, const std::string& scene, co
 }
 
 constexpr const char* net = R"(
+integrator: {name: euler_implicit_linearized, options: {linearization_limit: inf}}
 step: 0.01
 end: 0.1
 bodies:

@@ -81,8 +81,8 @@ struct SpatialFriction : sdk::FrictionCone {
         const bool inside = t <= slope * v[0], polar = slope * t <= -v[0];
         const double normal = (v[0] + slope * t) / (1.0 + slope * slope);
         const double factor = slope * normal / t;  // not finite for t = 0 alone, which is inside or polar
-        v[0] = inside ? v[0] : polar ? 0.0 : normal;
-        const double kept = inside ? 1.0 : polar ? 0.0 : factor;
+        v[0] = polar ? 0.0 : inside ? v[0] : normal;
+        const double kept = polar ? 0.0 : inside ? 1.0 : factor;
         v[1] *= kept;
         v[2] *= kept;
     }
