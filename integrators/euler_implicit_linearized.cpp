@@ -217,7 +217,6 @@ private:
     // them after the solve. Blocks come by ascending keys as a rule, as they are kept: then each search for the last
     // impulses begins where the last one ended.
     void assemble_unilateral(double h) {
-        keep_penetrating();
         rows_.move_into(problem_.D);
         problem_.cones.resize(blocks_.size() + rows_.blocks().size());
         for (std::size_t k = 0; k < blocks_.size(); ++k) copy_cone(Cone::free(blocks_[k]), problem_.cones[k]);
@@ -226,6 +225,9 @@ private:
         for (std::int32_t i = 0; i < m_; ++i) lambda[i] = multipliers_.empty() ? 0.0 : last_h_ * multipliers_[i];
         next_kept_.clear();
         approaches_.clear();
+        penetrating_.clear();
+        penetrating_column_.clear();
+        penetrating_value_.clear();
         std::int32_t row = 0;
         Cone* cone = problem_.cones.data() + blocks_.size();
         auto last = kept_.cbegin();
@@ -243,6 +245,7 @@ private:
                 problem_.b[m_ + row + i] = offset(block, i, row + i, h);
                 lambda[m_ + row + i] = fits ? impulses_[last->first + i] : 0.0;
             }
+            if (block.along_normal() && rows_.rows()[row].gap < 0.0) keep_penetrating(next_kept_.size(), row);
             next_kept_.push_back({block.key, row, rows});
             approaches_.push_back({std::max(rows_.rows()[row].gap, 0.0), -block.speed, block.along_normal(),
                                    known && impulses_[last->first] > 0.0});
@@ -274,24 +277,13 @@ private:
         }
     }
 
-    // Normal rows that penetrate, before the rows go into the problem.
-    void keep_penetrating() {
-        penetrating_.clear();
-        penetrating_column_.clear();
-        penetrating_value_.clear();
-        std::size_t row = 0;
-        for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
-            const auto& block = rows_.blocks()[k];
-            if (block.along_normal() && rows_.rows()[row].gap < 0.0) {
-                const auto first = rows_.row_start()[row], last = rows_.row_start()[row + 1];
-                penetrating_column_.insert(penetrating_column_.end(), rows_.column().begin() + first,
-                                           rows_.column().begin() + last);
-                penetrating_value_.insert(penetrating_value_.end(), rows_.value().begin() + first,
-                                          rows_.value().begin() + last);
-                penetrating_.push_back({k, rows_.rows()[row].rate, penetrating_value_.size()});
-            }
-            row += static_cast<std::size_t>(block.cone.rows);
-        }
+    /// Of the normal row of a block that penetrates, which is a row of D as long as that is not solved for.
+    void keep_penetrating(std::size_t block, std::size_t row) {
+        const auto& [rows, columns, row_start, column, value] = problem_.D;
+        const auto first = row_start[m_ + row], last = row_start[m_ + row + 1];
+        penetrating_column_.insert(penetrating_column_.end(), column.begin() + first, column.begin() + last);
+        penetrating_value_.insert(penetrating_value_.end(), value.begin() + first, value.begin() + last);
+        penetrating_.push_back({block, rows_.rows()[row].rate, penetrating_value_.size()});
     }
 
     /// b of row number `row`, the i-th of its block.
