@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "../cholmod/cholesky.hpp"
+#include "cholesky.hpp"
 #include "delassus/sdk/block_rows.hpp"
 #include "row_scaling.hpp"
 

@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 #include <memory>
 
-#include "../cholmod/cholesky.hpp"
+#include "cholesky.hpp"
 #include "delassus/sdk/problem_view.hpp"
 
 namespace delassus::ssn {

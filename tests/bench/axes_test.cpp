@@ -6,7 +6,7 @@
 #include <map>
 
 #include "bench/bench_writers.hpp"
-#include "bench/expression.hpp"
+#include "bench/formula.hpp"
 #include "bench/outcome.hpp"
 #include "bench/results_file.hpp"
 #include "bench/suite.hpp"
@@ -34,8 +34,18 @@ TEST(Formula, IsFilledIn) {
     EXPECT_EQ(bench::fill_in("$((value / 0.5) ^ 2 - 1) m", 2.0), "15 m");
     EXPECT_EQ(bench::fill_in("$(-value ^ 2)$(2 ^ -1)", 3.0), "-90.5");
     EXPECT_EQ(bench::fill_in("value", 3.0), "value");
-    for (const char* wrong : {"$(", "$(2", "$(2 3)", "$(x)", "$(1 / 0)", "$()"})
+    EXPECT_EQ(bench::fill_in("$(sqrt(2 * (value + 5))) $(2 ^ 3 ^ 2)", 3.0), "4 512");
+    for (const char* wrong : {"$(", "$(2", "$(2 3)", "$(x)", "$(1 / 0)", "$()", "$(sqrt(-1))", "$(1, 2)",
+                              "$(value = 2)", "$(nan)", "$(\"a\")", "$(1e999)"})
         EXPECT_THROW(static_cast<void>(bench::fill_in(wrong, 1.0)), InputError) << wrong;
+    try {
+        static_cast<void>(bench::fill_in("[$(2 * vale)]", 1.0));
+        FAIL() << "an unknown name";
+    } catch (const InputError& error) {
+        EXPECT_STREQ(error.what(),
+                     "the formula in \"[$(2 * vale)]\" cannot be read: Unexpected token \"vale\" found at position 4; "
+                     "a formula has numbers, \"value\", + - * / ^, parentheses and functions such as sqrt and exp");
+    }
 }
 
 TEST_F(Axes, ValuesAndBoundsExpand) {

@@ -10,8 +10,8 @@ namespace {
 TEST(LeaveOut, ApgdMapsNoHeavyLibrary) {
     const auto log = loader_log("solve " + example("box_stack") + " --solver apgd");
     EXPECT_NE(log.find("apgd.so"), std::string::npos);
-    for (const char* library :
-         {"libpetsc", "libdmumps", "libcholmod", "libmpi", "libhdf5", "/spg.so", "/cholmod.so", "/petsc.so"})
+    for (const char* library : {"libpetsc", "libdmumps", "libcholmod", "libmpi", "libhdf5", "libmuparser", "libqhull",
+                                "/spg.so", "/cholmod.so", "/petsc.so"})
         EXPECT_EQ(log.find(library), std::string::npos) << library;
 }
 
@@ -31,6 +31,13 @@ TEST(LeaveOut, FclibFilesAloneMapHdf5) {
 
 std::string scene(const std::string& name) {
     return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / (name + ".yaml")).string();
+}
+
+TEST(LeaveOut, ConvexShapesAloneMapQhull) {
+    EXPECT_EQ(loader_log("plan " + scene("box_on_incline")).find("libqhull"), std::string::npos);
+#ifdef DELASSUS_HAS_QHULL
+    EXPECT_NE(loader_log("plan " + scene("arch")).find("libqhull"), std::string::npos);
+#endif
 }
 
 TEST(LeaveOut, MeshFilesAloneMapTheirLibraries) {

@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "bench/expression.hpp"
+#include "bench/formula.hpp"
 #include "bench/suite.hpp"
 #include "bench/suite_sections.hpp"
 #include "config/sections.hpp"

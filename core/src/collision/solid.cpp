@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "collision/convex_hull.hpp"
+#include "collision/hull_polytope.hpp"
 #include "delassus/error.hpp"
 
 namespace delassus::collision {
@@ -18,7 +18,7 @@ constexpr std::size_t kMostVertices = 10000;
 Polytope hull_of(const Shape& shape, std::int32_t index) {
     std::vector<Vector3d> points;
     for (const auto& vertex : shape.mesh->vertices) points.emplace_back(vertex[0], vertex[1], vertex[2]);
-    Polytope hull = convex_hull(points);
+    Polytope hull = hull_polytope(points);
     if (hull.faces.size() < 4)
         throw InputError(fmt::format("Shape {}: the mesh has no volume; its vertices should span a solid.", index));
     if (hull.vertices.size() > kMostVertices) {

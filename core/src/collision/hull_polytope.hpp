@@ -5,8 +5,8 @@
 
 namespace delassus::collision {
 
-/// The convex hull; triangles in a plane are merged to polygons. Cost: vertices × faces. Empty without volume.
-[[nodiscard]] Polytope convex_hull(const std::vector<Vector3d>& points);
+/// The convex hull of points (m), as delassus::convex_hull has it. Empty without volume.
+[[nodiscard]] Polytope hull_polytope(const std::vector<Vector3d>& points);
 
 /// The points of a polytope that are further than distance (m) from all its faces. center: further than distance too.
 [[nodiscard]] Polytope shrink(const Polytope& polytope, double distance, const Vector3d& center);
