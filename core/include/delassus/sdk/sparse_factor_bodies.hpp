@@ -122,9 +122,11 @@ DELASSUS_SPARSE_FACTOR_INLINE bool SparseFactor::analyze(const Eigen::Ref<const 
     analyze(matrix, positive, minimum_degree(matrix));
     // Dissection is worth its time where the fill is large.
     if (entries_ >= 10.0 * static_cast<double>(matrix.nonZeros()) && size_ >= smallest_to_dissect) {
-        SparseFactor other(kernels_);
-        other.analyze(matrix, positive, nested_dissection(matrix));
-        if (other.flops_ < flops_) *this = std::move(other);
+        if (std::vector<std::int32_t> position = nested_dissection(matrix); !position.empty()) {
+            SparseFactor other(kernels_);
+            other.analyze(matrix, positive, std::move(position));
+            if (other.flops_ < flops_) *this = std::move(other);
+        }
     }
     front_ = DenseFront(kernels_ == Kernels::Best && flops_ >= least_flops_for_blas ? Blas::find() : nullptr);
     analyzed_start_.assign(start, start + matrix.cols() + 1);
