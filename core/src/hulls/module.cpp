@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <libqhull_r/libqhull_r.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
