@@ -17,8 +17,8 @@ namespace delassus::sdk {
 /// The multifrontal method (Duff and Reid 1983; Liu 1992): columns of L with nearly the same pattern form a supernode,
 /// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
 /// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD, or nested
-/// dissection by METIS where it is installed and takes fewer operations. Fronts are factored by Eigen, or by the system's BLAS where the
-/// analysis foretells so much work that loading it pays.
+/// dissection by METIS where it is installed and takes fewer operations. Fronts are factored by Eigen, or by the
+/// system's BLAS where the analysis foretells so much work that loading it pays.
 class SparseFactor {
 public:
     enum class Kernels { Best, Eigen };
