@@ -26,7 +26,7 @@ constexpr delassus_option kOptions[] = {
     delassus::sdk::choice_option("schur", "auto", kSchurChoices,
                                  "preconditioner of the rows; auto: incomplete_cholesky, or blocks where N is dense"),
     delassus::sdk::integer_option("stall_window", "20000", 10, 1e9, "iterations",
-                                  "so many without an improvement by one part in a hundred end the solve as stalled"),
+                                  "the solve ends as stalled after this many iterations without an improvement by 1 %"),
     delassus::sdk::integer_option("restarts", "50", 0, 1e6, "",
                                   "largest number of restarts from the true residual, after rounding has spoilt it"),
 };

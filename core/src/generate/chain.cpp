@@ -26,7 +26,7 @@ const Field<P> kFields[] = {
     {"drift", &P::drift, -1, 1, "s", "for how long each rod has moved by its own velocity, breaking the joints"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &P::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &P::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &P::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 // The direction of rod k, downwards: incommensurate waves, smooth along the chain and never the same twice.

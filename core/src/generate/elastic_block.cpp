@@ -29,7 +29,7 @@ const Field<P> kFields[] = {
     {"glue", &P::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &P::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &P::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &P::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 // Corner c of an element lies at ((c & 1), (c >> 1) & 1, (c >> 2) & 1) edges from its first corner.

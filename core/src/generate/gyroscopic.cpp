@@ -19,7 +19,7 @@ const Field<P> kFields[] = {
     {"tilt", &P::tilt, 0, 1.5, "rad", "largest angle of a top to the vertical, about"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &P::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &P::seed, 0, kLargestSeed, "", "of the random angular velocities"},
+    {"seed", &P::seed, 0, kLargestSeed, "", "seed of the random angular velocities"},
 };
 
 }  // namespace

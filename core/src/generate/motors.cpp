@@ -24,7 +24,7 @@ const Field<P> kFields[] = {
     {"speed", &P::speed, 0, 1e3, "m/s", "amplitude of random velocities"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &P::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &P::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &P::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 }  // namespace

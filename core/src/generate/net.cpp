@@ -20,7 +20,7 @@ const Field<P> kFields[] = {
     {"drift", &P::drift, -1, 1, "s", "for how long each node has moved by its own velocity, stretching the strings"},
     {"gravity", &P::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &P::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &P::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &P::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 struct Node {

@@ -147,7 +147,7 @@ std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double sc
 
 TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale, int refinements) {
     if (refinements < 0 || refinements > 6)
-        throw InputError(fmt::format("a mesh shall be refined {} times; it must be from 0 to 6", refinements));
+        throw InputError(fmt::format("the number of refinements of a mesh is {}; it must be from 0 to 6", refinements));
     TetrahedralMesh mesh;
     if (file.extension() == ".vol") {
         must_be_there(file);
