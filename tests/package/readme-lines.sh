@@ -32,7 +32,9 @@ while IFS=$'\t' read -r number line <&3; do
     if [[ $line =~ $skipped ]]; then continue; fi
     echo "== README.md:$number: $line"
     status=0
+    begin=$SECONDS
     eval "$line" || status=$?
+    echo "-- $((SECONDS - begin)) s"
     if [ "$status" -ne 0 ]; then echo "README.md:$number failed with exit code $status: $line" >&2; exit 1; fi
     count=$((count + 1))
 done 3< "$scratch/lines"
