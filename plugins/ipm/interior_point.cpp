@@ -13,7 +13,7 @@ namespace {
 // ‖S r‖ = 1 in scaled units: a solution this much larger than the data is none.
 constexpr double largest_solution = 1e9;
 
-// Relative residuals of linear solves: the predictor only predicts a step, and the residuals of the next iteration
+// Relative residuals of linear solves: the predictor is only a forecast, and the residuals of the next iteration
 // contain what the corrector leaves of the equations.
 constexpr double predictor_residual = 1e-3;
 constexpr double corrector_residual = 1e-9;
