@@ -41,7 +41,7 @@ Mesh joined(const Mesh& mesh) {
     return result;
 }
 
-/// One mesh for each set of triangles that hang together by vertices, in the order of their first triangles.
+/// One mesh for each set of triangles connected by vertices, in the order of their first triangles.
 std::vector<Mesh> parts_of(const Mesh& mesh) {
     std::vector<std::int32_t> parent(mesh.vertices.size());
     std::iota(parent.begin(), parent.end(), 0);
