@@ -6,15 +6,8 @@ set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/delassus)
 
 install(TARGETS delassus_sdk EXPORT delassusSdkTargets)
 install(TARGETS delassus_command EXPORT delassusSdkTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS delassus delassus_dynamics delassus_mechanics delassus_scene EXPORT delassusCoreTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-foreach(module delassus_fclib delassus_trajectory delassus_collision delassus_surface_mesh
-        delassus_volume_mesh delassus_sparse_rank)
-  if(TARGET ${module})
-    install(TARGETS ${module} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus)
-  endif()
-endforeach()
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/core/include/delassus" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp"
+install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" "${PROJECT_SOURCE_DIR}/tools/generate/include/delassus/generate.hpp"
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus)
 install(EXPORT delassusSdkTargets NAMESPACE delassus:: DESTINATION ${package_directory})
 install(EXPORT delassusCoreTargets NAMESPACE delassus:: DESTINATION ${package_directory})

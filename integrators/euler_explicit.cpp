@@ -40,7 +40,7 @@ private:
     std::int32_t n_;
 };
 
-const RegisterTimestepper row{
+const RegisterTimestepper euler_explicit_row{
     {.name = "euler_explicit",
      .description = "explicit Euler on the Lie group; without constraints, for reference",
      .options = {},

@@ -16,7 +16,7 @@ namespace {
 // L-stable: energy of linear systems never grows, and what is much faster than 1/h is gone after a step. λ is right to
 // first order from the second step on; in the first one, v̇ and so λ are off by a share that does not fall with h, for
 // (q_1 − q_0)/h is the velocity in the middle of the step.
-const RegisterTimestepper row{
+const RegisterTimestepper euler_implicit_row{
     {.name = "euler_implicit",
      .description = "implicit Euler by Newton's method, constraints on positions; strongly damped",
      .options = newton_options(),

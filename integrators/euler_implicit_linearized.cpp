@@ -340,7 +340,7 @@ private:
     State end_;
 };
 
-const RegisterTimestepper row{
+const RegisterTimestepper euler_implicit_linearized_row{
     {.name = "euler_implicit_linearized",
      .description = "linearised implicit Euler for contacts, impacts and constraints; one problem a step",
      .options = {{.key = "recovery_speed",

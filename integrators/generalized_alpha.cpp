@@ -21,7 +21,7 @@ namespace {
 //
 // where the seed's last update has a_n for the first term. The first step has a_0 = v̇_0, an error of
 // O(h) that ρ_∞ < 1 makes vanish; q and v are of order 2 from the first step on, λ once it has gone.
-const RegisterTimestepper row{
+const RegisterTimestepper generalized_alpha_row{
     {.name = "generalized_alpha",
      .description = "generalised-alpha: order 2 with damping of high frequencies by rho_infinity",
      .options =

@@ -18,7 +18,7 @@ namespace {
 //
 // which is the same for constant M, keeps order 2 for every M, and is the generalised-α form with α_m = 0 and
 // α_f = −α (the seed's remark after eq. 196 says α_f = α). γ′ = γ/(hβ), β′ = 1/((1 + α) h² β).
-const RegisterTimestepper row{
+const RegisterTimestepper hht_row{
     {.name = "hht",
      .description = "Hilber, Hughes and Taylor: order 2 with damping of high frequencies by alpha",
      .options = newton_options({{.key = "alpha",

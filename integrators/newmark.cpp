@@ -16,7 +16,7 @@ namespace {
 // Expanded about t_n, the velocity is off by (γ − ½) h² v̈ a step: order 2 for γ = ½ only, and γ > ½ damps. A-stable
 // for 2β ≥ γ ≥ ½; the best damping of high frequencies is that of β = (γ + ½)²/4, 0.3025 for γ = 0.6. With γ = ½,
 // β = ¼ it is the trapezoidal rule.
-const RegisterTimestepper row{
+const RegisterTimestepper newmark_row{
     {.name = "newmark",
      .description = "Newmark's family; gamma = 0.5 is of order 2 without damping, more damps and is of order 1",
      .options = newton_options({{.key = "gamma",

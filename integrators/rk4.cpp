@@ -60,7 +60,7 @@ private:
     std::vector<DiagonalBlock3> blocks_;
 };
 
-const RegisterTimestepper row{
+const RegisterTimestepper rk4_row{
     {.name = "rk4",
      .description = "Runge–Kutta–Munthe-Kaas of order 4; without constraints, for reference",
      .options = {},

@@ -18,7 +18,7 @@ namespace {
 //
 // In a constrained system, v̇_n is forced through λ_n: the error of λ changes its sign every step and is not damped, as
 // the rule has the eigenvalue −1 (twice) at infinite frequency. docs/integrators.md has what is left of its order.
-const RegisterTimestepper row{
+const RegisterTimestepper trapezoidal_row{
     {.name = "trapezoidal",
      .description = "trapezoidal rule by Newton's method; no damping, its multipliers oscillate",
      .options = newton_options(),

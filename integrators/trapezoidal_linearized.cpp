@@ -15,7 +15,7 @@ namespace {
 // besides ("sawtooth"): then a force of twice the size acts along C_qᵀ of the end of the step only, an error of order 1
 // (measured on a pendulum, with Newton's method converged: 0.99 in q). Here λ_n is kept, and the linearisation is done
 // where the seed's closing remark wants it, at an extrapolated end.
-const RegisterTimestepper row{
+const RegisterTimestepper trapezoidal_linearized_row{
     {.name = "trapezoidal_linearized",
      .description = "trapezoidal rule with one linear problem a step; no damping, its multipliers oscillate",
      .options = {jacobian_option("exact"), linearization_option(), newton_options().back()},  // largest_turn

@@ -45,7 +45,7 @@ extern "C" void* aligned_alloc(std::size_t alignment, std::size_t size) {
 }
 #endif
 
-namespace delassus {
+namespace delassus::steady_step_test {
 namespace {
 
 #if DELASSUS_COUNTS
@@ -148,4 +148,4 @@ TEST(SteadySteps, AreCountedWithoutSanitizersOnly) {
 #endif
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::steady_step_test

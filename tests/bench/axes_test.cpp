@@ -13,7 +13,7 @@
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::axes_test {
 namespace {
 
 using bench::Json;
@@ -284,4 +284,4 @@ TEST_F(Axes, StiffnessBeyondDoublePrecisionIsAFailureWithItsReason) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::axes_test

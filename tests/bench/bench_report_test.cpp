@@ -7,7 +7,7 @@
 #include "support/browser.hpp"
 #include "support/html_page.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::bench_report_test {
 namespace {
 
 class BenchReport : public BenchTest {
@@ -168,4 +168,4 @@ TEST_F(BenchReport, AScreenshotShowsIt) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::bench_report_test

@@ -12,7 +12,7 @@
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::bench_run_test {
 namespace {
 
 using bench::Json;
@@ -367,4 +367,4 @@ TEST(Cause, DivergedIsNotALimit) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::bench_run_test

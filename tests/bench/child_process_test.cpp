@@ -10,7 +10,7 @@
 
 #include "delassus/error.hpp"
 
-namespace delassus {
+namespace delassus::child_process_test {
 namespace {
 
 ChildSettings shell(const std::string& script, double timeout = 60.0) {
@@ -145,4 +145,4 @@ TEST(ChildProcess, SaysThatAProgramIsNotThere) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::child_process_test

@@ -7,7 +7,7 @@
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::compare_sets_test {
 namespace {
 
 using bench::Json;
@@ -83,4 +83,4 @@ TEST_F(BenchTest, CompareFromOutside) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::compare_sets_test

@@ -9,7 +9,7 @@
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::compare_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -169,4 +169,4 @@ TEST(ShellLine, QuotesWhatAShellWouldTouch) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::compare_test

@@ -5,7 +5,7 @@
 #include "bench_fixture.hpp"
 #include "support/run_command.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::interrupt_test {
 namespace {
 
 TEST_F(BenchTest, InterruptEndsASolveWithWhatWasReached) {
@@ -35,4 +35,4 @@ TEST_F(BenchTest, AnInsistentInterruptEndsASolverThatNeverLooks) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::interrupt_test

@@ -5,7 +5,7 @@
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::measurement_test {
 namespace {
 
 using ::testing::Test;
@@ -149,4 +149,4 @@ TEST_F(BenchTest, DescribeTellsTheFacts) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::measurement_test

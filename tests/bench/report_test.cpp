@@ -11,7 +11,7 @@
 #include "support/browser.hpp"
 #include "support/html_page.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::report_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -97,4 +97,4 @@ TEST_F(ReportTest, IsDrawnByABrowser) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::report_test

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace delassus::bench {
+namespace delassus::bench::statistics_test {
 namespace {
 
 // Four problems, three solvers; C solves one problem only, and the last problem nobody solves.
@@ -81,4 +81,4 @@ TEST(Statistics, RatiosCarryTheSpread) {
 }
 
 }  // namespace
-}  // namespace delassus::bench
+}  // namespace delassus::bench::statistics_test

@@ -9,7 +9,7 @@
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus::bench_test {
+namespace delassus::bench_test::suite_test {
 namespace {
 
 class SuiteTest : public BenchTest {
@@ -111,4 +111,4 @@ TEST_F(SuiteTest, ShippedSuitesCanBeRead) {
 }
 
 }  // namespace
-}  // namespace delassus::bench_test
+}  // namespace delassus::bench_test::suite_test

@@ -8,7 +8,7 @@
 #include "delassus/problem_files.hpp"
 #include "helpers.hpp"
 
-namespace delassus {
+namespace delassus::command_test {
 namespace {
 
 using test::fixture;
@@ -103,4 +103,4 @@ TEST_F(Command, CheckHasItsExitCode) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::command_test

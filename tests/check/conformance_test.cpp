@@ -8,7 +8,7 @@
 
 #include "helpers.hpp"
 
-namespace delassus::check {
+namespace delassus::check::conformance_test {
 namespace {
 
 using Verdict = CheckResult::Verdict;
@@ -175,4 +175,4 @@ TEST(Conformance, ReportIsJson) {
 }
 
 }  // namespace
-}  // namespace delassus::check
+}  // namespace delassus::check::conformance_test

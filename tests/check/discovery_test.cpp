@@ -8,7 +8,7 @@
 #include "delassus/registry.hpp"
 #include "helpers.hpp"
 
-namespace delassus {
+namespace delassus::discovery_test {
 namespace {
 
 using test::fixture;
@@ -195,4 +195,4 @@ TEST(Discovery, AFolderThatIsNotThereIsNamed) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::discovery_test

@@ -9,7 +9,7 @@
 #include <csignal>
 #include <cstdio>
 
-namespace delassus::check {
+namespace delassus::check::isolated_test {
 namespace {
 
 using Verdict = CheckResult::Verdict;
@@ -81,4 +81,4 @@ TEST(Isolated, CountsWhatIsPrinted) {
 }
 
 }  // namespace
-}  // namespace delassus::check
+}  // namespace delassus::check::isolated_test

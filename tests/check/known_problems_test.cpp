@@ -9,7 +9,7 @@
 #include "delassus/errors.hpp"
 #include "delassus/needs.hpp"
 
-namespace delassus::check {
+namespace delassus::check::known_problems_test {
 namespace {
 
 void expect_solved(const KnownProblem& known) {
@@ -81,4 +81,4 @@ TEST(KnownProblems, NewValuesKeepThePattern) {
 }
 
 }  // namespace
-}  // namespace delassus::check
+}  // namespace delassus::check::known_problems_test

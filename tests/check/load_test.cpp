@@ -9,7 +9,7 @@
 #include "delassus/solver.hpp"
 #include "helpers.hpp"
 
-namespace delassus {
+namespace delassus::load_test {
 namespace {
 
 using test::fixture;
@@ -145,4 +145,4 @@ TEST(Solve, GoesOnAfterAllOfThem) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::load_test

@@ -6,7 +6,7 @@
 #include "collision/scene.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus::collision_tests {
+namespace delassus::collision_tests::detector_test {
 namespace {
 
 std::string refusal(const CollisionSetup& setup) {
@@ -220,4 +220,4 @@ TEST(Detector, BadCallsAreRefused) {
 #endif
 
 }  // namespace
-}  // namespace delassus::collision_tests
+}  // namespace delassus::collision_tests::detector_test

@@ -5,7 +5,7 @@
 
 #include "collision/oracle.hpp"
 
-namespace delassus::collision_tests {
+namespace delassus::collision_tests::gap_test {
 namespace {
 
 /// Every pair of kinds, in random poses that are apart, just touching, and in penetration.
@@ -147,5 +147,5 @@ TEST(Gap, OfTwoVertices) {
 }
 
 }  // namespace
-}  // namespace delassus::collision_tests
+}  // namespace delassus::collision_tests::gap_test
 #endif

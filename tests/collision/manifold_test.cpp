@@ -7,7 +7,7 @@
 
 #include "collision/scene.hpp"
 
-namespace delassus::collision_tests {
+namespace delassus::collision_tests::manifold_test {
 namespace {
 
 const Shape kCube = shape(ShapeKind::Box, {0.5, 0.5, 0.5}, 0);
@@ -102,5 +102,5 @@ TEST(Manifold, CylindersGapIsContinuousWhileTipping) {
 }
 
 }  // namespace
-}  // namespace delassus::collision_tests
+}  // namespace delassus::collision_tests::manifold_test
 #endif

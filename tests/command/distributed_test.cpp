@@ -8,7 +8,7 @@
 #include "delassus/problem_files.hpp"
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::distributed_test {
 namespace {
 
 class DistributedCommand : public testing::TestWithParam<const char*> {};
@@ -44,4 +44,4 @@ INSTANTIATE_TEST_SUITE_P(Solvers, DistributedCommand, testing::Values("petsc", "
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::distributed_test

@@ -4,7 +4,7 @@
 
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::docs_test {
 namespace {
 
 TEST(Docs, TablesAreUpToDate) {
@@ -17,4 +17,4 @@ TEST(Docs, TablesAreUpToDate) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::docs_test

@@ -4,7 +4,7 @@
 
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::leave_out_test {
 namespace {
 
 TEST(LeaveOut, ApgdMapsNoHeavyLibrary) {
@@ -50,4 +50,4 @@ TEST(LeaveOut, MeshFilesAloneMapTheirLibraries) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::leave_out_test

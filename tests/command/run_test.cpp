@@ -9,7 +9,7 @@
 
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::run_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -338,4 +338,4 @@ TEST(LeaveOut, SolvingAProblemMapsNeitherHdf5NorFcl) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::run_test

@@ -7,7 +7,7 @@
 
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::solve_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -165,4 +165,4 @@ TEST(Examples, AreWhatTheirLinesMake) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::solve_test

@@ -12,7 +12,7 @@
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::view_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -237,4 +237,4 @@ TEST_F(ViewBrowsed, WithoutWebGLThereAreASentenceAndThePlots) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::view_test

@@ -8,7 +8,7 @@
 #include "support/systems/linear_oscillators.hpp"
 #include "support/systems/planar_pendulum.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::adaptive_test {
 namespace {
 
 struct Run {
@@ -197,4 +197,4 @@ TEST(AdaptiveStepping, RefusesControlsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::adaptive_test

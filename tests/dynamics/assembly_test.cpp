@@ -7,7 +7,7 @@
 #include "delassus/dynamical_system.hpp"
 #include "delassus/error.hpp"
 
-namespace delassus {
+namespace delassus::assembly_test {
 namespace {
 
 TEST(MatrixAssembler, FillsAMatrixOfAnyContent) {
@@ -92,4 +92,4 @@ TEST(UnilateralRows, MoveBelowOtherRowsOrTakeTheirArrays) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::assembly_test

@@ -7,7 +7,7 @@
 #include "support/order.hpp"
 #include "support/systems/linear_oscillators.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::energy_test {
 namespace {
 
 const double frequencies[] = {1e-2, 1.0, 1e2, 1e4, 1e6, 1e8};
@@ -158,4 +158,4 @@ TEST(Energy, OfAMovingSystemStaysBelowTheFirst) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::energy_test

@@ -7,7 +7,7 @@
 #include "support/systems/heavy_top.hpp"
 #include "support/systems/planar_pendulum.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::memory_test {
 namespace {
 
 struct Method {
@@ -155,4 +155,4 @@ TEST(Refusals, OptionsOutsideTheirRange) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::memory_test

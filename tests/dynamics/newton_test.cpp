@@ -9,7 +9,7 @@
 #include "support/systems/planar_pendulum.hpp"
 #include "support/systems/slider_crank.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::newton_test {
 namespace {
 
 VectorXd some(std::int32_t count, double size, double phase) {
@@ -268,4 +268,4 @@ TEST(NewtonFailure, AForceThatIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::newton_test

@@ -13,7 +13,7 @@
 #include "support/systems/planar_pendulum.hpp"
 #include "support/systems/slider_crank.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::order_test {
 namespace {
 
 /// A system with an end time, and the number of steps in which a method of order 2 is in its asymptotic range.
@@ -141,4 +141,4 @@ INSTANTIATE_TEST_SUITE_P(Methods, Order, testing::ValuesIn(cases()), [](const au
 });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::order_test

@@ -5,7 +5,7 @@
 #include "support/order.hpp"
 #include "support/systems/planar_pendulum.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::pendulum_test {
 namespace {
 
 constexpr double period = 2.367841947576237;
@@ -102,4 +102,4 @@ TEST(Damped, MultipliersDoNotGrow) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::pendulum_test

@@ -8,7 +8,7 @@
 #include "delassus/generate.hpp"
 #include "support/small_problems.hpp"
 
-namespace delassus {
+namespace delassus::step_solver_test {
 namespace {
 
 /// Two problems beside each other, the second's columns and rows after the first's.
@@ -153,4 +153,4 @@ TEST_F(StepSolverTest, SaysWhatItDidNotSolve) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::step_solver_test

@@ -8,7 +8,7 @@
 #include "support/systems/planar_pendulum.hpp"
 #include "support/systems/slider_crank.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::systems_test {
 namespace {
 
 template <class System>
@@ -74,4 +74,4 @@ TEST(Rotations, AMillionIncrementsKeepTheUnitLength) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::systems_test

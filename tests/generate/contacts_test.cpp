@@ -8,7 +8,7 @@
 #include "delassus/generate.hpp"
 #include "support/dense.hpp"
 
-namespace delassus {
+namespace delassus::contacts_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -282,4 +282,4 @@ TEST(ElasticBlock, IsSparseAndContactsAreTheLowestNodes) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::contacts_test

@@ -10,7 +10,7 @@
 #include "delassus/error.hpp"
 #include "support/dense.hpp"
 
-namespace delassus {
+namespace delassus::generate_test {
 namespace {
 
 using tests::dense;
@@ -158,4 +158,4 @@ TEST(Glued, RefusesAReducedProblem) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::generate_test

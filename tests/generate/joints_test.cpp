@@ -7,7 +7,7 @@
 #include "delassus/generate.hpp"
 #include "support/dense.hpp"
 
-namespace delassus {
+namespace delassus::joints_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -229,4 +229,4 @@ TEST(Motors, RigidMotionStrainsNothingButTheFeet) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::joints_test

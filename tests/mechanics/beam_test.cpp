@@ -12,7 +12,7 @@
 #include "delassus/multibody.hpp"
 #include "support/system_derivatives.hpp"
 
-namespace delassus {
+namespace delassus::beam_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -313,4 +313,4 @@ TEST(Beam, RefusesWhatIsNoBeam) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::beam_test

@@ -12,7 +12,7 @@
 #include "delassus/timestepper.hpp"
 #include "support/system_derivatives.hpp"
 
-namespace delassus {
+namespace delassus::cantilever_test {
 namespace {
 
 constexpr double length = 1.0, depth = 0.1, young = 1e9, density = 1000.0;
@@ -146,4 +146,4 @@ TEST(Cantilever, SwingsWithTheFrequenciesOfABeam) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::cantilever_test

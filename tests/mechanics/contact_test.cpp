@@ -2,7 +2,7 @@
 // Contact and friction against closed forms, by the linearised implicit Euler method with the exact Coulomb law.
 #include "mechanics/contact_fixture.hpp"
 
-namespace delassus {
+namespace delassus::contact_test {
 namespace {
 
 using tests::about_y;
@@ -165,4 +165,4 @@ TEST_F(ContactTest, LimitsAndBoundedMotors) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::contact_test

@@ -9,7 +9,7 @@
 #include "delassus/multibody.hpp"
 #include "support/system_derivatives.hpp"
 
-namespace delassus {
+namespace delassus::derivatives_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -370,4 +370,4 @@ TEST(Group, QuaternionsKeepTheirLength) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::derivatives_test

@@ -8,7 +8,7 @@
 #include "delassus/multibody.hpp"
 #include "delassus/timestepper.hpp"
 
-namespace delassus {
+namespace delassus::elastic_contact_test {
 namespace {
 
 TEST(ElasticBlock, SlidesWithTheFrictionOfItsWeight) {
@@ -133,4 +133,4 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::elastic_contact_test

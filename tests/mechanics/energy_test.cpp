@@ -8,7 +8,7 @@
 #include "delassus/multibody.hpp"
 #include "delassus/timestepper.hpp"
 
-namespace delassus {
+namespace delassus::energy_test {
 namespace {
 
 /// Keeps the way in a step and the amplitude of oscillations near a thousandth of a metre.
@@ -141,4 +141,4 @@ INSTANTIATE_TEST_SUITE_P(Systems, LinearEnergy,
                          [](const auto& chosen) { return std::string(chosen.param.name); });
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::energy_test

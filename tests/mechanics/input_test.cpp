@@ -9,7 +9,7 @@
 #include "delassus/error.hpp"
 #include "delassus/multibody.hpp"
 
-namespace delassus {
+namespace delassus::input_test {
 namespace {
 
 BodyParameters good(const std::string& name) {
@@ -164,4 +164,4 @@ TEST(Refusals, OfTheWrongOrder) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::input_test

@@ -8,7 +8,7 @@
 
 #include "mechanics/contact_fixture.hpp"
 
-namespace delassus {
+namespace delassus::masonry_test {
 namespace {
 
 using tests::about_y;
@@ -162,4 +162,4 @@ TEST_F(MasonryTest, ArchStandsAboveItsLeastThickness) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::masonry_test

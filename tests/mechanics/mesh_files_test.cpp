@@ -12,7 +12,7 @@
 
 #include "delassus/error.hpp"
 
-namespace delassus {
+namespace delassus::mesh_files_test {
 namespace {
 
 class MeshFile : public testing::Test {
@@ -187,4 +187,4 @@ TEST_F(MeshFile, SurfaceIsFilledWithTetrahedra) {
 #endif
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::mesh_files_test

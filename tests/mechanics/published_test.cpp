@@ -8,7 +8,7 @@
 #include "delassus/timestepper.hpp"
 #include "support/mechanisms.hpp"
 
-namespace delassus {
+namespace delassus::published_test {
 namespace {
 
 State run(DynamicalSystem& system, const std::string& method, double end, int steps, const OptionTexts& options = {}) {
@@ -101,4 +101,4 @@ TEST(ClosedForm, StiffSpringPendulumStretchesAsItsTension) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::published_test

@@ -18,7 +18,7 @@
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::admm_test {
 namespace {
 
 using tests::dense;
@@ -355,4 +355,4 @@ INSTANTIATE_TEST_SUITE_P(All, AdmmShared, testing::ValuesIn(tests::shared_proble
 });
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::admm_test

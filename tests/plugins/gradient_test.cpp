@@ -19,7 +19,7 @@
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::gradient_test {
 namespace {
 
 using tests::dense;
@@ -348,4 +348,4 @@ INSTANTIATE_TEST_SUITE_P(Solvers, GradientShared,
                          });
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::gradient_test

@@ -13,7 +13,7 @@
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::ipm_test {
 namespace {
 
 using tests::diagonal_matrix;
@@ -199,4 +199,4 @@ TEST(Ipm, AClaimThatRoundingHidesIsTakenBack) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::ipm_test

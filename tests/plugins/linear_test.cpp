@@ -16,7 +16,7 @@
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::linear_test {
 namespace {
 
 using tests::dense;
@@ -356,4 +356,4 @@ TEST(Minres, WhatItCannotReachIsStalledAndNotSolved) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::linear_test

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "support/mpi_plugin_tests.hpp"
 
-namespace delassus {
+namespace delassus::mumps_test {
 namespace {
 
 class Mumps : public tests::PluginTest {
@@ -85,4 +85,4 @@ TEST_F(Mumps, RefusesBadOptions) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::mumps_test

@@ -3,7 +3,7 @@
 
 #include "support/mpi_plugin_tests.hpp"
 
-namespace delassus {
+namespace delassus::petsc_test {
 namespace {
 
 class Petsc : public tests::PluginTest {
@@ -122,4 +122,4 @@ TEST_F(Petsc, SharesOneMpiWithMumps) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::petsc_test

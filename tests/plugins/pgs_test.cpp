@@ -20,7 +20,7 @@
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::pgs_test {
 namespace {
 
 using tests::diagonal_matrix;
@@ -573,4 +573,4 @@ TEST(PgsShared, ReachesFourDigitsInBothLaws) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::pgs_test

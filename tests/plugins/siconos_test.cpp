@@ -7,7 +7,7 @@
 #include "delassus/generate.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::siconos_test {
 namespace {
 
 using tests::solve_with;
@@ -66,4 +66,4 @@ TEST_F(Siconos, RefusesTheAssociatedLaw) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::siconos_test

@@ -18,7 +18,7 @@
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::ssn_test {
 namespace {
 
 using tests::diagonal_matrix;
@@ -370,4 +370,4 @@ INSTANTIATE_TEST_SUITE_P(Problems, SsnShared, testing::ValuesIn(shared_names()),
 });
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::ssn_test

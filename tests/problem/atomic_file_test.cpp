@@ -12,7 +12,7 @@
 #include "support/problem_equality.hpp"
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::atomic_file_test {
 namespace {
 namespace fs = std::filesystem;
 
@@ -111,4 +111,4 @@ TEST(AtomicFolder, NeverReplacesWhatIsNotItsOwn) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::atomic_file_test

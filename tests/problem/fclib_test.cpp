@@ -16,7 +16,7 @@
 #include <functional>
 #include <map>
 
-namespace delassus::tests {
+namespace delassus::tests::fclib_test {
 namespace {
 namespace fs = std::filesystem;
 
@@ -419,5 +419,5 @@ TEST(FclibRefuses, Links) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::fclib_test
 #endif

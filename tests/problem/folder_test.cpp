@@ -11,7 +11,7 @@
 #include "support/run_command.hpp"
 #include "support/shared_problems.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::folder_test {
 namespace {
 namespace fs = std::filesystem;
 
@@ -261,4 +261,4 @@ TEST(FolderRefuses, WhatIsNoProblemFolder) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::folder_test

@@ -6,7 +6,7 @@
 #include "delassus/generate.hpp"
 #include "delassus/needs.hpp"
 
-namespace delassus {
+namespace delassus::prepared_problem_test {
 namespace {
 
 void expect_same(const PreparedProblem& renewed, const Problem& problem) {
@@ -59,4 +59,4 @@ TEST(RenewedProblem, IsAsOneMadeAnew) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::prepared_problem_test

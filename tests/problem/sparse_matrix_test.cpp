@@ -6,7 +6,7 @@
 #include "problem/symmetry.hpp"
 #include "support/problem_equality.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::sparse_matrix_test {
 namespace {
 
 SparseMatrix example() {
@@ -71,4 +71,4 @@ TEST(Names, LawsAndKinds) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::sparse_matrix_test

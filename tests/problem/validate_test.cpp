@@ -8,7 +8,7 @@
 #include "delassus/problem.hpp"
 #include "support/problem_equality.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::validate_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -136,4 +136,4 @@ INSTANTIATE_TEST_SUITE_P(All, ValidateRefuses, testing::ValuesIn(refusals),
                          [](const auto& one) { return std::string(one.param.name); });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::validate_test

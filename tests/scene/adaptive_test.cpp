@@ -6,11 +6,11 @@
 
 #include "delassus/error.hpp"
 #include "delassus/plan.hpp"
-#include "scene/checkpoint.hpp"
+#include "simulation/checkpoint.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::adaptive_test {
 namespace {
 
 constexpr double g = 9.81;
@@ -159,4 +159,4 @@ TEST(Tolerance, AndAStepOfTheCommandLineReplaceEachOther) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::adaptive_test

@@ -11,7 +11,7 @@
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::contact_forces_test {
 namespace {
 
 constexpr double g = 9.81;
@@ -117,5 +117,5 @@ elastic_blocks:
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::contact_forces_test
 #endif

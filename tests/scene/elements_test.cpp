@@ -9,7 +9,7 @@
 #include "delassus/simulation.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::elements_test {
 namespace {
 
 const std::string head = "step: 0.001\nend: 0.1\n";
@@ -161,4 +161,4 @@ TEST(ElasticScene, WrongOnesAreToldInOneSentence) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::elements_test

@@ -6,7 +6,7 @@
 #include "delassus/scene.hpp"
 #include "support/run_command.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::errors_test {
 namespace {
 
 const std::string head = "step: 0.01\nend: 1\n";
@@ -171,4 +171,4 @@ TEST(SceneOverride, LeadsByNameOrPosition) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::errors_test

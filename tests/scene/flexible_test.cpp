@@ -9,7 +9,7 @@
 #include "delassus/error.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::flexible_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -166,4 +166,4 @@ TEST(FlexibleScene, WrongMeshesAreToldInOneSentence) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::flexible_test

@@ -10,7 +10,7 @@
 #include "delassus/timestepper.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::friction_laws_test {
 namespace {
 
 struct Case {
@@ -115,4 +115,4 @@ INSTANTIATE_TEST_SUITE_P(Cases, FrictionLaws,
                          });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::friction_laws_test

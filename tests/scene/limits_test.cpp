@@ -10,7 +10,7 @@
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::limits_test {
 namespace {
 
 constexpr double g = 9.81;
@@ -247,4 +247,4 @@ TEST(Limits, AreRefusedWhereTheyMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::limits_test

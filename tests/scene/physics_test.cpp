@@ -9,7 +9,7 @@
 
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::physics_test {
 namespace {
 
 constexpr double g = 9.81;
@@ -183,4 +183,4 @@ TEST(ExampleScene, PileStaysInItsBoxAndComesToRest) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::physics_test

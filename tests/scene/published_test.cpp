@@ -9,7 +9,7 @@
 #include "support/mechanisms.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::published_test {
 namespace {
 
 TEST(ExampleScene, SqueezerIsWhereTheHandbookHasIt) {
@@ -105,4 +105,4 @@ TEST(ExampleScene, GovernorFollowsItsThreeCoordinates) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::published_test

@@ -7,7 +7,7 @@
 
 #include "delassus/scene.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::reading_test {
 namespace {
 
 const std::string head = "step: 0.01\nend: 1\n";
@@ -149,4 +149,4 @@ TEST(Scene, CanonicalTextKnowsAllButTheEnd) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::reading_test

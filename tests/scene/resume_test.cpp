@@ -6,11 +6,11 @@
 #include <bit>
 
 #include "delassus/error.hpp"
-#include "scene/checkpoint.hpp"
+#include "simulation/checkpoint.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::resume_test {
 namespace {
 
 std::vector<std::uint64_t> bits(const std::vector<double>& values) {
@@ -123,4 +123,4 @@ TEST(Simulation, FailedStepLeavesTheLastState) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::resume_test

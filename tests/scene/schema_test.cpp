@@ -13,7 +13,7 @@
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::schema_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -168,4 +168,4 @@ TEST(SceneSchema, IsPrintedByTheCommand) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::schema_test

@@ -8,11 +8,11 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
-#include "scene/checkpoint.hpp"
+#include "simulation/checkpoint.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::sleeping_test {
 namespace {
 
 const std::string head = R"(
@@ -287,5 +287,5 @@ TEST(Sleeping, RefusesWhatCannotSleep) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::sleeping_test
 #endif

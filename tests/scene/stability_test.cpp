@@ -7,7 +7,7 @@
 
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::stability_test {
 namespace {
 
 struct Method {
@@ -109,4 +109,4 @@ INSTANTIATE_TEST_SUITE_P(Methods, StiffPendulum,
                          });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::stability_test

@@ -6,12 +6,12 @@
 
 #include <algorithm>
 
-#include "scene/run_folder.hpp"
+#include "output/run_folder.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
-#include "trajectory/recorded.hpp"
+#include "output/recorded.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::trajectory_test {
 namespace {
 
 struct Dataset {
@@ -220,5 +220,5 @@ TEST(Trajectory, ThinningKeepsTheExtremes) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::trajectory_test
 #endif

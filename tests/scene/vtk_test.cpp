@@ -4,11 +4,11 @@
 
 #include <cstring>
 
-#include "scene/vtk_series.hpp"
+#include "output/vtk_series.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::vtk_test {
 namespace {
 
 /// An array of the appended section: the one with that name after the element `part`.
@@ -73,4 +73,4 @@ cables:
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::vtk_test

@@ -11,7 +11,7 @@
 #include "delassus/sdk/column_shares.hpp"
 #include "delassus/sdk/team.hpp"
 
-namespace delassus::sdk {
+namespace delassus::sdk::block_rows_test {
 namespace {
 
 /// Groups of 1 to 6 rows, each of which touches some runs of columns.
@@ -157,4 +157,4 @@ TEST(Team, SharesCoverEverythingOnce) {
 }
 
 }  // namespace
-}  // namespace delassus::sdk
+}  // namespace delassus::sdk::block_rows_test

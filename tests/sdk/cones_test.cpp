@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace delassus::sdk {
+namespace delassus::sdk::cones_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -124,4 +124,4 @@ TEST(Cones, ProjectionIsTheNearestPoint) {
 }
 
 }  // namespace
-}  // namespace delassus::sdk
+}  // namespace delassus::sdk::cones_test

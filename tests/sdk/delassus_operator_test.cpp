@@ -9,7 +9,7 @@
 
 #include "delassus/needs.hpp"
 
-namespace delassus {
+namespace delassus::delassus_operator_test {
 namespace {
 
 using Dense = Eigen::MatrixXd;
@@ -138,4 +138,4 @@ INSTANTIATE_TEST_SUITE_P(Structures, OperatorOfStructure,
                          [](const auto& parameters) { return parameters.param.name; });
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::delassus_operator_test

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace delassus {
+namespace delassus::sparse_factor_test {
 namespace {
 
 using sdk::SparseColumns;
@@ -137,4 +137,4 @@ TEST(SparseFactor, RefusesPivotsOfTheWrongSign) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::sparse_factor_test

@@ -14,7 +14,7 @@
 #include "support/shared_problems.hpp"
 #include "support/solving.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::accuracy_test {
 namespace {
 
 const Registry& registry() {
@@ -116,4 +116,4 @@ INSTANTIATE_TEST_SUITE_P(Problems, Accuracy, testing::ValuesIn(shared_problem_fo
 });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::accuracy_test

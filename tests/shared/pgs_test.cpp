@@ -13,7 +13,7 @@
 #include "delassus/problem_files.hpp"
 #include "support/shared_problems.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::pgs_test {
 namespace {
 
 struct Case {
@@ -58,4 +58,4 @@ INSTANTIATE_TEST_SUITE_P(Problems, PgsOnShared, ::testing::ValuesIn(cases()), []
 });
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::pgs_test

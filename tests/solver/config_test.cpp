@@ -7,7 +7,7 @@
 
 #include "delassus/error.hpp"
 
-namespace delassus {
+namespace delassus::config_test {
 namespace {
 
 std::string refusal(const std::string& yaml) {
@@ -83,4 +83,4 @@ TEST(Options, AreCheckedAgainstTheTable) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::config_test

@@ -13,7 +13,7 @@
 #include "delassus/generate.hpp"
 #include "support/small_problems.hpp"
 
-namespace delassus {
+namespace delassus::errors_test {
 namespace {
 
 using tests::point_on_plane;
@@ -305,4 +305,4 @@ TEST(Errors, OfAPileAreThoseOfPlainProducts) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::errors_test

@@ -10,7 +10,7 @@
 #include "delassus/rank.hpp"
 #include "support/solving.hpp"
 
-namespace delassus {
+namespace delassus::qualification_test {
 namespace {
 
 /// A point (3 velocities) between two planes with friction whose normals make the angle 2θ with one another, symmetric
@@ -148,4 +148,4 @@ TEST(Rank, OfStacksDenseAndSparse) {
 }
 
 }  // namespace
-}  // namespace delassus
+}  // namespace delassus::qualification_test

@@ -16,7 +16,7 @@
 #include "support/run_command.hpp"
 #include "support/small_problems.hpp"
 
-namespace delassus::tests {
+namespace delassus::tests::stages_test {
 namespace {
 
 const Registry& registry() {
@@ -307,4 +307,4 @@ TEST(Auto, BadRankingsAreRefused) {
 }
 
 }  // namespace
-}  // namespace delassus::tests
+}  // namespace delassus::tests::stages_test

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "delassus/adaptive_stepping.hpp"
-#include "delassus/config.hpp"
+#include "delassus/solver_config.hpp"
 #include "delassus/export.hpp"
 #include "delassus/multibody.hpp"
 

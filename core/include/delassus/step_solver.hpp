@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "delassus/config.hpp"
+#include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
 #include "delassus/needs.hpp"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "collision/feature.hpp"
+#include "mechanics/contact_feature.hpp"
 #include "collision/separation.hpp"
 
 namespace delassus::collision {

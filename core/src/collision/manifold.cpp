@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "collision/feature.hpp"
+#include "mechanics/contact_feature.hpp"
 
 namespace delassus::collision {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "collision/feature.hpp"
+#include "mechanics/contact_feature.hpp"
 
 namespace delassus::collision {
 namespace {

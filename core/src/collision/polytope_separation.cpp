@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "collision/feature.hpp"
+#include "mechanics/contact_feature.hpp"
 #include "collision/separation.hpp"
 
 namespace delassus::collision {

@@ -14,11 +14,4 @@ DELASSUS_API OptionTexts read_options(const Source& source, const YAML::Node& no
 /// The "solver" section: a name, or a map.
 DELASSUS_API SolverConfig read_solver(const Source& source, const YAML::Node& node);
 
-/// "name" or "name(key=value,key=value)"; what names the thing in messages. Throws InputError.
-struct NameWithOptions {
-    std::string name;
-    OptionTexts options;
-};
-DELASSUS_API NameWithOptions parse_name_with_options(std::string_view text, std::string_view what);
-
 }  // namespace delassus

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "collision/feature.hpp"
+#include "mechanics/contact_feature.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {

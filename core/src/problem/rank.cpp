@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "delassus/sdk/problem_view.hpp"
-#include "sparse_rank/rank_module.hpp"
+#include "problem/rank_module.hpp"
 #include "support/module.hpp"
 
 namespace delassus {

@@ -9,6 +9,7 @@
 #include "config/sections.hpp"
 #include "scene/overrides.hpp"
 #include "scene/system_reader.hpp"
+#include "solver/name_with_options.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus {

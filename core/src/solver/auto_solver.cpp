@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "delassus/config.hpp"
+#include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
 #include "problem/need_of.hpp"

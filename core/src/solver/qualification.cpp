@@ -18,7 +18,7 @@
 #include <limits>
 #include <utility>
 
-#include "delassus/config.hpp"
+#include "delassus/solver_config.hpp"
 #include "delassus/errors.hpp"
 #include "delassus/rank.hpp"
 #include "delassus/solver.hpp"

@@ -15,9 +15,7 @@ namespace delassus {
 
 namespace {
 
-using Json = nlohmann::json;
-
-void check_keys(const Json& object, const std::vector<std::string_view>& known, std::string_view where) {
+void check_keys(const nlohmann::json& object, const std::vector<std::string_view>& known, std::string_view where) {
     if (!object.is_object()) throw InputError(fmt::format("{} must be an object", where));
     for (const auto& [key, value] : object.items())
         if (std::find(known.begin(), known.end(), key) == known.end())
@@ -31,7 +29,7 @@ Structure structure_of(const std::string& name) {
     throw InputError(fmt::format("there is no structure \"{}\" of H", name));
 }
 
-RankedStage read_stage(const Json& json) {
+RankedStage read_stage(const nlohmann::json& json) {
     check_keys(json, {"solver", "options", "tolerance", "max_iterations", "watched", "last", "law", "reason"},
                "a stage");
     RankedStage ranked;
@@ -46,11 +44,11 @@ RankedStage read_stage(const Json& json) {
     return ranked;
 }
 
-RankingRule read_rule(const Json& json) {
+RankingRule read_rule(const nlohmann::json& json) {
     check_keys(json, {"name", "when", "stages"}, "a rule");
     RankingRule rule;
     rule.name = json.at("name").get<std::string>();
-    const Json& when = json.at("when");
+    const nlohmann::json& when = json.at("when");
     check_keys(when, {"linear", "simulation", "law", "structure", "m", "tolerance"},
                fmt::format("\"when\" of \"{}\"", rule.name));
     if (when.contains("linear")) rule.linear = when.at("linear").get<bool>();
@@ -86,13 +84,13 @@ bool RankingRule::matches(const RankedNeeds& asked) const {
 
 Ranking::Ranking(const std::filesystem::path& file) {
     try {
-        const Json json = Json::parse(read_file(file));
+        const nlohmann::json json = nlohmann::json::parse(read_file(file));
         check_keys(json, {"format", "made_by", "rules"}, "a ranking");
         if (json.at("format") != 1) throw InputError("its format is not 1");
         for (const auto& rule : json.at("rules")) rules_.push_back(read_rule(rule));
         if (rules_.empty() || !json.at("rules").back().at("when").empty())
             throw InputError("its last rule must match everything: \"when\": {}");
-    } catch (const Json::exception& error) {
+    } catch (const nlohmann::json::exception& error) {
         throw InputError(fmt::format("the ranking {} cannot be read: {}", file.string(), error.what()));
     } catch (const InputError& error) {
         throw InputError(fmt::format("the ranking {} cannot be used: {}", file.string(), error.what()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sparse_rank/rank_module.hpp"
+#include "problem/rank_module.hpp"
 
 #include <SuiteSparseQR_C.h>
 #include <cholmod.h>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "trajectory/datasets.hpp"
-#include "trajectory/model.hpp"
+#include "output/trajectory_model.hpp"
 
 namespace delassus::trajectory {
 

@@ -8,7 +8,7 @@
 #include "delassus/export.hpp"
 #include "hdf5/isolated.hpp"
 #include "trajectory/model_file.hpp"
-#include "trajectory/recorded.hpp"
+#include "output/recorded.hpp"
 
 namespace delassus::trajectory {
 namespace {

@@ -5,7 +5,7 @@
 #include "delassus/export.hpp"
 #include "trajectory/datasets.hpp"
 #include "trajectory/model_file.hpp"
-#include "trajectory/trajectory.hpp"
+#include "output/trajectory.hpp"
 
 namespace delassus::trajectory {
 namespace {

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "output/run_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "delassus/error.hpp"
+#include "delassus/problem_files.hpp"
+#include "output/system_model.hpp"
+#include "support/atomic_file.hpp"
+
+namespace delassus {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// scene.html is what `delassus view` makes of the rest.
+constexpr std::array<std::string_view, 8> own_files = {"checkpoint.json", "scene.yaml", "trajectory.h5", "scene.pvd",
+                                                       "report.json",     "vtk",        "problems",      "scene.html"};
+constexpr std::chrono::seconds between_checkpoints{5};
+
+/// Makes the folder, or empties that of an earlier run.
+void prepare(const fs::path& folder) {
+    std::error_code error;
+    if (fs::exists(folder, error)) {
+        if (!fs::is_directory(folder, error))
+            throw InputError(fmt::format("{} is a file; -o needs a folder", folder.string()));
+        for (const auto& entry : fs::directory_iterator(folder))
+            if (std::find(own_files.begin(), own_files.end(), entry.path().filename().string()) == own_files.end())
+                throw InputError(fmt::format("{} holds {}, which no run wrote; choose another folder", folder.string(),
+                                             entry.path().filename().string()));
+        for (const auto name : own_files) fs::remove_all(folder / name, error);
+    }
+    fs::create_directories(folder / "vtk", error);
+    if (error) throw InputError(fmt::format("{} cannot be made: {}", folder.string(), error.message()));
+}
+
+}  // namespace
+
+RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& scene_text,
+                     std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces)
+    : folder_(std::move(folder)),
+      scene_(scene.canonical),
+      simulations_(simulations),
+      every_(every),
+      contact_forces_(contact_forces) {
+    prepare(folder_);
+    write_file_atomically(folder_ / "scene.yaml", scene_text);
+    frame_times_.resize(simulations.size());
+    open(scene, false);
+    for (std::size_t i = 0; i < simulations_.size(); ++i) {
+        trajectory_->add_step(i, simulations_[i].record());
+        add_frame(i);
+    }
+    checkpoint();
+}
+
+RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every)
+    : folder_(std::move(folder)), scene_(scene.canonical), simulations_(simulations), every_(every) {
+    Checkpoint checkpoint = read_checkpoint(folder_ / "checkpoint.json");
+    if (checkpoint.scene != scene.canonical || checkpoint.systems.size() != simulations.size())
+        throw InputError(
+            fmt::format("the run in {} was of another scene, or with other settings; give the same "
+                        "scene, --set, --solver, --integrator and --step (--end may differ)",
+                        folder_.string()));
+    contact_forces_ = checkpoint.contact_forces;
+    for (std::size_t i = 0; i < simulations.size(); ++i) {
+        frame_times_.push_back(std::move(checkpoint.systems[i].frame_times));
+        simulations[i].load(std::move(checkpoint.systems[i].simulation));
+    }
+    open(scene, true);
+}
+
+RunFolder::~RunFolder() = default;
+
+void RunFolder::open(const Scene& scene, bool resume) {
+    std::vector<TrajectorySystem> systems;
+    for (std::size_t i = 0; i < simulations_.size(); ++i) {
+        const SceneSystem& system = scene.systems[i];
+        systems.push_back({system.name, system.integrator, system.solver.name, system.system->position_size(),
+                           system.system->n(), system.step, trajectory_model(system), contact_forces_,
+                           simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size())});
+        series_.emplace_back(folder_ / "vtk", system.name, *system.system);
+    }
+    trajectory_ = open_trajectory(folder_ / "trajectory.h5", systems, resume);
+    last_checkpoint_ = std::chrono::steady_clock::now();
+}
+
+void RunFolder::dump_problems(std::int64_t every) {
+    std::error_code error;
+    fs::create_directories(folder_ / "problems", error);
+    if (error) throw InputError(fmt::format("{}/problems cannot be made: {}", folder_.string(), error.message()));
+    for (auto& simulation : simulations_) {
+        simulation.solver().on_problem = [this, every, &simulation, step = std::int64_t{-1},
+                                          solve = 0](const Problem& problem) mutable {
+            const std::int64_t now = simulation.record().step + 1;
+            if (now % every != 0 || problem.m() == 0) return;
+            solve = now == step ? solve + 1 : 1;
+            step = now;
+            const auto name = solve == 1 ? fmt::format("{}_{:06}", simulation.system().name, now)
+                                         : fmt::format("{}_{:06}_{}", simulation.system().name, now, solve);
+            Problem copy = problem;
+            copy.name = name;
+            copy.source = fmt::format("step {} of system {} from t = {:.17g} s, solve {}", now,
+                                      simulation.system().name, simulation.state().t, solve);
+            write_problem(copy, folder_ / "problems" / name);
+        };
+    }
+}
+
+void RunFolder::add_step(std::size_t system) {
+    const Simulation& simulation = simulations_[system];
+    trajectory_->add_step(system, simulation.record());
+    if (simulation.record().step % every_ == 0) add_frame(system);
+    if (std::chrono::steady_clock::now() - last_checkpoint_ > between_checkpoints) checkpoint();
+}
+
+void RunFolder::add_frame(std::size_t system) {
+    const Simulation& simulation = simulations_[system];
+    const MultibodySystem& mechanics = *simulation.system().system;
+    std::vector<Pose> poses;
+    for (BodyIndex body = 0; body < mechanics.body_count(); ++body)
+        poses.push_back(mechanics.pose(simulation.state(), body));
+    const auto forces = contact_forces_ ? simulation.contact_forces() : std::vector<ContactForce>{};
+    trajectory_->add_frame(system, simulation.state(), poses, mechanics.contacts(), forces);
+    const auto number = static_cast<std::int64_t>(frame_times_[system].size());
+    series_[system].write(number, simulation.state());
+    if (contact_forces_) series_[system].write_contacts(number, simulation.state().t, mechanics.contacts(), forces);
+    frame_times_[system].push_back(simulation.state().t);
+}
+
+void RunFolder::checkpoint() {
+    trajectory_->flush();
+    std::vector<VtkCollectionPart> parts;
+    Checkpoint checkpoint{scene_, {}, contact_forces_};
+    for (std::size_t i = 0; i < simulations_.size(); ++i) {
+        parts.push_back({&series_[i], &frame_times_[i], contact_forces_});
+        checkpoint.systems.push_back({simulations_[i].system().name, simulations_[i].save(), frame_times_[i]});
+    }
+    write_vtk_collection(folder_ / "scene.pvd", "vtk", parts);
+    write_checkpoint(checkpoint, folder_ / "checkpoint.json");
+    last_checkpoint_ = std::chrono::steady_clock::now();
+}
+
+void RunFolder::write_report(const std::string& json) const {
+    write_file_atomically(folder_ / "report.json", json);
+}
+
+}  // namespace delassus

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "simulation/energy_guard.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "delassus/simulation.hpp"
+
+namespace delassus {
+
+EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
+    const MultibodySystem& mechanics = *system.system;
+    const State start = mechanics.initial_state();
+    const auto n = static_cast<std::size_t>(mechanics.n());
+    std::vector<double> fall(n, 0.0), momentum(n, 0.0);
+    const auto set = [&](std::int32_t column) {
+        if (column >= 0) std::copy_n(mechanics.gravity().begin(), 3, fall.begin() + column);
+    };
+    for (BodyIndex body = 0; body < mechanics.body_count(); ++body) set(mechanics.body_column(body));
+    for (std::int32_t node = 0; node < mechanics.node_count(); ++node) set(mechanics.node_column(node));
+    mechanics.multiply_mass(start, 1.0, fall.data(), momentum.data());
+    fall_ = 0.0;
+    for (std::size_t i = 0; i < n; ++i) fall_ += 2.0 * fall[i] * momentum[i];
+}
+
+bool EnergyGuard::watches(const SimulationTotals& totals) const {
+    return std::isfinite(totals.start_energy) && system_->motors.empty() && system_->loads.empty();
+}
+
+double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) const {
+    const double available = totals.start_kinetic + totals.potential_drop + totals.recovered;
+    const double floor = fall_ * longest_step * longest_step + 1e-10 * std::abs(totals.start_energy);
+    return std::max(available, floor);
+}
+
+}  // namespace delassus

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "simulation/energy_guard.hpp"
+#include "simulation/sleeping.hpp"
+#include "solver/auto_solver.hpp"
+#include "support/finite.hpp"
+#include "support/frames.hpp"
+
+namespace delassus {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Remaining times within this fraction of a step are whole steps that rounding spoiled.
+constexpr double rounding_of_step = 1e-9;
+
+/// Throws Unsupported if the system's timestepper solves for more than the velocities of one step.
+void require_sleeping(const SceneSystem& system) {
+    std::vector<std::string> able;
+    for (const TimestepperInfo& one : timesteppers()) {
+        if (one.sleeping && one.name == system.integrator) return;
+        if (one.sleeping) able.push_back(one.name);
+    }
+    throw Unsupported(fmt::format("{} cannot leave out bodies that sleep. Can: {}; or remove \"sleeping\"",
+                                  system.integrator, fmt::join(able, ", ")));
+}
+
+}  // namespace
+
+Simulation::Simulation(SceneSystem& system, const Registry& registry)
+    : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
+    if (!system.leave_out) solver_->leave_nothing_out();
+    try {
+        // Checked here without loading the plugin, which may never be needed.
+        SolverConfig solver = system.solver;
+        if (solver.name.empty()) solver.name = auto_name;
+        check_solver(registry, solver);
+        timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
+        if (system.control)
+            control_ = std::make_unique<AdaptiveStepping>(*system.system, *timestepper_, *system.control);
+        if (system.sleeping) {
+            require_sleeping(system);
+            if (control_)
+                throw InputError("bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
+            sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
+            solver_->resting = sleeping_.get();
+        }
+    } catch (const InputError& error) {
+        throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));
+    } catch (const Unsupported& error) {
+        throw Unsupported(fmt::format("system \"{}\": {}", system.name, error.what()));
+    }
+    now_.state = system.system->initial_state();
+    constraint_.resize(static_cast<std::size_t>(system.system->m()));
+    guard_ = std::make_unique<EnergyGuard>(system);
+    measure(now_.state, now_.step);
+    now_.totals.start_energy = now_.totals.energy = record_.energy;
+    now_.totals.start_kinetic = record_.kinetic;
+    now_.totals.worst_drift = record_.drift;
+}
+
+Simulation::~Simulation() = default;
+Simulation::Simulation(Simulation&&) noexcept = default;
+
+bool Simulation::finished() const {
+    // The last of steps that are chosen ends at `end` itself.
+    return system_->end - now_.state.t <= (control_ ? 0.0 : rounding_of_step * system_->step);
+}
+
+AdaptiveStepReport Simulation::advance(State& state) {
+    if (control_) return control_->step(state, system_->end, *solver_);
+    // A whole step unless the end comes sooner: a run that is ended here or goes on later takes the same steps.
+    const double remaining = system_->end - state.t;
+    AdaptiveStepReport report;
+    report.h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
+    if (sleeping_) sleeping_->begin_step(report.h);
+    report.step = timestepper_->step(state, report.h, *solver_);
+    if (sleeping_) sleeping_->end_step(now_.state, state);
+    return report;
+}
+
+void Simulation::measure(const State& state, std::int64_t step) {
+    const MultibodySystem& mechanics = *system_->system;
+    record_.step = step;
+    record_.t = state.t;
+    record_.energy = mechanics.energy(state);
+    record_.kinetic = mechanics.kinetic_energy(state);
+    const auto momentum = mechanics.momentum(state);
+    record_.momentum = momentum[0];
+    record_.angular_momentum = momentum[1];
+    if (!constraint_.empty()) mechanics.constraint(state, constraint_.data());
+    record_.drift = 0.0;
+    for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
+    record_.sleeping = sleeping_ ? sleeping_->count() : 0;
+}
+
+void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const {
+    const RunLimits& limits = system_->limits;
+    if (record_.drift > limits.drift)
+        throw StepFailure(
+            fmt::format("the constraints have drifted by {:.3g}, where limits.drift is {:.3g}: the step of {:.3g} s is "
+                        "too long for {}",
+                        record_.drift, limits.drift, taken.h, system_->integrator));
+    if (!guard_->watches(totals)) return;
+    const double start_potential = totals.start_energy - totals.start_kinetic;
+    totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
+    totals.recovered += taken.step.recovered;
+    const double growth = record_.energy - totals.start_energy - totals.recovered;
+    const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
+    totals.growth = std::max(totals.growth, growth);
+    if (growth > 0.0) totals.growth_share = std::max(totals.growth_share, growth / scale);
+    if (growth > limits.energy_growth * scale)
+        throw StepFailure(fmt::format(
+            "the energy has grown from {:.6g} J at the start to {:.6g} J though nothing supplies any (what can have "
+            "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
+            "damps (limits.energy_growth: {:.3g})",
+            totals.start_energy, record_.energy, scale, taken.h, system_->integrator, limits.energy_growth));
+}
+
+const StepRecord& Simulation::step() {
+    const auto begin = Clock::now();
+    const auto where = [&] {
+        return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
+    };
+    State next = now_.state;
+    const std::vector<double> memory = timestepper_->save();
+    const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
+    AdaptiveStepReport taken;
+    SimulationTotals judged = now_.totals;
+    const StepRecord last = record_;
+    solver_->reset_effort();
+    const auto undo = [&] {
+        record_ = last;
+        timestepper_->restart();
+        timestepper_->load(memory);
+        if (sleeping_) sleeping_->load(sleeping);
+    };
+    try {
+        taken = advance(next);
+        if (!all_finite(next.q) || !all_finite(next.v))
+            throw StepFailure("the state at the end of the step is not finite");
+        measure(next, now_.step + 1);
+        judge(taken, judged);
+    } catch (const Unsupported& error) {
+        undo();
+        throw Unsupported(fmt::format("{}: {}", where(), error.what()));
+    } catch (const InputError& error) {
+        undo();
+        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+    } catch (const StepInterrupted& error) {
+        undo();
+        throw StepInterrupted(fmt::format("{}: {}", where(), error.what()));
+    } catch (const StepFailure& error) {
+        undo();
+        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+    }
+    const StepReport& report = taken.step;
+    const std::string place = where();
+    now_.state = std::move(next);
+    now_.totals = std::move(judged);
+    ++now_.step;
+
+    record_.contacts = report.unilateral_blocks;
+    record_.penetration = 0.0;
+    for (const auto& contact : system_->system->contacts())
+        record_.penetration = std::max(record_.penetration, -contact.gap);
+    const SolverEffort& effort = solver_->effort();
+    record_.newton_iterations = report.newton_iterations;
+    record_.solver_iterations = effort.iterations;
+    record_.natural = effort.worst_natural;
+    record_.solved = report.solved;
+    record_.h = taken.h;
+    record_.rejected = taken.rejected;
+    record_.impact = taken.impact;
+    record_.linearization = report.linearization;
+    record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+
+    auto& totals = now_.totals;
+    totals.energy = record_.energy;
+    totals.worst_drift = std::max(totals.worst_drift, record_.drift);
+    totals.worst_penetration = std::max(totals.worst_penetration, record_.penetration);
+    totals.worst_natural = std::max(totals.worst_natural, record_.natural);
+    totals.worst_linearization = std::max(totals.worst_linearization, record_.linearization);
+    if (!taken.impact) {
+        totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
+        totals.largest_step = std::max(totals.largest_step, taken.h);
+    }
+    totals.rejected += taken.rejected;
+    totals.impacts += taken.impact ? 1 : 0;
+    totals.most_contacts = std::max(totals.most_contacts, record_.contacts);
+    totals.newton_iterations += record_.newton_iterations;
+    totals.solver_iterations += record_.solver_iterations;
+    totals.plugin_solves += effort.plugin_solves;
+    totals.resting_parts += effort.resting_parts;
+    totals.solver_seconds += effort.seconds;
+    totals.seconds += record_.seconds;
+    if (!report.solved) {
+        ++totals.unsolved_steps;
+        if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
+    }
+    return record_;
+}
+
+std::vector<ContactForce> Simulation::contact_forces() const {
+    const MultibodySystem& mechanics = *system_->system;
+    std::vector<ContactForce> forces;
+    for (const ContactPoint& contact : mechanics.contacts()) {
+        Eigen::Vector3d normal(contact.normal.data()), first, second;
+        tangents(normal, first, second);  // the directions of the contact's rows
+        const auto [n, t, s] = timestepper_->reaction(MultibodySystem::contact_key(contact));
+        const Eigen::Vector3d force = n * normal + t * first + s * second;
+        forces.push_back({mechanics.contact_bodies(contact), {force[0], force[1], force[2]}});
+    }
+    return forces;
+}
+
+std::vector<std::string> Simulation::warnings() const {
+    /// Of what can have moved: a growth that a plot would show.
+    constexpr double visible_share = 0.05;
+    std::vector<std::string> sentences;
+    if (const auto& totals = now_.totals; totals.growth_share > visible_share)
+        sentences.push_back(
+            fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
+                        "moved, though nothing supplies any: the steps are long for {}",
+                        system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    return sentences;
+}
+
+SimulationState Simulation::save() const {
+    SimulationState result = now_;
+    result.memory = timestepper_->save();
+    if (control_) result.control = control_->save();
+    if (sleeping_) result.sleeping = sleeping_->save();
+    return result;
+}
+
+void Simulation::load(SimulationState state) {
+    if (state.state.q.size() != now_.state.q.size() || state.state.v.size() != now_.state.v.size())
+        throw InputError(fmt::format(
+            "the checkpoint of system \"{}\" has {} positions and {} velocities; the system "
+            "has {} and {}",
+            system_->name, state.state.q.size(), state.state.v.size(), now_.state.q.size(), now_.state.v.size()));
+    timestepper_->restart();
+    timestepper_->load(state.memory);
+    if (control_) control_->load(state.control);
+    if (sleeping_) sleeping_->load(state.sleeping);
+    now_ = std::move(state);
+    now_.memory.clear();
+    now_.control.clear();
+    now_.sleeping.clear();
+    record_ = {};
+    measure(now_.state, now_.step);
+}
+
+}  // namespace delassus

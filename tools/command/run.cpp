@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// delassus run: a scene, step by step.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "command.hpp"
+#include "delassus/error.hpp"
+#include "delassus/scene_schema.hpp"
+#include "delassus/simulation.hpp"
+#include "output/run_folder.hpp"
+#include "output/run_report.hpp"
+#include "process/stdout_guard.hpp"
+#include "process/supervision.hpp"
+#include "scene_arguments.hpp"
+#include "simulation/run_loop.hpp"
+#include "support/text_file.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct RunArguments {
+    SceneArguments scene;
+    std::filesystem::path output, resume;
+    std::int64_t every = 1, dump = 0;
+    bool contact_forces = false, json = false;
+};
+
+double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// A line on a terminal that says how far a run is and when it will be done; nothing where there is no terminal.
+class Progress {
+public:
+    explicit Progress(const std::vector<Simulation>& simulations)
+        : simulations_(simulations), terminal_(isatty(STDERR_FILENO) != 0), start_(done()) {}
+
+    void show() {
+        if (!terminal_ || seconds_since(shown_) < 0.1) return;
+        shown_ = Clock::now();
+        const double all = total(), now = done(), part = all > 0.0 ? now / all : 1.0;
+        std::int64_t steps = 0;
+        for (const auto& simulation : simulations_) steps += simulation.record().step;
+        const double rate = (now - start_) / seconds_since(begin_);
+        const std::string left = rate > 0.0 ? fmt::format("{:.0f} s left", (all - now) / rate) : std::string();
+        const auto& first = simulations_[0];
+        const std::string size = first.system().control ? fmt::format(" of {:.1e} s", first.record().h) : std::string();
+        fmt::print(stderr, "\r  {:3.0f} %  t = {:.4g} s  {} steps{}  {} contacts  {:12}", 100.0 * part,
+                   simulations_[0].state().t, steps, size, simulations_[0].record().contacts, left);
+        written_ = true;
+    }
+    void clear() {
+        if (written_) fmt::print(stderr, "\r{:78}\r", "");
+    }
+
+private:
+    [[nodiscard]] double total() const {
+        double sum = 0.0;
+        for (const auto& simulation : simulations_) sum += simulation.system().end;
+        return sum;
+    }
+    [[nodiscard]] double done() const {
+        double sum = 0.0;
+        for (const auto& simulation : simulations_) sum += simulation.state().t;
+        return sum;
+    }
+
+    const std::vector<Simulation>& simulations_;
+    bool terminal_, written_ = false;
+    double start_;
+    Clock::time_point begin_ = Clock::now(), shown_ = begin_;
+};
+
+struct Run {
+    RunOutcome outcome;
+    int exit_code = exit_solved;
+};
+
+int exit_code_of(RunStatus status) {
+    if (status == RunStatus::Finished) return exit_solved;
+    return status == RunStatus::Unsupported ? exit_unsupported : exit_not_converged;
+}
+
+/// Steps until the end, an interrupt or a failure.
+Run advance(std::vector<Simulation>& simulations, RunFolder* folder) {
+    const auto begin = Clock::now();
+    Progress progress(simulations);
+    const auto stepped = [&](std::size_t system) {
+        if (folder != nullptr) folder->add_step(system);
+        progress.show();
+    };
+    const RunResult result = run_to_end(simulations, {stepped, interrupted});
+    progress.clear();
+    Run run{{"finished", result.message, seconds_since(begin)}, exit_code_of(result.status)};
+    if (result.status == RunStatus::Unsolved) {
+        run.outcome.status = "unsolved";
+    } else if (result.status == RunStatus::Interrupted) {
+        run.outcome.status = "interrupted";
+        run.outcome.message =
+            fmt::format("stopped at t = {:.9g} s; --resume goes on from there", reached_time(simulations));
+    } else if (result.status != RunStatus::Finished) {
+        run.outcome.status = "failed";
+    }
+    return run;
+}
+
+void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outcome) {
+    for (auto& simulation : simulations) {
+        const auto& system = simulation.system();
+        const auto& totals = simulation.totals();
+        fmt::print("{}: {} steps of {} to t = {:.6g} s in {:.3g} s\n", system.name, simulation.record().step,
+                   system.integrator, simulation.state().t, totals.seconds);
+        if (system.control)
+            fmt::print("  steps from {:.2e} to {:.2e} s, {} trials rejected, {} impacts\n", totals.smallest_step,
+                       totals.largest_step, totals.rejected, totals.impacts);
+        if (std::isfinite(totals.energy))
+            fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
+        fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
+                   totals.worst_penetration, totals.most_contacts);
+        if (system.sleeping)
+            fmt::print("  sleeping: {} bodies and nodes at the end; {} parts of problems left out\n",
+                       simulation.record().sleeping, totals.resting_parts);
+        if (totals.worst_linearization > 0.0)
+            fmt::print("  worst linearisation error {:.1e}\n", totals.worst_linearization);
+        if (totals.plugin_solves == 0) {
+            fmt::print("  no solver was needed\n");
+        } else {
+            fmt::print("  {}: {} solves, {} iterations, {:.3g} s, worst natural error {:.1e}\n",
+                       fmt::join(simulation.solver().loaded(), ", "), totals.plugin_solves, totals.solver_iterations,
+                       totals.solver_seconds, totals.worst_natural);
+        }
+    }
+    if (outcome.status != "finished") fmt::print("{}\n", outcome.status);
+}
+
+int run(const RunArguments& arguments) {
+    if (arguments.every < 1) throw InputError("--every must be at least 1");
+    if (arguments.dump < 0) throw InputError("--dump-problems must be at least 1");
+    const bool resume = !arguments.resume.empty();
+    if (resume && !arguments.output.empty() && arguments.output != arguments.resume)
+        throw InputError("--resume goes on in its own folder; leave out -o");
+    if (arguments.dump > 0 && arguments.output.empty() && !resume)
+        throw InputError("--dump-problems writes into the folder of -o; give one");
+    if (arguments.contact_forces && arguments.output.empty() && !resume)
+        throw InputError("--contact-forces writes into the folder of -o; give one");
+
+    Scene scene = read(arguments.scene);
+    const Registry registry(absolute(arguments.scene.plugin_path));
+    std::vector<Simulation> simulations;
+    simulations.reserve(scene.systems.size());
+    for (auto& system : scene.systems) simulations.emplace_back(system, registry);
+
+    std::unique_ptr<RunFolder> folder;
+    if (resume) {
+        folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every);
+        if (arguments.contact_forces && !folder->contact_forces())
+            throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
+                                         arguments.resume.string()));
+    } else if (!arguments.output.empty()) {
+        folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
+                                             arguments.every, arguments.contact_forces);
+    }
+    if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
+
+    install_interrupt_handler();
+    for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
+    install_crash_handler("a solver plugin", exit_not_converged);
+    StdoutGuard guard;
+    const Run result = advance(simulations, folder.get());
+    if (const auto bytes = guard.release())
+        fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
+
+    const std::string report =
+        run_report_json(arguments.scene.file.filename().string(), scene, simulations, result.outcome);
+    if (folder) {
+        folder->checkpoint();
+        folder->write_report(report);
+    }
+    if (arguments.json) {
+        fmt::print("{}", report);
+    } else {
+        print_summary(simulations, result.outcome);
+    }
+    for (const auto& simulation : simulations)
+        for (const auto& warning : simulation.warnings()) fmt::print(stderr, "delassus: {}\n", warning);
+    if (!result.outcome.message.empty()) fmt::print(stderr, "delassus: {}\n", result.outcome.message);
+    return result.exit_code;
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Action& action) {
+    auto arguments = std::make_shared<RunArguments>();
+    auto* command = program.add_subcommand("run", "Simulate a scene");
+    add_scene_arguments(*command, arguments->scene);
+    command->add_option("-o,--output", arguments->output, "Folder for trajectory.h5, VTK files, checkpoint, report")
+        ->type_name("DIR");
+    command->add_option("--every", arguments->every, "Write the state of every N-th step [1]")->type_name("N");
+    command->add_flag("--contact-forces", arguments->contact_forces,
+                      "Write the bodies and the force of each contact with the state");
+    command->add_option("--dump-problems", arguments->dump, "Write the problem of every N-th step as a problem folder")
+        ->type_name("N");
+    command->add_option("--resume", arguments->resume, "Go on with the run in this folder")->type_name("DIR");
+    command->add_flag("--json", arguments->json, "Print the report as JSON");
+    command
+        ->add_flag_callback(
+            "--schema",
+            [] {
+                fmt::print("{}", scene_schema());
+                throw CLI::Success();
+            },
+            "Print the JSON Schema of scene files")
+        ->trigger_on_parse();
+    command->callback([arguments, &action] { action.run = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace delassus::command
