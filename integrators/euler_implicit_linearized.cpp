@@ -19,11 +19,11 @@ namespace {
 //     (M + h R + h² K) v⁺ − Dᵀ λ = (M + h R) v + h f(q, v, t⁺)
 //
 // It is consistent for any R and K, so that their symmetric parts do. The reactions turn with the bodies as well: with
-// those of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so H also has h² G.
-// It is what holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the pull P
-// at the arm l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1 on. Of G
-// only that part is taken that a step does not bear explicitly and that keeps H definite for every solver; what is left
-// out is of the order of the method's own error.
+// those of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so H also has h² G. G
+// holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the pull P at the arm
+// l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1 on. Only that part
+// of G is taken that a step cannot bear explicitly and that keeps H definite for every solver; the rest is of the order
+// of the method's own error.
 //
 // Constraints at the end of the step, again to first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows
 // with b = C(q, t⁺)/h. The part C(q, t)/h of it is error of earlier steps; it is recovered with at most the speed η_s
@@ -68,7 +68,7 @@ public:
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
-        // H and a are looked at once more where the linearisation is judged; else the problem changes hands.
+        // H and a are needed again if the linearisation is judged; otherwise the solver takes the problem's arrays.
         report.solved = linearization_.wanted() ? solver.solve(problem_, solution_, true)
                                                 : solver.solve(std::move(problem_), solution_, true);
         if (!report.solved) report.message = solver.effort().unsolved;
@@ -147,7 +147,7 @@ private:
         std::uint64_t key;
         std::int32_t first, rows;
     };
-    /// What tells whether a unilateral block had an impact in this step.
+    /// What decides whether a unilateral block had an impact in this step.
     struct Approach {
         double gap, speed;  ///< gap ≥ 0; the speed of closing
         bool along_normal, pushed_before;
@@ -213,9 +213,9 @@ private:
         D_.finish_into(problem_.D);
     }
 
-    // One walk over the blocks: their cones, b, the impulses they had in the last step as a start, and what is asked of
-    // them after the solve. Blocks come by ascending keys as a rule, as they are kept: then each search for the last
-    // impulses begins where the last one ended.
+    // One walk over the blocks collects their cones, b, their impulses of the last step as a start, and what is needed
+    // of them after the solve. Blocks usually come by ascending keys, the order in which impulses are kept: then each
+    // search for the last impulses begins where the one before ended.
     void assemble_unilateral(double h) {
         rows_.move_into(problem_.D);
         problem_.cones.resize(blocks_.size() + rows_.blocks().size());

@@ -21,7 +21,7 @@ constexpr delassus_option options[] = {
     choice_option("form", "auto", forms,
                   "what is factored: H + rho D'D or N + 1/rho; auto: the latter for n = 0 and for few rows"),
     integer_option("stall_iterations", "20000", 0, 1e9, "iterations",
-                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+                   "give up after this many iterations without an improvement by 1 %; 0: never"),
 };
 
 constexpr delassus::sdk::PluginInfo info{

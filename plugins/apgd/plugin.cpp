@@ -12,9 +12,10 @@ constexpr delassus_option options[] = {
     real_option("step_shrinkage", "0.9", 0.1, 0.999, "", "largest factor by which backtracking cuts the step"),
     boolean_option("restart", true, "drop the momentum where it points uphill"),
     integer_option("stall_iterations", "100000", 0, 1e9, "iterations",
-                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+                   "give up after this many iterations without an improvement by 1 %; 0: never"),
     integer_option("threads", "1", 1, 1024, "threads",
-                   "that work together; at most as many as there are processors, and the answer does not depend on it"),
+                   "threads that share the work, at most as many as there are processors; the answer does not depend "
+                   "on their number"),
 };
 
 constexpr delassus::sdk::PluginInfo info{

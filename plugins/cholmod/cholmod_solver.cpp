@@ -52,7 +52,7 @@ FactorSettings settings_from(const OptionValues& options) {
 
 // Refinement goes on below the tolerance while it pays: a direct solver is used for its last digits.
 constexpr double kAim = 1e-13;
-// The host takes no balance below this for granted.
+// The host accepts any balance below this.
 constexpr double kFloor = 1e-12;
 
 std::string formatted(const char* format, double value) {

@@ -28,12 +28,10 @@ struct FactorSettings {
 /// fixed point. Written for the corrections x − x_k, λ − λ_k that is iterative refinement with this matrix.
 ///
 /// Two forms, equal in exact arithmetic:
-/// - Schur: H̃ = L Lᵀ, Z = L⁻¹ P D̃ᵀ, then N + δ1 = Zᵀ Z + Ẽ + δ1 by Cholesky; ρ = 0, H definite. Sparse where each row
-/// of
-///   D couples few others through H.
+/// - Schur: H̃ = L Lᵀ, Z = L⁻¹ P D̃ᵀ, then N + δ1 = Zᵀ Z + Ẽ + δ1 by Cholesky; ρ = 0, H definite. Sparse where each
+///   row of D couples few others through H.
 /// - quasi-definite: L Δ Lᵀ of [H̃ + ρ1, D̃ᵀ; D̃, −(Ẽ + δ1)], which exists for every symmetric order of the rows
-/// (Vanderbei
-///   1995). Sparse where H⁻¹ is not, and for a semidefinite H.
+///   (Vanderbei 1995). Sparse where H⁻¹ is not, and for a semidefinite H.
 class ShiftedFactor {
 public:
     explicit ShiftedFactor(const FactorSettings& settings) : settings_(settings) {}

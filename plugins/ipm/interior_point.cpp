@@ -13,8 +13,8 @@ namespace {
 // ‖S r‖ = 1 in scaled units: a solution this much larger than the data is none.
 constexpr double largest_solution = 1e9;
 
-// Relative residuals of linear solves: the predictor only foretells a step, and what the corrector leaves of the
-// equations is in the residuals of the next iteration.
+// Relative residuals of linear solves: the predictor is only a forecast, and the residuals of the next iteration
+// contain what the corrector leaves of the equations.
 constexpr double predictor_residual = 1e-3;
 constexpr double corrector_residual = 1e-9;
 
@@ -77,7 +77,7 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
 
 bool InteriorPoint::judge(const sdk::ProblemView& problem, sdk::Monitor& monitor, std::int64_t iteration) {
     const Scaling::Error error = scaling_.measure(problem, true_x_, true_lambda_);
-    // The host takes no balance below 1e-12 for granted.
+    // The host accepts any balance below 1e-12.
     const double worst = error.balance > 1e-12 ? std::max(error.natural, error.balance) : error.natural;
     if (!(worst >= monitor.best_residual())) best_x_ = true_x_;
     return monitor.check(iteration, scaling_.definite() ? nullptr : true_x_.data(), true_lambda_, worst);

@@ -18,7 +18,7 @@ constexpr delassus_option options[] = {
                 "static regularisation of the rows, relative to the diagonal of N; refinement removes its effect"),
     integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
     integer_option("stall_iterations", "15", 0, 1e9, "iterations",
-                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+                   "give up after this many iterations without an improvement by 1 %; 0: never"),
 };
 
 constexpr delassus::sdk::PluginInfo info{

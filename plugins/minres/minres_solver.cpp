@@ -26,7 +26,7 @@ constexpr delassus_option kOptions[] = {
     delassus::sdk::choice_option("schur", "auto", kSchurChoices,
                                  "preconditioner of the rows; auto: incomplete_cholesky, or blocks where N is dense"),
     delassus::sdk::integer_option("stall_window", "20000", 10, 1e9, "iterations",
-                                  "so many without an improvement by one part in a hundred end the solve as stalled"),
+                                  "the solve ends as stalled after this many iterations without an improvement by 1 %"),
     delassus::sdk::integer_option("restarts", "50", 0, 1e6, "",
                                   "largest number of restarts from the true residual, after rounding has spoilt it"),
 };
@@ -94,7 +94,7 @@ double balance(const ProblemView& problem, const Pair& v, const Pair& residual) 
 
 // Below the tolerance, so that rounding in the host's own measurement does not turn a true claim into a false one.
 constexpr double kAim = 0.9;
-// The host takes no balance below this for granted.
+// The host accepts any balance below this.
 constexpr double kFloor = 1e-12;
 // ‖K y‖ ≤ this · ‖y‖ counts as zero, in norms where K has the size 1.
 constexpr double kNull = 1e-9;
@@ -214,7 +214,7 @@ private:
             without_gain = error < 0.5 * milestone ? 0 : without_gain + 1;
             milestone = std::min(milestone, error);
             if (without_gain >= 4 || run.restarts > restarts_) return DELASSUS_STALLED;
-            if (error > 10.0 * milestone) {  // rounding has taken over: start again from where it had not
+            if (error > 10.0 * milestone) {  // rounding has taken over: start again from the true residual
                 run.iterate = run.best;
                 run.lambda = -run.iterate.y;
                 residual = true_residual(run.problem, run.iterate);

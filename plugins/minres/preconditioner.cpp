@@ -17,7 +17,7 @@ namespace {
 
 // Products in D H⁻¹ Dᵀ up to which `auto` forms N: beyond, N is dense or nearly so.
 constexpr double kLargestProduct = 5e7;
-// Eigenvalues of a block N_cc below this share of the largest are taken for it: Ŝ must be definite.
+// Eigenvalues of a block N_cc below this share of the largest are raised to it: Ŝ must be definite.
 constexpr double kBlockFloor = 1e-10;
 // Where a pivot vanishes, because N is singular or of what is left out, the factorisation is tried again with N +
 // shift·1. Eigen doubles the shift ten times; then the next of these comes.

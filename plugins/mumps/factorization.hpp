@@ -40,8 +40,8 @@ public:
     /// JOB = 1. C: the scaling, n + m. Chooses LDLᵀ, or LU for an unsymmetric H. Size n + m must not be 0.
     void analyze(const sdk::ProblemView& problem, const sdk::Vector& C);
 
-    /// JOB = 2, of the matrix with the shift on its diagonal (see visit_saddle_point). More memory is given by itself
-    /// where MUMPS asks for it.
+    /// JOB = 2, of the matrix with the shift on its diagonal (see visit_saddle_point). If MUMPS asks for more memory,
+    /// it gets it.
     void factorize(const sdk::ProblemView& problem, const sdk::Vector& C, double shift);
 
     /// JOB = 3: v ← (C K C)⁻¹ v, on every process. transposed: the inverse of the transpose.

@@ -24,13 +24,14 @@ constexpr delassus_option options[] = {
     real_option("pivot_threshold", "0.01", 0.0, 0.5, "", "relative threshold of numerical pivoting; larger is safer"),
     real_option("null_pivot_threshold", "1e-14", 0.0, 1e-3, "",
                 "a pivot of the scaled matrix below it marks a redundant row"),
-    choice_option("redundant_rows", "automatic", redundancies,
-                  "tried first, the other follows if it fails; null_pivots: found while factoring; shift: a shifted "
-                  "matrix and more refinement, quicker for many dependent rows; automatic: shift if m > n > 0"),
+    choice_option(
+        "redundant_rows", "automatic", redundancies,
+        "the way that is tried first, before the other one; null_pivots: rows are found while factoring; shift: a "
+        "shifted matrix and more refinement, faster for many dependent rows; automatic: shift if m > n > 0"),
     integer_option("memory_relaxation", "30", 0, 10000, "%", "working memory above the estimate; grows by itself"),
     integer_option("refinement_steps", "2", 0, 100, "", "iterative refinement inside MUMPS at every solve"),
     choice_option("error_analysis", "backward", analyses_of_error,
-                  "MUMPS' error analysis, told in the message; full adds condition numbers"),
+                  "MUMPS' error analysis, reported in the message; full adds condition numbers"),
 };
 
 Settings settings_of(const OptionValues& values) {

@@ -25,7 +25,7 @@ public:
     /// Removes everything and enters the plugin's own choices; the user's come last and win.
     void enter(const std::vector<std::pair<std::string, std::string>>& own);
 
-    /// The user's options that nobody has asked for since they were entered.
+    /// The user's options that PETSc has not asked for since they were entered.
     [[nodiscard]] std::vector<std::string> unused() const;
     [[nodiscard]] bool has_user_options() const { return !user_.empty(); }
 

@@ -29,11 +29,12 @@ constexpr delassus_option options[] = {
                   "what preconditions the Schur complement: D diag(H)^-1 D' + E; automatic takes the inverse of small "
                   "blocks exactly; selfp: PETSc's own"),
     integer_option("restart", "50", 1, 10000, "iterations", "length of a cycle of the GMRES family"),
-    integer_option("stall_window", "1000", 0, 1000000, "iterations",
-                   "a residual that falls by less than 1 % within it is a stall; 0: never"),
+    integer_option(
+        "stall_window", "1000", 0, 1000000, "iterations",
+        "the solve ends as stalled if the residual falls by less than 1 % within this many iterations; 0: never"),
     real_option("shift", "1e-10", 0.0, 1e-2, "",
-                "on the diagonal of the scaled preconditioner, never of the operator: keeps it regular where rows are "
-                "redundant"),
+                "shift on the diagonal of the scaled preconditioner, never of the operator; keeps it regular where "
+                "rows are redundant"),
     real_option("inner_tolerance", "1e-8", 0.0, 1.0, "",
                 "reduction of the residual after which it is computed afresh in higher precision"),
     text_option("petsc_options", "", "PETSc's own options without prefix, e.g. -ksp_type gcr -pc_type asm"),

@@ -28,18 +28,19 @@ constexpr delassus_option option_table[] = {
         "local_solver", "diagonal", local_solvers,
         "friction blocks: one projected step of length 1/largest eigenvalue, or the one-contact problem"),
     sdk::real_option("omega", "1.5", 1e-3, 1.999, "", "over- or underrelaxation of the local step"),
-    sdk::choice_option("form", "auto", forms,
-                       "sweep on velocities (H diagonal or of blocks, E diagonal), on rows of N, or what is possible"),
+    sdk::choice_option(
+        "form", "auto", forms,
+        "sweep on velocities (H diagonal or of blocks, E diagonal) or on rows of N; auto: on velocities if possible"),
     sdk::choice_option("ordering", "spaced", orderings,
-                       "of the blocks in a sweep: as in the problem; as in the problem, but for neighbours a little "
-                       "apart; by colours that share no body"),
+                       "order of the blocks in a sweep: as in the problem; as in the problem, with neighbours kept a "
+                       "little apart; by colours that share no body"),
     sdk::integer_option("threads", "1", 1, 1024, "threads",
-                        "that sweep together (ordering = coloured); at most as many as there are processors, and the "
-                        "answer does not depend on it"),
+                        "threads that share a sweep (needs ordering = coloured), at most as many as there are "
+                        "processors; the answer does not depend on their number"),
     sdk::integer_option("check_every", "0", 0, 1e9, "iterations",
-                        "between measurements of the natural error; 0: every 5 % of the iterations done"),
+                        "iterations between measurements of the natural error; 0: every 5 % of the iterations done"),
     sdk::integer_option("stall_window", "1000000", 0, 1e15, "iterations",
-                        "without a gain of 1 % that count as a stall; 0: never"),
+                        "the solve ends as stalled after this many iterations without a gain of 1 %; 0: never"),
 };
 
 class Pgs : public sdk::Solver {

@@ -3,12 +3,12 @@
 //
 // Two blocks that share a velocity must wait for one another: the second reads what the first has just written, and a
 // visit is a chain of some twenty dependent operations, a square root and a division among them. In the order in which
-// contacts are found neighbours share a body as a rule, and most of a sweep is waiting.
+// contacts are found, neighbours usually share a body, and most of a sweep is waiting.
 //   given     as in the problem;
 //   spaced    as given, but a block that shares a velocity with one of the last few visited waits until others have
 //             come in between, so that the visits overlap in the processor;
 //   coloured  blocks of one colour share no velocity, and one colour follows another: the blocks of a colour may be
-//             visited at the same time, and the result does not depend on who visits them.
+//             visited at the same time, and the result does not depend on the thread that visits them.
 #pragma once
 
 #include <algorithm>

@@ -2,10 +2,9 @@
 // A problem in the form that Siconos takes: velocity = M reaction + q with three rows a contact, normal first.
 //
 // M = P N P and q = P r with one scalar p_c a contact, that of the natural error (or 1): then Siconos' own error is
-// free of units, and differs from the natural one in its divisor alone. What has fewer rows than three is embedded: a
-// frictionless row is a contact with μ = 0, a planar contact one with a third row of its own, and the rows that are
-// added have a one on the diagonal of M and zeros else, so that their reactions and velocities are zero at the
-// solution.
+// free of units, and differs from the natural one in its divisor alone. Blocks with fewer than three rows are embedded:
+// a frictionless row becomes a contact with μ = 0, a planar contact gets a third row. The added rows have a one on the
+// diagonal of M and zeros elsewhere, so that their reactions and velocities are zero at the solution.
 #pragma once
 
 #include <memory>

@@ -49,16 +49,16 @@ constexpr const char* local_solvers[] = {"hybrid", "newton", "projection"};
 
 constexpr delassus_option options[] = {
     choice_option("method", "nsgs", method_names, "Siconos' solver of the friction problem"),
-    choice_option("local_solver", "hybrid", local_solvers, "of one contact, for nsgs"),
+    choice_option("local_solver", "hybrid", local_solvers, "solver of one contact, for nsgs"),
     boolean_option("scaling", true, "scale each contact by one scalar, so that units do not matter; false: as given"),
     integer_option("stall_iterations", "20000", 0, 1e9, "iterations",
-                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+                   "give up after this many iterations without an improvement by 1 %; 0: never"),
 };
 
 constexpr PluginInfo info{
     .name = "siconos",
     .version = "0.1.0",
-    .description = "the solvers of Siconos Numerics for friction, to compare with",
+    .description = "the solvers of Siconos Numerics for friction, for comparison",
     .licence = "BSD-3-Clause AND Apache-2.0",
     .capabilities = DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_FRICTION | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL |
                     DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE |

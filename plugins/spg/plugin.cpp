@@ -17,9 +17,10 @@ constexpr delassus_option options[] = {
     boolean_option("tangential", true, "form the short step from the part of the change that lies in the face"),
     boolean_option("face_steps", true, "now and then take a conjugate gradient step on the identified face"),
     integer_option("stall_iterations", "100000", 0, 1e9, "iterations",
-                   "give up after so many without an improvement by one part in a hundred; 0 = never"),
+                   "give up after this many iterations without an improvement by 1 %; 0: never"),
     integer_option("threads", "1", 1, 1024, "threads",
-                   "that work together; at most as many as there are processors, and the answer does not depend on it"),
+                   "threads that share the work, at most as many as there are processors; the answer does not depend "
+                   "on their number"),
 };
 
 constexpr delassus::sdk::PluginInfo info{

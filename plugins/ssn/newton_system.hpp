@@ -4,8 +4,7 @@
 //     (A N B + M) δ_B = g,      N = D H⁻¹ Dᵀ + E  (scaled),
 //
 // in one of two forms that are equal in exact arithmetic:
-// - rows: N is formed, and the matrix has a row for each active direction of each contact; the others, inactive, are
-// rows
+// - rows: N is formed, and the matrix has a row for each active direction of each contact; the inactive ones are rows
 //   of the identity, so that one pattern serves every step;
 // - velocities: with v = H⁻¹Dᵀ B δ_B,
 //       (H + Dᵀ Q D) v = Dᵀ B M⁻¹ g,   δ_B = M⁻¹ (g − A D v),   Q = B M⁻¹ A,  M ← M + A E B,

@@ -137,7 +137,7 @@ SemismoothNewton::Result SemismoothNewton::proximal_step(sdk::ScaledRun& run) {
 }
 
 // The solutions of the subproblems follow dλ/ds = −(velocities that are still wrong), s = Σ 1/τ: the last step,
-// stretched to the new τ, foretells the next one. Taken if it is better than the centre.
+// stretched to the new τ, predicts the next one. It is used if it is better than the centre.
 void SemismoothNewton::start_subproblem(const Proximal& measure) {
     if (!(previous_tau_ > 0.0)) return;
     const double at_centre = merit(lambda_, velocity_, measure);

@@ -12,9 +12,10 @@ constexpr const char* forms[] = {"auto", "rows", "velocities"};
 constexpr delassus_option options[] = {
     choice_option("form", "auto", forms,
                   "unknowns of the Newton system; auto: velocities where they are fewer than rows"),
-    boolean_option("follow_law", true, "where exact Coulomb stalls, come from the associated law's solution"),
+    boolean_option("follow_law", true,
+                   "where exact Coulomb stalls, start from the associated law's solution and follow it"),
     integer_option("stall_iterations", "300", 0, 1e9, "iterations",
-                   "give up after so many that did not lower the error by a tenth; 0 = never"),
+                   "give up after this many iterations that did not lower the error by a tenth; 0: never"),
 };
 
 constexpr delassus::sdk::PluginInfo info{

@@ -222,7 +222,7 @@ TEST(Breakdowns, StandInTheSummary) {
               std::string::npos)
         << text;
     EXPECT_NE(text.find("does not"), std::string::npos);
-    EXPECT_NE(text.find("Refuse it from the start: other."), std::string::npos) << text;
+    EXPECT_NE(text.find("Refused from the start by: other."), std::string::npos) << text;
     EXPECT_TRUE(bench::axes_markdown({}).empty());
 }
 

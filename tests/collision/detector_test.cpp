@@ -32,7 +32,7 @@ TEST(CollisionSetup, BadOnesAreRefused) {
     Shape tilted = shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 0);
     tilted.pose.orientation = {0.0, 0.0, 0.0, 0.0};
     EXPECT_TRUE(has(one(tilted), "quaternion"));
-    EXPECT_TRUE(has(refusal({{}, {false}, {{0, 1}}}), "pair of bodies"));
+    EXPECT_TRUE(has(refusal({{}, {false}, {{0, 1}}}), "of bodies that never touch"));
     EXPECT_TRUE(has(refusal({{}, {false, false}, {}, {0}}), "groups for 1 bodies of 2"));
 
     Mesh mesh = *box_mesh(1.0, 1.0, 1.0);

@@ -99,7 +99,7 @@ TEST_F(View, ShowsWhatThereIsOfARunThatFailed) {
     const auto folder = run_of("pendulum", "--integrator 'euler_implicit(max_newton_iterations=1)'");
     const auto failed = run_command("view " + folder.string());
     EXPECT_EQ(failed.exit_code, 0) << failed.err;
-    EXPECT_NE(failed.out.find("the run is failed; this is what is there"), std::string::npos) << failed.out;
+    EXPECT_NE(failed.out.find("the run is failed; the page shows what is there"), std::string::npos) << failed.out;
     fs::remove(folder / "report.json");  // as while it goes on
     const auto unfinished = run_command("view " + folder.string());
     EXPECT_EQ(unfinished.exit_code, 0) << unfinished.err;
@@ -113,7 +113,7 @@ TEST_F(View, BadInputIsExplained) {
         EXPECT_EQ(result.exit_code, 2);
         EXPECT_NE(result.err.find(sentence), std::string::npos) << result.err;
     };
-    refused("nowhere", "nowhere is no folder; give the one that `delassus run SCENE -o DIR` wrote");
+    refused("nowhere", "nowhere is not a folder; give the one that `delassus run SCENE -o DIR` wrote");
     refused(scratch.path().string(), "holds no trajectory.h5");
     const auto folder = run_of("pendulum", "--end 0.01");
     refused(folder.string() + " --frames 1", "--frames must be at least 2");
@@ -124,7 +124,7 @@ TEST_F(View, BadInputIsExplained) {
     EXPECT_EQ(text_of(folder / "scene.html"), "earlier");
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 7);
     std::ofstream(folder / "report.json") << "{}";
-    refused(folder.string(), "is no report of a run");
+    refused(folder.string(), "is not the report of a run");
     EXPECT_EQ(run_command("view").exit_code, 2);
     EXPECT_EQ(run_command("view --help").exit_code, 0);
 }

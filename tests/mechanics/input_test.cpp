@@ -58,7 +58,7 @@ TEST(Refusals, OfBodies) {
         body.pose.position[1] = nan;
         system.add_body(body);
     });
-    expect_refused("is no quaternion of a positive length", [](auto& system) {
+    expect_refused("is not a quaternion of positive length", [](auto& system) {
         auto body = good("c");
         body.pose.orientation = {0.0, 0.0, 0.0, 0.0};
         system.add_body(body);
@@ -108,7 +108,7 @@ TEST(Refusals, OfJoints) {
         system.add_joint(parameters);
     });
     expect_refused("must join two revolute joints", [&](auto& system) { system.add_joint(joint(JointKind::Gear)); });
-    expect_refused("is no fraction of whole numbers below 1000", [&](auto& system) {
+    expect_refused("is not a fraction of whole numbers below 1000", [&](auto& system) {
         auto parameters = joint(JointKind::Gear);
         auto hinge = joint(JointKind::Revolute);
         parameters.gear_first = system.add_joint(hinge);

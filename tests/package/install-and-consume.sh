@@ -4,8 +4,7 @@
 set -euo pipefail
 build=$(realpath "$1")
 source=$(realpath "$2")
-scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
+. "$(dirname "$0")/common.sh"
 prefix=$scratch/prefix
 
 cmake --install "$build" --prefix "$prefix" >/dev/null
@@ -20,7 +19,6 @@ grep -q "$prefix.*quick.yaml" "$scratch/suites"
 
 # Only what is installed may be used from here on.
 cp -r "$source/examples/plugin" "$source/examples/embed" "$source/examples/system" "$source/examples/problems/box_stack" "$scratch"
-flags=${CONSUMER_FLAGS:-}
 cmake -S "$scratch/plugin" -B "$scratch/plugin/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
 cmake --build "$scratch/plugin/build"
 test -s "$scratch/plugin/build/uzawa.json"

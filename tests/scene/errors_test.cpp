@@ -131,7 +131,7 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 4: a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
              "\"plane\", \"convex\", \"mesh\""},
         Case{"PlaneMoves", head + "bodies:\n  - {name: b, mass: 1, shapes: [{plane: {}}]}\n",
-             "s.yaml, line 4: a plane has no volume, so that no mass and no inertia follow from it"}),
+             "s.yaml, line 4: a plane has no volume, so mass and inertia cannot follow from it"}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
 
 TEST(BadSceneFile, EndsTheCommandWithCodeTwoAndOneSentence) {

@@ -149,7 +149,7 @@ TEST(FlexibleScene, WrongBeamsAreToldInOneSentence) {
         "s.yaml, line 7: beam \"b\" has the key \"density\", which is for beams that make their bodies; \"bodies\" "
         "are there");
     EXPECT_EQ(refusal(bodies + "  - {name: b, bodies: [a], section: {circle: 0.01}}\n"),
-              "s.yaml, line 7: \"bodies\" must name two bodies at least");
+              "s.yaml, line 7: \"bodies\" must name at least two bodies");
 }
 
 TEST(FlexibleScene, WrongMeshesAreToldInOneSentence) {

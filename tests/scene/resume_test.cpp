@@ -83,7 +83,7 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
     };
     EXPECT_EQ(told("{"), "the checkpoint is damaged");
     EXPECT_EQ(told("{\"format\": \"x\", \"version\": 1}"),
-              "the checkpoint cannot be used: it is no checkpoint of Delassus");
+              "the checkpoint cannot be used: it is not a checkpoint of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 1}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 2, \"scene\": \"\", \"contact_forces\": false, "

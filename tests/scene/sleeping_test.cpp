@@ -275,12 +275,12 @@ std::string refusal(const std::string& yaml, const std::string& integrator = "")
 TEST(Sleeping, RefusesWhatCannotSleep) {
     EXPECT_EQ(
         refusal(pendulum, "trapezoidal"),
-        "system \"main\": trapezoidal cannot leave out bodies that sleep. Can: euler_implicit_linearized; or leave "
-        "out \"sleeping\"");
+        "system \"main\": trapezoidal cannot leave out bodies that sleep. Can: euler_implicit_linearized; or remove "
+        "\"sleeping\"");
     std::string adaptive = pendulum;
     adaptive.replace(adaptive.find("step: 0.002"), 11, "tolerance: 0.01");
     EXPECT_EQ(refusal(adaptive),
-              "system \"main\": bodies may sleep with a fixed step only; give a \"step\", no \"tolerance\"");
+              "system \"main\": bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
     std::string negative = pendulum;
     negative.replace(negative.find("1.0e-2"), 6, "-1");
     EXPECT_NE(refusal(negative).find("test, line 4: \"speed\" is -1"), std::string::npos) << refusal(negative);

@@ -89,7 +89,7 @@ void judge_end(std::string& status, std::string& message, const ChildResult& chi
     } else if (child.timed_out) {
         ended = "hung";
         sentence = complete ? "did not end after its last run and was killed"
-                            : fmt::format("gave no sign for {:.3g} s (time limit and grace){}; killed",
+                            : fmt::format("did not react for {:.3g} s (time limit and grace){}; killed",
                                           time_limit + grace_of(time_limit), where);
     } else if (child.cancelled) {
         if (!status.empty()) return;

@@ -57,7 +57,7 @@ std::string axes_markdown(const ResultSet& results) {
                        cell_text(one.sentence + (again.empty() ? "" : " (correct again at " + again + ")"))});
         }
         text += table.text();
-        if (!refused.empty()) text += fmt::format("\nRefuse it from the start: {}.\n", refused);
+        if (!refused.empty()) text += fmt::format("\nRefused from the start by: {}.\n", refused);
         text += '\n';
     }
     return text;

@@ -138,7 +138,7 @@ Json run_cell(const WorkerSettings& worker, const Suite& suite, const CellTask& 
     try {
         if (is_bounded(bounds, "velocity")) {
             const ProblemFacts facts = describe(worker, request.problem, axis.law);
-            // One that nobody confirms could make a right answer look wrong.
+            // A reference that is not confirmed could make a right answer look wrong.
             const Reference reference =
                 find_reference(worker, suite.references, request.problem, facts, facts.law, cache);
             if (!reference.row.is_null() && reference.row.value("confirmed", false))

@@ -22,7 +22,8 @@ public:
         const std::string text = text_of(line) + "\n";
         for (std::size_t sent = 0; sent < text.size();) {
             const ssize_t written = write(descriptor_, text.data() + sent, text.size() - sent);
-            if (written < 0 && errno != EINTR) throw Error("nobody listens to the worker any more");
+            if (written < 0 && errno != EINTR)
+                throw Error("the process that started the worker no longer reads from it");
             if (written > 0) sent += static_cast<std::size_t>(written);
         }
     }

@@ -21,8 +21,7 @@ void check_comparable(const ResultSet& before, const ResultSet& after, bool any_
         if (!any_machine && a.at("machine").at(what) != b.at("machine").at(what))
             throw InputError(
                 fmt::format("the sets come from different machines ({} {} and {}), so ratios of their times say "
-                            "nothing of a change; "
-                            "--any-machine compares them all the same",
+                            "nothing about a change; --any-machine compares them anyway",
                             what, a.at("machine").at(what).dump(), b.at("machine").at(what).dump()));
     for (const char* what : {"time_limit", "memory_limit", "max_iterations"})
         if (a.at("settings").at(what) != b.at("settings").at(what))

@@ -141,7 +141,7 @@ Reference find_reference(const WorkerSettings& worker, const SuiteReferences& re
         row["confirmed"] = difference <= confirmed_difference;
         row["message"] = difference <= confirmed_difference
                              ? ""
-                             : fmt::format("{} comes to velocities that differ by {:.1e}", second->label, difference);
+                             : fmt::format("{} finds velocities that differ by {:.1e}", second->label, difference);
     } else {
         row["second"] = nullptr;
         row["confirmed"] = false;

@@ -33,7 +33,7 @@ StoredLines read_lines(const fs::path& file) {
                                text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
         if (!row.is_object() || !row.contains("kind"))
             throw InputError(
-                fmt::format("{}, line {}: this is no row of a benchmark's results", file.string(), number));
+                fmt::format("{}, line {}: this is not a row of a benchmark's results", file.string(), number));
         if (row["kind"] == "session" &&
             (row.value("format", "") != rows_format || row.value("version", 0) != rows_version))
             throw InputError(fmt::format("{}, line {}: the format is {} {}; this version reads {} {}", file.string(),

@@ -77,7 +77,7 @@ struct Suite {
 /// line, key and the nearest valid key.
 [[nodiscard]] Suite read_suite(const std::filesystem::path& file, const Registry& registry);
 
-/// Leaves of the suite only the axes of those names. Throws InputError for a name that none has.
+/// Keeps only the named axes. Throws InputError for a name that none has.
 void keep_axes(Suite& suite, const std::vector<std::string>& names);
 
 struct ShippedSuite {

@@ -196,11 +196,11 @@ SuiteAxis read_axis(const Source& source, const YAML::Node& item, const Registry
     if (bounds.IsNull()) source.refuse(item, "an axis needs \"bounds\": without them no answer is correct");
     if (generator.empty() == scene.empty()) source.refuse(item, "an axis has one of \"generate\" and \"scene\"");
     if (generator.empty() && of_problems)
-        source.refuse(item,
-                      "\"solvers\", \"law\" and \"tolerance\" are of problems; a scene has them in itself, and "
-                      "\"step_solvers\"");
+        source.refuse(
+            item,
+            "\"solvers\", \"law\" and \"tolerance\" are keys of problems; a scene has its own, and \"step_solvers\"");
     if (scene.empty() && of_scenes)
-        source.refuse(item, "\"timesteppers\" and \"step_solvers\" are of scenes; problems have \"solvers\"");
+        source.refuse(item, "\"timesteppers\" and \"step_solvers\" are keys of scenes; problems have \"solvers\"");
     read_bounds(source, bounds, axis, generator.empty());
 
     const auto changes = set.IsNull() ? std::vector<Axis>{} : axes_of(source, set, "set");
@@ -213,7 +213,7 @@ SuiteAxis read_axis(const Source& source, const YAML::Node& item, const Registry
         std::map<std::string, std::string> texts;
         for (const auto& [key, choices] : changes) {
             if (choices.size() != 1)
-                source.refuse(set, fmt::format("\"{}\" must be a single value; a vector stands in quotes", key));
+                source.refuse(set, fmt::format("\"{}\" must be a single value; write a vector in quotes", key));
             texts[key] = filled(source, set, choices.front(), value);
         }
         if (!generator.empty()) {

@@ -156,7 +156,7 @@ void read_problem_item(const Source& source, const YAML::Node& item, Suite& suit
         dump.scene.file = file;
         for (const auto& [key, values] : axes) {
             if (values.size() != 1)
-                source.refuse(item, "a scene whose problems are taken has single values in \"set\"");
+                source.refuse(item, "a scene whose problems are used must have single values in \"set\"");
             dump.scene.settings[key] = values.front();
         }
         dump.place = source.at(item);

@@ -77,7 +77,8 @@ std::string class_text(const Json& one) {
     return fmt::format(
         "### {}: {}\n\n{}{}\n",
         class_titles().count(one.at("name")) ? class_titles().at(one.at("name")) : one.at("name").get<std::string>(),
-        problems, table.text(), refused.empty() ? "" : fmt::format("\nTake none of these: {}.\n", refused));
+        problems, table.text(),
+        refused.empty() ? "" : fmt::format("\nSolvers that take none of these problems: {}.\n", refused));
 }
 
 /// The fastest solver of each problem at the tightest tolerance.

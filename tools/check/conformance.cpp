@@ -14,7 +14,7 @@ namespace {
 
 using Verdict = CheckResult::Verdict;
 
-/// After so many checks that did not return, nobody waits for the others.
+/// After this many checks that did not return, the others are skipped.
 constexpr int patience = 3;
 
 std::vector<Check> all_checks() {

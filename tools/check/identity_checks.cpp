@@ -16,7 +16,7 @@ std::string check_descriptor(const Subject& subject) {
     expect(!info.version.empty(), "its version is empty");
     expect(!info.description.empty() && info.description.find('\n') == std::string::npos,
            "its description is not one line");
-    expect(!info.licence.empty(), "its licence is empty: an SPDX expression is asked for");
+    expect(!info.licence.empty(), "its licence is empty; it must be an SPDX expression");
     return fmt::format("{} {}, {}", info.name, info.version, info.licence);
 }
 

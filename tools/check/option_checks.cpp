@@ -70,7 +70,7 @@ std::string check_ranges(const Subject& subject) {
         } catch (const InputError&) {
             outside_is_refused = true;
         }
-        expect(outside_is_refused, fmt::format("\"{}\" took a value below its range", option.key));
+        expect(outside_is_refused, fmt::format("\"{}\" accepted a value below its range", option.key));
     }
     return fmt::format("{} bounds, {} refused with a sentence", tried, refused);
 }
@@ -109,7 +109,7 @@ std::string check_unknown(const Subject& subject) {
     } catch (const InputError& error) {
         return error.what();
     }
-    throw Failure("an option that is not in the table was taken");
+    throw Failure("an option that is not in the table was accepted");
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ std::string check_iterates(const Subject& subject) {
     std::string fault;
     const auto listen = [&](std::int64_t iteration, const double* x, const double* lambda) -> std::int32_t {
         ++calls;
-        if (iteration < last) fault = fmt::format("progress heard iteration {} after {}", iteration, last);
+        if (iteration < last) fault = fmt::format("progress was given iteration {} after {}", iteration, last);
         last = iteration;
         if (!lambda) fault = "progress was given no λ";
         for (std::size_t i = 0; lambda && i < m; ++i)

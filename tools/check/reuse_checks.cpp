@@ -19,12 +19,12 @@ std::string check_warm_start(const Subject& subject) {
         const auto warm = solver.solve(PreparedProblem(known.problem), solution, settings);
         expect_known_solution(known, solution, warm);
         expect(warm.iterations <= cold.iterations,
-               fmt::format("\"{}\" took {} iterations from its solution and {} from nothing", known.problem.name,
+               fmt::format("\"{}\" took {} iterations from its solution and {} from zero", known.problem.name,
                            warm.iterations, cold.iterations));
         cold_sum += cold.iterations;
         warm_sum += warm.iterations;
     }
-    return fmt::format("{} iterations from nothing, {} from the solutions", cold_sum, warm_sum);
+    return fmt::format("{} iterations from zero, {} from the solutions", cold_sum, warm_sum);
 }
 
 std::string check_right_hand_sides(const Subject& subject) {

@@ -116,7 +116,7 @@ void add_bench(CLI::App& program, Action& action) {
     run->add_option("-o,--output", arguments->output,
                     "Folder for results.jsonl, report.html, summary.md and CSV files [delassus-bench-SUITE]")
         ->type_name("DIR");
-    run->add_option("--only", arguments->only, "Run nothing but the axis of this name; may be given again")
+    run->add_option("--only", arguments->only, "Run only the axis of this name; may be given again")
         ->type_name("AXIS")
         ->allow_extra_args(false);
     run->add_option("--cache", arguments->cache, "Folder of reference solutions [~/.cache/delassus/references]")
@@ -133,11 +133,11 @@ void add_bench(CLI::App& program, Action& action) {
         };
     });
 
-    auto* compare = bench->add_subcommand(
-        "compare", "Set the times of two folders of results side by side, as ratios with their spread");
+    auto* compare =
+        bench->add_subcommand("compare", "Compare the times of two folders of results, as ratios with their spread");
     compare->add_option("a", arguments->before, "Results before a change")->required()->type_name("A");
     compare->add_option("b", arguments->after, "Results after it")->required()->type_name("B");
-    compare->add_flag("--any-machine", arguments->any_machine, "Compare results of different machines all the same");
+    compare->add_flag("--any-machine", arguments->any_machine, "Compare results even if their machines differ");
     compare->add_flag("--json", arguments->json, "Print the comparison as JSON");
     compare->callback([arguments, &action] { action.run = [arguments] { return compare_results(*arguments); }; });
 

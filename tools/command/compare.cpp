@@ -136,11 +136,11 @@ void add_compare(CLI::App& program, Action& action) {
     command->add_option("--max-iterations", settings.max_iterations, "Limit of iterations [1e8]")->type_name("N");
     command
         ->add_option("--repeats", settings.repeats,
-                     "Runs to take the least time of; only one where a run takes more than 5 s [3]")
+                     "Timed runs, of which the least time counts; only one if a run takes more than 5 s [3]")
         ->type_name("N");
     command->add_option("--memory-limit", arguments->memory_limit, "Address space of each solver's process [none]")
         ->type_name("MIB");
-    command->add_option("--jobs", arguments->jobs, "How many run at a time; measurements allow 1 only")->type_name("1");
+    command->add_option("--jobs", arguments->jobs, "Number of runs at a time; only 1 is allowed")->type_name("1");
     command->add_option("-o,--output", arguments->output, "Folder for report.html, results.json and results.csv")
         ->capture_default_str()
         ->type_name("DIR");

@@ -27,7 +27,7 @@ int convert(const ConvertArguments& arguments) {
 void add_convert(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<ConvertArguments>();
     auto* command = program.add_subcommand(
-        "convert", "Convert a problem; the form is told by the name: .hdf5 is FCLib, else a folder");
+        "convert", "Convert a problem; the name decides the form: .hdf5 is FCLib, anything else a folder");
     command->add_option("input", arguments->input, "Problem folder or FCLib file")->required()->type_name("IN");
     command->add_option("output", arguments->output, "Problem folder or FCLib file")->required()->type_name("OUT");
     command

@@ -77,7 +77,7 @@ void print(const Problem& problem, const Qualification& found) {
     if (found.free_rank && *found.free_rank < found.free_rows)
         fmt::print("    free rows: rank {} of {}: their reactions have no bound\n", *found.free_rank, found.free_rows);
     if (found.pointed == Answer::Undecided) {
-        fmt::print("    pointed friction cone undecided: no solver got near enough\n");
+        fmt::print("    pointed friction cone undecided: no solver came close enough\n");
     } else if (found.pointed == Answer::Yes && std::isinf(found.pointedness)) {
         fmt::print("    pointed friction cone holds: there are free rows only, and they are independent\n");
     } else if (found.pointed == Answer::Yes) {
@@ -85,7 +85,7 @@ void print(const Problem& problem, const Qualification& found) {
             "    pointed friction cone holds: reactions are bounded (net effect at least {:.2g} of the normals)\n",
             found.pointedness);
     } else if (found.cancelling.empty()) {
-        fmt::print("    pointed friction cone fails by the free rows alone\n");
+        fmt::print("    pointed friction cone fails because of the free rows alone\n");
     } else {
         constexpr std::size_t most = 8;
         const auto blocks = cancelling_blocks(problem, found.cancelling);
@@ -160,7 +160,7 @@ int inspect(const InspectArguments& arguments) {
 void add_inspect(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<InspectArguments>();
     auto* command = program.add_subcommand(
-        "inspect", "Show a problem's sizes, structure, cones, rank, needs, and who could solve it");
+        "inspect", "Show a problem's sizes, structure, cones, rank, needs, and which solvers can take it");
     command->add_option("problem", arguments->problem, "Problem folder, or FCLib file (.hdf5)")
         ->required()
         ->type_name("PROBLEM");
@@ -168,7 +168,7 @@ void add_inspect(CLI::App& program, Action& action) {
         ->type_name("LAW");
     add_plugin_path(*command, arguments->plugin_path);
     command->add_flag("--qualification", arguments->qualification,
-                      "Tell whether LICQ and the pointed friction cone hold: are reactions unique, are they bounded?");
+                      "Check LICQ and the pointed friction cone: are reactions unique, are they bounded?");
     command->add_flag("--json", arguments->json, "Print JSON");
     command->callback([arguments, &action] { action.run = [arguments] { return inspect(*arguments); }; });
 }

@@ -41,7 +41,7 @@ std::string write_page(const std::filesystem::path& file, const std::function<st
     } catch (const InputError& error) {
         std::error_code ignored;
         std::filesystem::remove(file, ignored);
-        return fmt::format("no {} was written, for a part of the page is missing: {}", file.filename().string(),
+        return fmt::format("no {} was written, because a part of the page is missing: {}", file.filename().string(),
                            error.what());
     }
     write_file_atomically(file, page);

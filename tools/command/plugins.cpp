@@ -62,7 +62,7 @@ void print_capability_table(const Registry& registry) {
 
 /// A section of docs/solvers.md: what the descriptor says, as Markdown.
 void print_section(const PluginInfo& plugin) {
-    fmt::print("## {}\n\n{}. Licence: {}.\n\nCan: {}.\n\n", plugin.name, plugin.description, plugin.licence,
+    fmt::print("## {}\n\n{}. Licence: {}.\n\nTakes: {}.\n\n", plugin.name, plugin.description, plugin.licence,
                fmt::join(capability_names(plugin.capabilities), ", "));
     if (plugin.options.empty()) return;
     fmt::print("| option | default | value | |\n|---|---|---|---|\n");
@@ -180,7 +180,8 @@ void add_plugins(CLI::App& program, Action& action) {
         plugins->add_subcommand("list", "List the plugins that can be chosen by name, and those rejected");
     add_plugin_path(*list_command, arguments->plugin_path);
     list_command->add_flag("--json", arguments->json, "Print JSON");
-    list_command->add_flag("--markdown", arguments->markdown, "Print the table solver × what it can take as Markdown");
+    list_command->add_flag("--markdown", arguments->markdown,
+                           "Print a Markdown table of the solvers and what they can take");
     list_command->callback(on_call(list));
 
     auto* info_command = plugins->add_subcommand("info", "Show what a plugin can take, and its options");

@@ -30,7 +30,7 @@ int view(const ViewArguments& arguments) {
                    system.t.back());
         fmt::print("{}\n", static_cast<std::int64_t>(system.t.size()) < system.frames ? "; --frames N shows more" : "");
     }
-    if (run.status != "finished") fmt::print("  the run is {}; this is what is there\n", run.status);
+    if (run.status != "finished") fmt::print("  the run is {}; the page shows what is there\n", run.status);
     return exit_solved;
 }
 
@@ -39,12 +39,14 @@ int view(const ViewArguments& arguments) {
 void add_view(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<ViewArguments>();
     auto* command = program.add_subcommand(
-        "view", "Write a page for a browser, whole in one file, that plays the motion of a run in 3D beside its plots");
+        "view", "Write a page for a browser, in a single file, that plays the motion of a run in 3D beside its plots");
     command->add_option("folder", arguments->folder, "Folder that `delassus run -o` wrote")
         ->required()
         ->type_name("DIR");
     command->add_option("-o,--output", arguments->output, "The page [DIR/scene.html]")->type_name("FILE");
-    command->add_option("--frames", arguments->limits.frames, "Frames of each system at most, evenly in time [600]")
+    command
+        ->add_option("--frames", arguments->limits.frames,
+                     "Largest number of frames of each system, evenly chosen in time [600]")
         ->type_name("N");
     command->callback([arguments, &action] { action.run = [arguments] { return view(*arguments); }; });
 }

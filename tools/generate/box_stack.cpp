@@ -24,7 +24,7 @@ const Field<BoxStackParameters> box_stack_fields[] = {
     {"glue", &BoxStackParameters::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &BoxStackParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &BoxStackParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &BoxStackParameters::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &BoxStackParameters::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 }  // namespace

@@ -24,7 +24,7 @@ const Field<BrickWallParameters> brick_wall_fields[] = {
     {"glue", &BrickWallParameters::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &BrickWallParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &BrickWallParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &BrickWallParameters::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &BrickWallParameters::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 // Where a brick lies along x, in half bricks: whole numbers, so that overlaps are exact.

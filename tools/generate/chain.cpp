@@ -28,7 +28,7 @@ const Field<ChainParameters> chain_fields[] = {
      "for how long each rod has moved by its own velocity, breaking the joints"},
     {"gravity", &ChainParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &ChainParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &ChainParameters::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &ChainParameters::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 // The direction of rod k, downwards: incommensurate waves, smooth along the chain and never the same twice.

@@ -30,7 +30,7 @@ const Field<ElasticBlockParameters> elastic_block_fields[] = {
     {"glue", &ElasticBlockParameters::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &ElasticBlockParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &ElasticBlockParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &ElasticBlockParameters::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &ElasticBlockParameters::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 // Corner c of an element lies at ((c & 1), (c >> 1) & 1, (c >> 2) & 1) edges from its first corner.

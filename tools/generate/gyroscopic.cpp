@@ -19,7 +19,7 @@ const Field<GyroscopicParameters> gyroscopic_fields[] = {
     {"tilt", &GyroscopicParameters::tilt, 0, 1.5, "rad", "largest angle of a top to the vertical, about"},
     {"gravity", &GyroscopicParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &GyroscopicParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &GyroscopicParameters::seed, 0, kLargestSeed, "", "of the random angular velocities"},
+    {"seed", &GyroscopicParameters::seed, 0, kLargestSeed, "", "seed of the random angular velocities"},
 };
 
 }  // namespace

@@ -25,7 +25,7 @@ const Field<MotorsParameters> motors_fields[] = {
     {"speed", &MotorsParameters::speed, 0, 1e3, "m/s", "amplitude of random velocities"},
     {"gravity", &MotorsParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &MotorsParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &MotorsParameters::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &MotorsParameters::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ const Field<NetParameters> net_fields[] = {
      "for how long each node has moved by its own velocity, stretching the strings"},
     {"gravity", &NetParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &NetParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &NetParameters::seed, 0, kLargestSeed, "", "of the random velocities"},
+    {"seed", &NetParameters::seed, 0, kLargestSeed, "", "seed of the random velocities"},
 };
 
 struct Node {

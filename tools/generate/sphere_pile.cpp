@@ -28,7 +28,7 @@ const Field<SpherePileParameters> sphere_pile_fields[] = {
     {"glue", &SpherePileParameters::glue, 0, 1, "", "1: all contacts stick: free rows with b = 0"},
     {"gravity", &SpherePileParameters::gravity, 0, 1e3, "m/s^2", "along -z"},
     {"step", &SpherePileParameters::step, 1e-9, 10, "s", "time step h"},
-    {"seed", &SpherePileParameters::seed, 0, kLargestSeed, "", "of radii and velocities"},
+    {"seed", &SpherePileParameters::seed, 0, kLargestSeed, "", "seed of radii and velocities"},
 };
 
 // The closest packing in square layers: a sphere lies in the hollow between four below, so that layers are √2 r apart

@@ -9,7 +9,7 @@ const outcomes = {
   failed: ["✗", "the library itself says that it came to no end, and why"],
   wrong: ["‼", "claimed as solved, but above the tolerance or not finite"],
   crashed: ["†", "its process crashed"],
-  hung: ["∞", "gave no sign beyond its time limit and was killed"],
+  hung: ["∞", "did not end at its time limit and was killed"],
 };
 const outcomeMark = (outcome) => element("span", { className: `outcome ${outcome}`, textContent: `${outcomes[outcome][0]} ${outcome}` });
 const figureText = (value) => (value === null ? "" : value === 0 ? "0" : value.toExponential(0).replace("e+", "e"));

@@ -49,7 +49,7 @@ function writeClasses() {
     for (const at of one.tolerances) {
       if (at.solved_by_any === 0) continue;
       const place = element("div", { className: "chart" });
-      grid.append(element("div", {}, element("h4", { textContent: `to ${short(at.tolerance)}, ${at.solved_by_any} of ${at.problems} solved by one at least` }), place));
+      grid.append(element("div", {}, element("h4", { textContent: `to ${short(at.tolerance)}, ${at.solved_by_any} of ${at.problems} solved by at least one` }), place));
       addChart(place, () => profileOption(at, title));
     }
     writePair(one, made);

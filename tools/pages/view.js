@@ -19,7 +19,7 @@
       ].join(", "));
     at("facts").replaceChildren(...facts.map((text) => Object.assign(document.createElement("span"), { textContent: text })));
     if (run.status === "finished") return;
-    at("status").textContent = `The run is ${run.status}; this is what is there. ${run.message}`;
+    at("status").textContent = `The run is ${run.status}; the page shows what is there. ${run.message}`;
     at("status").hidden = false;
   }
 
@@ -33,7 +33,7 @@
       page.dataset.webgl = "no";
       at("stage").replaceChildren(Object.assign(document.createElement("p"), {
         className: "sentence",
-        textContent: `This browser cannot draw the motion, which takes WebGL (${error.message}). The plots show the run all the same.` }));
+        textContent: `This browser cannot draw the motion, which needs WebGL (${error.message}). The plots still show the run.` }));
       return null;
     }
   }

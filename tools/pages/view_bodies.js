@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What of a system is seen in space, and how it follows the motion. Lengths are in m; `size` is the radius of all that
+// What the page shows of a system in space, and how it follows the motion. Lengths are in m; `size` is the radius of all that
 // moves, which markers without a size of their own are drawn by.
 "use strict";
 

@@ -62,7 +62,7 @@ struct Pipe {
     }
 };
 
-/// A file that holds the input, so that nobody waits for anybody.
+/// A file that holds the input, so that neither process waits for the other.
 void open_input(Descriptor& file, const ChildSettings& settings) {
     file.reset(memfd_create("delassus-input", MFD_CLOEXEC));
     std::string_view rest = settings.input;

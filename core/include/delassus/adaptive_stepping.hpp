@@ -15,7 +15,7 @@ struct StepControl {
     double absolute = 1e-4;  ///< in units of positions, as a rule m and rad; > 0
     double relative = 0.0;   ///< of the way that a coordinate goes in a unit of time; ≥ 0
     double initial = 1e-4;   ///< first step to try, as a rule s; > 0
-    double smallest = 1e-7;  ///< > 0. A smooth step below it fails; of impacts closer than this none is looked for
+    double smallest = 1e-7;  ///< > 0. A smooth step below it fails; impacts closer together are not told apart
     double largest = 0.1;    ///< ≥ initial
 };
 
@@ -31,7 +31,7 @@ struct AdaptiveStepReport {
 /// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves; the halves are kept.
 class DELASSUS_API AdaptiveStepping {
 public:
-    /// system and stepper, made for it, outlive this. Throws InputError for values of control that make no sense.
+    /// system and stepper, made for it, outlive this. Throws InputError for values of control outside their ranges.
     AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control);
 
     /// Advances state by one step, not beyond end > state.t. Throws StepFailure if a step below `smallest` would be

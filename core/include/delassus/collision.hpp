@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Shapes and where they touch. A module that the first scene with shapes loads finds near pairs by a kept library
-// (FCL's dynamic tree, double precision) and their gaps in closed form, exact to rounding.
+// Shapes and where they touch. The first scene with shapes loads a module that finds near pairs by a maintained library
+// (FCL's dynamic tree, double precision) and computes their gaps in closed form, exact to rounding.
 #pragma once
 
 #include <array>
@@ -55,7 +55,7 @@ struct ContactPoint {
     Vector3 point_a{}, point_b{};           ///< on the surfaces, world frame
     Vector3 normal{};                       ///< unit, from a to b
     double gap = 0.0;                       ///< normal · (point_b − point_a); negative in penetration, m
-    std::uint32_t feature = 0;              ///< which point of several between the pair; stable while they slide little
+    std::uint32_t feature = 0;              ///< tells apart several points of a pair; stable while they slide little
 };
 
 /// Finds contacts among a fixed set of shapes that move with their bodies.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Runs under an MPI launcher, as its environment tells. The core itself never talks to MPI.
+// Runs under an MPI launcher, recognised by its environment. The core itself never talks to MPI.
 #pragma once
 
 #include "delassus/export.hpp"

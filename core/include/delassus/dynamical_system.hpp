@@ -9,7 +9,7 @@
 // entries, for a rigid body the velocity of its mass centre in the world frame and its angular velocity in the body
 // frame. Units are the system's own, as a rule SI. Every array belongs to the caller; none is kept.
 //
-// A user's own system derives from DynamicalSystem and works with every timestepper and solver (examples/ode).
+// A user's own system derives from DynamicalSystem and works with every timestepper and solver (examples/system).
 #pragma once
 
 #include <array>
@@ -53,7 +53,7 @@ public:
         std::uint64_t key = 0;     ///< the same constraint has the same key in the next step: for warm starts
         double speed = 0.0;        ///< of its first row, at the velocities of measure_speeds_at()
 
-        /// Whether its first row is the distance of two things that cannot meet.
+        /// Whether its first row is the distance of two things that cannot overlap.
         [[nodiscard]] bool along_normal() const {
             return cone.kind == ConeKind::Friction || cone.kind == ConeKind::Nonnegative;
         }
@@ -63,9 +63,9 @@ public:
         double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity
     };
 
-    /// The memory stays for the next rows, and the velocities of measure_speeds_at().
+    /// Keeps the memory for the next rows, and the velocities of measure_speeds_at().
     DELASSUS_API void clear();
-    /// v: of the system's n, there as long as blocks are added; null: speeds of blocks are 0.
+    /// v: n, valid as long as blocks are added; null: the speeds of blocks are 0.
     void measure_speeds_at(const double* v) { velocity_ = v; }
 
     /// Adds entries to the row that end_row() closes, in the columns from `column` on. Columns of one row may come in
@@ -95,8 +95,8 @@ public:
     /// D_A v + rate of a row; v: of the system's n.
     [[nodiscard]] DELASSUS_API double speed(std::size_t row, const double* v) const;
 
-    /// Puts the rows below those of D, which has as many columns. Below none nothing is copied: the arrays change
-    /// places, and D's serve the next rows. Until clear() only blocks() and rows() are left.
+    /// Appends the rows to D, which has as many columns. If D has no rows, nothing is copied: the arrays are swapped,
+    /// and D's serve the next rows. Only blocks() and rows() may be used from then until clear().
     DELASSUS_API void move_into(SparseMatrix& D);
 
 private:
@@ -180,14 +180,14 @@ public:
     /// H += factor · ∂(C_qᵀ λ)/∂q for fixed λ; m. Default: nothing.
     virtual void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
                                           MatrixAssembler& H) const;
-    /// H += what must not be left out of −factor · ∂(C_qᵀ λ)/∂q beside M and keeps H positive definite: symmetric and
-    /// positive semidefinite. Default: nothing.
+    /// H += the part of −factor · ∂(C_qᵀ λ)/∂q that a step needs beside M: symmetric and positive semidefinite, so that
+    /// H stays positive definite. Default: nothing.
     virtual void add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
                                                    MatrixAssembler& H) const;
 
     // ---- Contacts, stops, bounded motors; nothing by default ----
 
-    /// Whether collect_unilateral() ever finds anything: then only a timestepper for such rows will do.
+    /// Whether collect_unilateral() ever finds anything; such a system needs a timestepper for unilateral rows.
     [[nodiscard]] virtual bool has_unilateral() const;
     /// The rows that may become active within a step of size h.
     virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);

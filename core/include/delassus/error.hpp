@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Exceptions of the library. Misuse throws; an outcome of a solve is a status (report.hpp).
+// Exceptions of the library. Misuse throws; an outcome of a solve is a status (solver.hpp).
 #pragma once
 
 #include <stdexcept>

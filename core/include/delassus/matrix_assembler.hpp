@@ -17,8 +17,8 @@ public:
     /// Starts an assembly of rows × columns; the values of the last one are dropped.
     DELASSUS_API void begin(std::int32_t rows, std::int32_t columns);
 
-    /// Adds value at a place, 0 ≤ row < rows and 0 ≤ column < columns (not checked). Zeros make entries too: whoever
-    /// wants a pattern that lasts adds them.
+    /// Adds value at a place, 0 ≤ row < rows and 0 ≤ column < columns (not checked). Zeros make entries too; add them
+    /// for a pattern that lasts.
     void add(std::int32_t row, std::int32_t column, double value) {
         const Place place{row, column};
         if (count_ == places_.size()) {
@@ -48,7 +48,7 @@ public:
     /// The matrix; valid until the next begin(). Throws InputError if a place lies outside.
     [[nodiscard]] DELASSUS_API const SparseMatrix& finish();
 
-    /// The same in place of another matrix, whose arrays are used again. Throws alike.
+    /// The same into another matrix, whose arrays are reused. Throws likewise.
     DELASSUS_API void finish_into(SparseMatrix& matrix);
 
     /// How often a pattern was built: grows by one whenever finish() met new places.

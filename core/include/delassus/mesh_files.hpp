@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Meshes in files. Modules that the first file loads read them by kept libraries: surfaces by assimp (OBJ, STL, PLY,
-// OFF, glTF, COLLADA and more), tetrahedra by Netgen.
+// Meshes in files. The first file loads a module that reads it by a maintained library: surfaces by assimp (OBJ, STL,
+// PLY, OFF, glTF, COLLADA and more), tetrahedra by Netgen.
 #pragma once
 
 #include <array>
@@ -13,9 +13,9 @@
 
 namespace delassus {
 
-/// The surface in a file, one mesh for each part that hangs together; lengths are multiplied by scale. Polygons become
-/// triangles, and equal points one. assimp keeps coordinates in single precision. Throws InputError, naming the file,
-/// where this build has no assimp, the file is unreadable or has no triangles, or a part is no closed surface seen
+/// The surface in a file, one mesh for each connected part; lengths are multiplied by scale. Polygons become triangles,
+/// and equal points one. assimp keeps coordinates in single precision. Throws InputError, naming the file, where this
+/// build has no assimp, the file is unreadable or has no triangles, or a part is not a closed surface seen
 /// counter-clockwise from outside (with the triangle or edge).
 [[nodiscard]] DELASSUS_API std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double scale = 1.0);
 
@@ -25,10 +25,11 @@ struct TetrahedralMesh {
     std::vector<std::array<std::int32_t, 4>> tetrahedra;  ///< of positive volume: det(b − a, c − a, d − a) > 0
 };
 
-/// The tetrahedra in a Netgen file (.vol); any other file is read as a surface and filled with tetrahedra by Netgen,
-/// about as large as the surface's triangles, that are divided into eight `refinements` times (0 to 6). Throws
+/// The tetrahedra in a Netgen file (.vol); any other file is read as a surface, which Netgen fills with tetrahedra
+/// about as large as the surface's triangles. Each is then divided into eight, `refinements` times (0 to 6). Throws
 /// InputError, naming the file, where this build lacks the library, the file is unreadable, an element is inverted or
-/// flat or no tetrahedron, a vertex belongs to no element, a face to more than two, or a .vol shall be refined.
+/// flat or not a tetrahedron, a vertex belongs to no element, a face to more than two, or refinements are asked of a
+/// .vol file.
 [[nodiscard]] DELASSUS_API TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale = 1.0,
                                                                  int refinements = 0);
 

@@ -228,8 +228,8 @@ struct ContactMaterial {
     double restitution = 0.0;  ///< in [0, 1]
 };
 
-/// Builds up by add_…(), which check their input (InputError with one sentence), then serves as a DynamicalSystem.
-/// finish() must come between.
+/// Built by add_…(), which check their input (InputError with one sentence), and completed by finish(). From then on it
+/// serves as a DynamicalSystem.
 class DELASSUS_API MultibodySystem : public DynamicalSystem {
 public:
     MultibodySystem();
@@ -264,10 +264,10 @@ public:
     void set_material_pair(std::int32_t first, std::int32_t second, const ContactMaterial& material);
     /// m; how near shapes must be for a contact to be made. Unless set: a twentieth of the median shape's size.
     void set_envelope(double envelope);
-    /// These two bodies never touch. Joined bodies do not in any case.
+    /// These two bodies never touch. Joined bodies never touch in any case.
     void keep_apart(BodyIndex first, BodyIndex second);
     /// Gives contacts without friction three rows, a cone with μ = 0, and loads the collision library even if nothing
-    /// can touch: what leaving these out saves can be measured against that. Call it before finish().
+    /// can touch: the reference for what leaving these out saves. Call it before finish().
     void leave_nothing_out();
     /// Numbers what moves; call it once, after the last add_…().
     void finish();

@@ -14,7 +14,7 @@
 
 namespace delassus {
 
-/// What H was found to be. Detected from its values, never declared; at most taken for a more general one.
+/// The structure of H, detected from its values, never declared. A problem may at most count as a more general one.
 enum class Structure {
     Reduced,       ///< n = 0
     Diagonal,      ///< positive diagonal
@@ -41,7 +41,7 @@ public:
     /// Throws InputError if the problem is not valid. Factors H once if it is neither diagonal nor block-diagonal, to
     /// learn whether it is definite.
     ///
-    /// also_needs: DELASSUS_CAN_* bits that the problem is to have beyond its own, as one of a more general kind: of
+    /// also_needs: DELASSUS_CAN_* bits that the problem gets beyond its own, as if it were more general: kinds of
     /// cones, and H_DEFINITE, with which a diagonal or block-diagonal H counts as sparse and is factorised.
     DELASSUS_API explicit PreparedProblem(Problem problem, std::uint64_t also_needs = 0);
     DELASSUS_API ~PreparedProblem();
@@ -50,7 +50,7 @@ public:
 
     [[nodiscard]] DELASSUS_API const Problem& problem() const;
     [[nodiscard]] DELASSUS_API Structure structure() const;
-    /// DELASSUS_CAN_* bits that a solver must have for this problem, whatever is asked of the solve.
+    /// DELASSUS_CAN_* bits that a solver must have for this problem, whatever the settings of the solve.
     [[nodiscard]] DELASSUS_API std::uint64_t needs() const;
     /// What crosses the border; valid as long as this object.
     [[nodiscard]] DELASSUS_API const delassus_problem& raw() const;
@@ -59,9 +59,9 @@ public:
     /// value that is not finite.
     DELASSUS_API void set_right_hand_side(std::vector<double> a, std::vector<double> b);
 
-    /// Takes another problem in the place of this one, and leaves this one's arrays in it. Where its entries stand in
-    /// the same places, analysis and scratch memory are used again, and nothing is allocated as long as H is
-    /// block-diagonal. Throws as the constructor; both are then as they were.
+    /// Replaces this problem by another one, and leaves this one's arrays in the other. If the entries have the same
+    /// places, analysis and scratch memory are reused, and nothing is allocated as long as H is block-diagonal. Throws
+    /// as the constructor; both are then unchanged.
     DELASSUS_API void renew(Problem&& problem);
     /// The same with a copy of the problem.
     DELASSUS_API void renew(const Problem& problem);

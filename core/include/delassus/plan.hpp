@@ -23,7 +23,7 @@ struct SystemPlan {
     std::int32_t constraints = 0;  ///< m of the bilateral constraints
     std::int32_t parts = 0;        ///< of the first step's problem that go to a solver, each apart from the others
     std::vector<PlanLine> kept, left_out;
-    /// Plugins: those that the first step loaded, then those that contacts which are not there yet will load.
+    /// Plugins: those that the first step loaded, then those that later contacts will load.
     std::vector<std::string> solvers;
     /// Plugins that the run loads only in a step where those do not reach the tolerance.
     std::vector<std::string> later_solvers;
@@ -31,8 +31,8 @@ struct SystemPlan {
     std::vector<std::string> libraries;
 };
 
-/// Takes one step of a copy of each system's state to see its problems; the scene stays as it is. Throws as
-/// Simulation does, and Unsupported if the scene may come to need a solver that is not installed or not able.
+/// Takes one step of a copy of each system's state to see its problems; the scene stays as it is. Throws as Simulation
+/// does, and Unsupported if the scene may need a solver that is not installed or cannot take it.
 [[nodiscard]] DELASSUS_API std::vector<SystemPlan> make_plan(Scene& scene, const Registry& registry);
 
 }  // namespace delassus

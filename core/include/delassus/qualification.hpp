@@ -14,8 +14,8 @@ namespace delassus {
 
 enum class Answer { Yes, No, Undecided };
 
-/// All rows of the problem count, those of contacts that will open too: what is said of a subset of them is at least as
-/// good.
+/// All rows of the problem count, also those of contacts that will open. A subset of the rows qualifies at least as
+/// well.
 struct Qualification {
     /// Linear independence (LICQ): rank of N = number of rows. Then reactions are unique. Undecided: no rank was found.
     Answer independent = Answer::Undecided;

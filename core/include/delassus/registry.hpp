@@ -33,7 +33,7 @@ private:
     return name.find('/') != std::string_view::npos || name.ends_with(".so");
 }
 
-/// A plugin, or what was meant to be one, that cannot be used.
+/// A plugin, or a file meant to be one, that cannot be used.
 struct RejectedPlugin {
     std::filesystem::path path;
     std::string reason;

@@ -19,7 +19,7 @@
 
 namespace delassus {
 
-/// Something of the scene that the system does without, since it has no effect.
+/// An item of the scene that the system does without, because it has no effect.
 struct LeftOut {
     std::string what;    ///< "joint \"frame\""
     std::string reason;  ///< "both bodies are fixed"
@@ -51,7 +51,7 @@ struct RunLimits {
     double drift = std::numeric_limits<double>::infinity();  ///< of bilateral constraints, m or rad
 };
 
-/// A system, finished and ready to be simulated, with what the file says about how.
+/// A system, finished and ready to be simulated, with the settings of the file.
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
     std::unique_ptr<MultibodySystem> system;
@@ -65,7 +65,7 @@ struct SceneSystem {
     RunLimits limits;                      ///< what a run must not exceed
     double end = 0.0;                      ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
-    // What a plan and a report name things by.
+    // The names that a plan and a report use.
     std::vector<BodyParameters> bodies;  ///< by BodyIndex
     std::vector<NodeParameters> nodes;   ///< by number
     std::vector<ElasticBlock> elastic_blocks;
@@ -93,7 +93,7 @@ struct Scene {
     std::string canonical;
 };
 
-/// What a command line puts in place of values of the file.
+/// Values of the command line that replace those of the file.
 struct SceneOverrides {
     /// Paths of keys and list positions or names, "bodies.ball.mass", with values in YAML.
     std::vector<std::pair<std::string, std::string>> values;

@@ -24,12 +24,12 @@ struct StepRecord {
     std::int64_t step = 0;       ///< steps taken so far
     double t = 0.0;              ///< s
     double energy = 0.0;         ///< J; NaN where the system does not know it
-    double kinetic = 0.0;        ///< of it, kinetic energy, J
+    double kinetic = 0.0;        ///< the kinetic part of it, J
     Vector3 momentum{};          ///< kg m/s
     Vector3 angular_momentum{};  ///< about the origin, kg m²/s
     double drift = 0.0;          ///< largest |C| of the bilateral constraints, in their own units (m, rad)
     double penetration = 0.0;    ///< of the deepest contact, m; ≥ 0
-    std::int64_t contacts = 0;   ///< and other unilateral blocks in the problem
+    std::int64_t contacts = 0;   ///< contacts and other unilateral blocks in the problem
     std::int64_t sleeping = 0;   ///< bodies and nodes that sleep
     std::int64_t newton_iterations = 0;
     std::int64_t solver_iterations = 0;
@@ -39,10 +39,10 @@ struct StepRecord {
     bool impact = false;         ///< a short step of the step control, for a contact that closed
     double seconds = 0.0;        ///< of wall time, everything included
     bool solved = true;          ///< every solve reached its tolerance
-    double linearization = 0.0;  ///< of a linearised method: what its forces were off by (StepReport)
+    double linearization = 0.0;  ///< error of the forces of a linearised method (StepReport)
 };
 
-/// What acts in a contact, as a mean over the last step.
+/// The force in a contact, as a mean over the last step.
 struct ContactForce {
     std::array<std::int32_t, 2> bodies{};  ///< as MultibodySystem::contact_bodies()
     Vector3 force{};                       ///< on the second, world frame, N; on the first the opposite
@@ -55,7 +55,7 @@ struct SimulationTotals {
     double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
     double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
     double growth = 0.0;                      ///< largest rise of the energy above its start and `recovered`, J
-    double growth_share = 0.0;  ///< the largest, of what energy there can have been to move (running.md); 0: not judged
+    double growth_share = 0.0;  ///< largest growth over the energy that can have moved (running.md); 0: not judged
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
     double worst_linearization = 0.0;
     std::int64_t most_contacts = 0;
@@ -74,7 +74,7 @@ struct SimulationState {
     State state;
     std::vector<double> memory;    ///< Timestepper::save(), warm starts included
     std::vector<double> control;   ///< AdaptiveStepping::save(); empty with fixed steps
-    std::vector<double> sleeping;  ///< who sleeps, and how long the others were quiet; empty where none may sleep
+    std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
     SimulationTotals totals;
 };
 
@@ -105,7 +105,7 @@ public:
     [[nodiscard]] DELASSUS_API std::vector<ContactForce> contact_forces() const;
     [[nodiscard]] StepSolver& solver() { return *solver_; }
 
-    /// What a user should know of a run so far that did not fail; a sentence each.
+    /// What a user should know about a run that has not failed so far, one sentence each.
     [[nodiscard]] DELASSUS_API std::vector<std::string> warnings() const;
 
     [[nodiscard]] DELASSUS_API SimulationState save() const;

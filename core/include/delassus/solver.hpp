@@ -39,7 +39,7 @@ struct CurveSample {
     double natural = 0.0;
 };
 
-/// What one solve may take.
+/// The settings of one solve.
 struct SolveSettings {
     double tolerance = 1e-8;  ///< natural error, > 0
     std::int64_t max_iterations = 1000000;
@@ -55,7 +55,7 @@ struct SolveSettings {
     std::function<void(const CurveSample&)> on_sample;
     /// Asked at every progress call; true cancels the solve. May be empty.
     std::function<bool()> cancelled;
-    /// Shown every iterate that the solver shows, on the solver's clock; true ends the solve, as stalled. x may be
+    /// Called with every iterate that the solver shows, on the solver's clock; true ends the solve as stalled. x may be
     /// null. May be empty.
     std::function<bool(std::int64_t iteration, const double* x, const double* lambda)> give_up;
 };

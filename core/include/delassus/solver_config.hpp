@@ -15,7 +15,7 @@
 
 namespace delassus {
 
-/// Which solver, and what it may take. What is absent keeps the default of SolveSettings, or the problem's own law.
+/// The chosen solver and its limits. An absent value keeps the default of SolveSettings, or the problem's own law.
 struct SolverConfig {
     std::string name;     ///< a plugin's name, "auto", or the path of a shared library; empty if not given
     OptionTexts options;  ///< the plugin's, and "finish" and "finish_at" of the framework (docs/configuration.md)
@@ -24,15 +24,15 @@ struct SolverConfig {
     std::optional<double> time_limit;  ///< seconds
     std::optional<Law> law;
 
-    /// Default settings with what is given here in place.
+    /// The default settings, overridden by what is given here.
     [[nodiscard]] DELASSUS_API SolveSettings settings() const;
 };
 
 /// Parses "name" or "name(key=value,key=value)", the form of `delassus compare --solvers`. Throws InputError.
 [[nodiscard]] DELASSUS_API SolverConfig parse_solver(std::string_view text);
 
-/// What is known of a solver without loading it: of a plugin, or of "auto", which can what any of the plugins can.
-/// Throws InputError naming the nearest and all names if there is none.
+/// What is known of a solver without loading it: of a plugin, or of "auto", whose capabilities are the union of all
+/// plugins'. Throws InputError naming the nearest and all names if there is none.
 [[nodiscard]] DELASSUS_API PluginInfo solver_info(const Registry& registry, const std::string& name);
 
 /// Throws InputError if there is no such solver, or an option is unknown or outside its domain (those of a library

@@ -24,10 +24,10 @@ struct StepReport {
     std::int32_t active_blocks = 0;      ///< of these, blocks with a reaction
     bool solved = true;                  ///< false if the step rests on a solve that missed its tolerance; it is taken
     std::string message;                 ///< why not
-    // Of the fastest contact or stop that closed: it pushed in this step, and not in the one before.
+    // Of the fastest contact or stop that closed, that is, one that pushed in this step and not in the one before:
     double impact_speed = 0.0;  ///< with which it closed, in its unit a second; 0: none
     double impact_time = 0.0;   ///< when, after the beginning of the step
-    /// Of a linearised method: what its forces were off by at the end of the step, as a share of the velocities
+    /// The error of a linearised method's forces at the end of the step, as a share of the velocities
     /// (docs/integrators.md); 0 where forces are linear, or where it is not measured.
     double linearization = 0.0;
     double recovered = 0.0;  ///< energy that contacts gave by pushing apart what penetrated, J; ≥ 0

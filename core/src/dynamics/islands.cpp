@@ -61,7 +61,7 @@ bool share_columns(const SparseMatrix& D, std::int32_t first, std::int32_t last)
 
 }  // namespace
 
-// The root of all is found once a cone, and columns that it has are told by one look. A contact has the same columns in
+// The root of all is found once a cone, and one look finds the columns that it has. A contact has the same columns in
 // all of its rows: they are looked at once, and the rows' values only where a column is new.
 void Islands::join_rows(const SparseMatrix& D) {
     const auto cones = first_row_.size() - 1;

@@ -66,7 +66,7 @@ OptionInfo linearization_option() {
             .minimum = 0.0,
             .maximum = HUGE_VAL,
             .doc =
-                "a step fails whose linear model of the forces is off by more, as a share of the velocities; inf: "
+                "a step fails if its linear model of the forces is off by more than this share of the velocities; inf: "
                 "not measured"};
 }
 

@@ -396,7 +396,7 @@ OptionInfo jacobian_option(std::string default_value) {
             .type = DELASSUS_OPTION_CHOICE,
             .default_value = std::move(default_value),
             .choices = {"symmetric", "exact"},
-            .doc = "matrix of Newton's method: the derivative, or its symmetric part, which more solvers take"};
+            .doc = "matrix of Newton's method: the derivative, or its symmetric part, which more solvers accept"};
 }
 
 std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
@@ -425,7 +425,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
          .minimum = 0.0,
          .maximum = HUGE_VAL,
          .unit = "rad",
-         .doc = "a step fails in which a body turns further; beyond a whole turn the end of a step is not unique"}};
+         .doc = "a step fails if a body turns further in it; beyond a whole turn the end of a step is not unique"}};
     options.insert(options.end(), own.begin(), own.end());
     return options;
 }

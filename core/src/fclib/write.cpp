@@ -46,7 +46,7 @@ Rows order_rows(const Problem& problem, const std::string& name) {
     }
     if (!rows.mu.empty() && problem.law != Law::Coulomb) {
         refuse(
-            fmt::format("FCLib files mean the law coulomb, but that of the problem is {}; `--law coulomb` changes it",
+            fmt::format("FCLib files use the law coulomb, but the law of the problem is {}; `--law coulomb` changes it",
                         name_of(problem.law)));
     }
     if (problem.n() > 0) {

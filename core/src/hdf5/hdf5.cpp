@@ -12,7 +12,8 @@
 namespace delassus::hdf5 {
 namespace {
 
-/// A dataset may announce more than it stores where chunks are compressed or were never written. So much is believed.
+/// A dataset may announce more than it stores where chunks are compressed or were never written. Announcements up to
+/// this size are believed.
 constexpr std::uint64_t most_compression = 100;
 constexpr std::uint64_t small_bytes = 1 << 20;
 constexpr std::size_t longest_text = 1 << 16;

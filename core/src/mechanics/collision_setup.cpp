@@ -58,7 +58,7 @@ void check_shape(const Shape& shape, const std::string& who, const KindRow& row,
     }
     if (shape.kind == ShapeKind::Plane && shape.body >= 0 && !setup.fixed[shape.body]) {
         throw InputError(fmt::format(
-            "{}: body {} moves; planes are for fixed bodies and the world only, a box will do here.", who, shape.body));
+            "{}: body {} moves; planes are for fixed bodies and the world only; use a box here.", who, shape.body));
     }
     if (shape.kind == ShapeKind::Convex) {
         if (shape.mesh == nullptr || shape.mesh->triangles.empty())
@@ -77,14 +77,15 @@ void check_collision_setup(const CollisionSetup& setup) {
         check_shape(setup.shapes[i], fmt::format("Shape {} ({})", i, row->name), *row, setup);
     }
     if (!setup.group.empty() && setup.group.size() != setup.fixed.size()) {
-        throw InputError(fmt::format("There are groups for {} bodies of {}; each body should have one, or none at all.",
-                                     setup.group.size(), setup.fixed.size()));
+        throw InputError(
+            fmt::format("There are groups for {} bodies of {}; each body should have one, or no body should.",
+                        setup.group.size(), setup.fixed.size()));
     }
     const auto bodies = static_cast<std::int32_t>(setup.fixed.size());
     for (const auto& [first, second] : setup.apart) {
         if (std::min(first, second) < -1 || std::max(first, second) >= bodies) {
             throw InputError(fmt::format(
-                "The pair of bodies ({}, {}) never to touch should be of numbers from 0 to {}, or -1 for the world.",
+                "The pair ({}, {}) of bodies that never touch should have numbers from 0 to {}, or -1 for the world.",
                 first, second, bodies - 1));
         }
     }

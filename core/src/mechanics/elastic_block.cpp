@@ -19,7 +19,7 @@ void check(const ElasticBlock& block) {
             throw InputError(
                 fmt::format("the edges of the elastic block \"{}\" must be positive and finite", block.name));
         if (block.cells[i] < 1)
-            throw InputError(fmt::format("the elastic block \"{}\" has {} cells along an edge; it needs one at least",
+            throw InputError(fmt::format("the elastic block \"{}\" has {} cells along an edge; it needs at least one",
                                          block.name, block.cells[i]));
         nodes *= block.cells[i] + 1.0;
     }

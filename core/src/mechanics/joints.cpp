@@ -59,7 +59,7 @@ void fraction_of(double ratio, const std::string& name, double& numerator, doubl
         rest = 1.0 / (rest - whole);
     }
     throw InputError(
-        fmt::format("the ratio {} of the gear \"{}\" is no fraction of whole numbers below 1000", ratio, name));
+        fmt::format("the ratio {} of the gear \"{}\" is not a fraction of whole numbers below 1000", ratio, name));
 }
 
 const Joint& revolute(const std::vector<Joint>& joints, std::int32_t index, const std::string& name) {

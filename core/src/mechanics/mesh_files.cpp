@@ -41,7 +41,7 @@ Mesh joined(const Mesh& mesh) {
     return result;
 }
 
-/// One mesh for each set of triangles that hang together by vertices, in the order of their first triangles.
+/// One mesh for each set of triangles connected by vertices, in the order of their first triangles.
 std::vector<Mesh> parts_of(const Mesh& mesh) {
     std::vector<std::int32_t> parent(mesh.vertices.size());
     std::iota(parent.begin(), parent.end(), 0);
@@ -147,7 +147,7 @@ std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double sc
 
 TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale, int refinements) {
     if (refinements < 0 || refinements > 6)
-        throw InputError(fmt::format("a mesh shall be refined {} times; it must be from 0 to 6", refinements));
+        throw InputError(fmt::format("the number of refinements of a mesh is {}; it must be from 0 to 6", refinements));
     TetrahedralMesh mesh;
     if (file.extension() == ".vol") {
         must_be_there(file);

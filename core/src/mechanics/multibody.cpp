@@ -44,7 +44,7 @@ void check_inertia(const std::string& name, const Matrix3d& J) {
 Quaternion normalized(const Quaternion& q, const std::string& name) {
     const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     refuse_unless(norm > 0.0 && std::isfinite(norm), "the orientation of", name,
-                  "is no quaternion of a positive length");
+                  "is not a quaternion of positive length");
     return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
 }
 

@@ -131,11 +131,11 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
 //     k (I − ĉ ĉᵀ),      k = s c̄ · Aᵀ y,   ĉ = c̄/|c̄|
 //
 // the stiffness of a pulled arm against being turned out of line. It is positive under pull, and nothing under a turn
-// about the arm. That is kept, where k > 0. The symmetric part of the whole would not do: a force across the arm, as
-// that of the last step always is a little, makes it couple turns about the arm to others, with a torque that is not
-// there. What a step bears explicitly, h² k below a tenth of the moment of inertia about the point, is left to it:
-// there the method conserves energy far better without. Of what a joint does to directions, and of the swing of a rod's
-// own ends, nothing is kept. H keeps its blocks.
+// about the arm. This term is kept where k > 0. The symmetric part of the whole would not work: the force of the last
+// step is always a little across the arm, and would couple turns about the arm to others by a torque that does not
+// exist. A step bears h² k explicitly up to a tenth of the moment of inertia about the point; up to there the method
+// conserves energy far better without the term. Nothing is kept of what a joint does to directions, and of the swing of
+// a rod's own ends. H keeps its blocks.
 void MultibodySystem::add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
                                                         MatrixAssembler& H) const {
     const auto& self = *implementation_;

@@ -86,7 +86,7 @@ BodyIndex MultibodySystem::add_elastic_beam(const ElasticBeamParameters& beam) {
     BeamParameters element{beam.name, 0, 0, beam.from, beam.to, beam.section_y, beam.section, beam.material};
     const mechanics::Matrix3d axes = mechanics::Beam::axes(element);
     refuse_unless(beam.elements >= 1, "the beam", beam.name,
-                  fmt::format("has {} elements; it needs one at least", beam.elements));
+                  fmt::format("has {} elements; it needs at least one", beam.elements));
     mechanics::check_material(beam.material);
     const Vector3d from = vector(beam.from), span = vector(beam.to) - from;
     const Vector3d velocity = vector(beam.velocity), turning = vector(beam.angular_velocity);

@@ -15,7 +15,7 @@
 
 namespace delassus {
 
-/// What of a system stands in the file once.
+/// What the file contains once for each system.
 struct TrajectorySystem {
     std::string name, integrator, solver;
     std::int32_t positions = 0, velocities = 0;  ///< sizes of q and v

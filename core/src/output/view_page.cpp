@@ -19,7 +19,7 @@ RecordedRun read_run(const fs::path& folder, const RecordingLimits& limits) {
     std::error_code error;
     if (!fs::is_directory(folder, error))
         throw InputError(
-            fmt::format("{} is no folder; give the one that `delassus run SCENE -o DIR` wrote", folder.string()));
+            fmt::format("{} is not a folder; give the one that `delassus run SCENE -o DIR` wrote", folder.string()));
     if (!fs::exists(file, error))
         throw InputError(
             fmt::format("{} holds no trajectory.h5; `delassus run SCENE -o DIR` writes one", folder.string()));
@@ -32,7 +32,7 @@ RecordedRun read_run(const fs::path& folder, const RecordingLimits& limits) {
             run.status = json.at("status").get<std::string>();
             run.message = json.at("message").get<std::string>();
         } catch (const nlohmann::json::exception& damage) {
-            throw InputError(fmt::format("{} is no report of a run: {}", report.string(), damage.what()));
+            throw InputError(fmt::format("{} is not the report of a run: {}", report.string(), damage.what()));
         }
     }
     run.systems = read_trajectory(file, limits);

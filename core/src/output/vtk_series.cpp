@@ -46,7 +46,7 @@ std::string polydata(double t, const std::string& head, const std::string& body,
            "\n</AppendedData>\n</VTKFile>\n";
 }
 
-/// How far from the origin bodies and shapes reach at the start, for the size at which planes are drawn.
+/// How far from the origin bodies and shapes reach at the start: the size at which planes are drawn.
 double extent_of(const MultibodySystem& system) {
     double extent = 1.0;
     for (BodyIndex body = 0; body < system.body_count(); ++body)

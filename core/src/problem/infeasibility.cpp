@@ -73,9 +73,8 @@ double size_by_velocities(const sdk::ProblemView& problem, const Units& units, c
                  y.cwiseQuotient(units.R).norm());
 }
 
-// What of a direction lies in the range of D stands in the way of the proof, and is there by a solver's tolerance only:
-// d̂ ← d̂ − Aᵀ(A Aᵀ + δ)⁻¹A d̂ with d̂ = S⁻¹d, A = R DᵀS, whose passes take away the component of a singular value σ by
-// factors δ/(σ² + δ).
+// A component in range(D) is solver error and spoils the proof; remove it: d̂ ← d̂ − Aᵀ(A Aᵀ + δ)⁻¹A d̂ with d̂ = S⁻¹d,
+// A = R DᵀS. Each pass multiplies the component of a singular value σ by δ/(σ² + δ).
 Vector without_range(const sdk::ProblemView& problem, const Units& units, const Vector& direction) {
     constexpr int passes = 6;
     if (problem.n == 0) return direction;

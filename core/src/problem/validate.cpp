@@ -72,7 +72,7 @@ private:
                    static_cast<std::int64_t>(A.rows) + 1);
         }
         if (A.column.size() != A.value.size()) {
-            refuse("{} has {} columns and {} values; each entry needs one of both.", name, A.column.size(),
+            refuse("{} has {} columns and {} values; each entry needs one of each.", name, A.column.size(),
                    A.value.size());
         }
         if (A.row_start[0] != 0 || A.row_start.back() < 0 ||
@@ -185,8 +185,8 @@ private:
             const Asymmetry asymmetry = asymmetry_of(problem_.H);
             if (asymmetry.relative > symmetry_tolerance) {
                 refuse(
-                    "H is not symmetric (H({}, {}) differs from H({}, {}) by {:.1e} of the largest entry), "
-                    "but cone {} is {}; an unsymmetric H goes with free rows only.",
+                    "H is not symmetric (H({}, {}) differs from H({}, {}) by {:.1e} of the largest entry), but cone {} "
+                    "is {}; an unsymmetric H is for free rows only.",
                     asymmetry.row, asymmetry.column, asymmetry.column, asymmetry.row, asymmetry.relative, c,
                     name_of(problem_.cones[c].kind));
             }

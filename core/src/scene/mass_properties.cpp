@@ -75,7 +75,7 @@ Moments moments_of(const Shape& shape) {
         case ShapeKind::Plane:
             break;
     }
-    throw InputError("a plane has no volume, so that no mass and no inertia follow from it");
+    throw InputError("a plane has no volume, so mass and inertia cannot follow from it");
 }
 
 }  // namespace
@@ -84,7 +84,7 @@ MassProperties mass_properties(std::span<const Shape> shapes) {
     Moments total;
     for (const auto& shape : shapes) {
         const Moments own = moments_of(shape);
-        if (!(own.volume > 0.0)) throw InputError("a shape without volume: no mass and no inertia follow from it");
+        if (!(own.volume > 0.0)) throw InputError("a shape without volume: mass and inertia cannot follow from it");
         const auto& [w, x, y, z] = shape.pose.orientation;
         const Matrix3d A = Eigen::Quaterniond(w, x, y, z).toRotationMatrix();
         const Vector3d p(shape.pose.position[0], shape.pose.position[1], shape.pose.position[2]);

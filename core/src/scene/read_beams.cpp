@@ -62,7 +62,7 @@ void SystemReader::read_beam(const YAML::Node& item, const Copy& copy) {
           [&](const YAML::Node& n) {
               for (const YAML::Node& one : elements(source_, n, "bodies"))
                   bodies.push_back(body_named(one, "bodies", copy));
-              if (bodies.size() < 2) source_.refuse(n, "\"bodies\" must name two bodies at least");
+              if (bodies.size() < 2) source_.refuse(n, "\"bodies\" must name at least two bodies");
           }},
          made("from", [&](const YAML::Node& n) { from = point_in(source_, n, "from", copy); }),
          made("to", [&](const YAML::Node& n) { to = point_in(source_, n, "to", copy); }),

@@ -52,7 +52,7 @@ void apply(const SceneOverrides& overrides, SceneSystem& system) {
     }
 }
 
-/// What overrides hold for every system, put where the file would have it.
+/// The overrides for every system, put where the file would have them.
 void put_values(const SceneOverrides& overrides, Source& source, YAML::Node map) {
     if (!map.IsMap()) return;  // refused when it is read
     const auto put = [&](const char* key, const std::optional<double>& value) {

@@ -50,7 +50,7 @@ void SystemReader::build(const YAML::Node& place) {
     read_items("elastic_meshes", &SystemReader::read_elastic_mesh);
     read_items("cables", &SystemReader::read_cable);
     read_items("beams", &SystemReader::read_beam);
-    // Empty lists are as good as others: a scene may have nothing in it. One that names none is not meant so.
+    // An empty list is allowed: a scene may have nothing in it. A scene without any such list is a mistake.
     const std::array<std::string_view, 5> moving = {"bodies", "nodes", "elastic_blocks", "elastic_meshes", "beams"};
     if (std::none_of(moving.begin(), moving.end(), [&](std::string_view key) { return lists_.contains(key); }))
         missing("bodies", "bodies: [{name: ball, mass: 1, …}]");

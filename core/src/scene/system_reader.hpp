@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reads one system of a scene: keys are read in the order in which things need one another, whatever their order in
-// the file.
+// Reads one system of a scene. Keys are read in the order in which items need one another, whatever their order in the
+// file.
 #pragma once
 
 #include <map>

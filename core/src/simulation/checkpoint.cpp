@@ -119,7 +119,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
     const std::string text = read_file(file);
     try {
         const Json json = Json::parse(text);
-        if (json.at("format") != format) throw InputError("it is no checkpoint of Delassus");
+        if (json.at("format") != format) throw InputError("it is not a checkpoint of Delassus");
         if (json.at("version") != version) throw InputError("it was written by another version of Delassus");
         Checkpoint checkpoint;
         json.at("scene").get_to(checkpoint.scene);

@@ -15,9 +15,9 @@ struct SimulationTotals;
 //
 // is the most that there can have been up to now, W being what contacts gave by pushing apart what penetrated. Methods
 // err: a growth by some percent of A is an inaccuracy, one by A itself means that the motion is not that of the system.
-// Judged is E − E₀ − W against limit · max(A, floor), with floor = ½ ‖2 h g‖²_M + 1e-10 |E₀|: what moves less than a
-// free fall for two steps is at rest as far as a step can tell (a stiff part that starts off its equilibrium
-// overshoots by about that), and energies of far bodies are rounded.
+// The guard compares E − E₀ − W with limit · max(A, floor), where floor = ½ ‖2 h g‖²_M + 1e-10 |E₀|: a step cannot tell
+// a motion below a free fall over two steps from rest (a stiff part that starts off its equilibrium overshoots by about
+// that), and energies of far bodies are rounded.
 class EnergyGuard {
 public:
     /// system outlives it.

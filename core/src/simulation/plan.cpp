@@ -30,8 +30,8 @@ std::string some_of(const std::vector<std::string>& names) {
     return text;
 }
 
-/// What of the system can touch what: the pairs of materials, each with its friction, that two shapes of different
-/// bodies have of which one moves and which are not kept apart.
+/// Which shapes can touch which: the pairs of materials, each with its friction, of two shapes of different bodies of
+/// which at least one moves and which are not kept apart.
 class Touching {
 public:
     explicit Touching(const SceneSystem& system) : system_(system), apart_(system.apart.begin(), system.apart.end()) {
@@ -163,7 +163,7 @@ private:
         if (!moving.empty())
             keep(counted(moving.size(), "moving body", "moving bodies"), "6 velocities each: " + some_of(moving));
         if (const auto nodes = system_.system->node_count(); nodes > 0)
-            keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities each that moves");
+            keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities for each that moves");
         if (!fixed.empty())
             leave(counted(fixed.size(), "fixed body", "fixed bodies"), "no unknowns, no columns: " + some_of(fixed));
         if (!free.empty() && system_.leave_out)

@@ -29,7 +29,7 @@ void require_sleeping(const SceneSystem& system) {
         if (one.sleeping && one.name == system.integrator) return;
         if (one.sleeping) able.push_back(one.name);
     }
-    throw Unsupported(fmt::format("{} cannot leave out bodies that sleep. Can: {}; or leave out \"sleeping\"",
+    throw Unsupported(fmt::format("{} cannot leave out bodies that sleep. Can: {}; or remove \"sleeping\"",
                                   system.integrator, fmt::join(able, ", ")));
 }
 
@@ -49,7 +49,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         if (system.sleeping) {
             require_sleeping(system);
             if (control_)
-                throw InputError("bodies may sleep with a fixed step only; give a \"step\", no \"tolerance\"");
+                throw InputError("bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
             sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
             solver_->resting = sleeping_.get();
         }

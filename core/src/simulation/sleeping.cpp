@@ -11,21 +11,21 @@ namespace delassus {
 
 // ---- Falling asleep ----
 //
-// What sleeps or wakes does so by parts of the step's problem: bodies and nodes that contacts, joints, springs or
-// elements connect. After a step in which all of a part have been slower than `speed` for at least `time`, their
-// velocities are set to zero, and the part is on trial: the next step is solved from rest. It stands still if no speed
-// x that comes of this, the acceleration by h, would grow to `speed` within `time`:
+// Parts of the step's problem sleep and wake as a whole: bodies and nodes that contacts, joints, springs or elements
+// connect. After a step in which all of a part have been slower than `speed` for at least `time`, their velocities are
+// set to zero, and the part is on trial: the next step is solved from rest. A speed x of that step is an acceleration
+// times h. The part stands still if no x would grow to `speed` within `time`:
 //
 //     x ≤ speed · h/time
 //
-// so that what is slow only for the moment, or slides ever faster, goes on. If it stands still, x is set to zero.
+// so a part that is slow only for the moment, or slides ever faster, goes on. If it stands still, x is set to zero.
 //
 // ---- Sleeping ----
 //
 // With v = 0 and positions that are kept to the bit, the part's problem is the same in each step that follows, so that
 // its solution is: it is left out, and its reactions stay. Whatever could wake it changes the problem: another body
 // that comes near or goes, a load or a motor that varies, a step of another size. The identity of the problem, a hash
-// of its rows and right-hand sides, tells. What wakes must be quiet for `time` again.
+// of its rows and right-hand sides, reveals the change. What wakes must be quiet for `time` again.
 
 namespace {
 

@@ -93,7 +93,8 @@ public:
         // Nothing of the rule is installed, or none got there: everyone else who can, from the best so far.
         if (!done)
             for (const auto& name : unnamed(registry_, needs)) {
-                const RankedStage ranked{name, {}, {.reason = "those before it did not get there", .watched = true}};
+                const RankedStage ranked{
+                    name, {}, {.reason = "the solvers before it did not reach the tolerance", .watched = true}};
                 const bool tried =
                     std::any_of(report.stages.begin(), report.stages.end(), [&](const StageReport& stage) {
                         return stage.solver == name && stage.law == problem.problem().law;
@@ -141,7 +142,7 @@ PluginInfo auto_info(const Registry& registry) {
                      0.0,
                      {},
                      "",
-                     "File that says who solves what; empty: ranking.json of the plugin folders"},
+                     "File of the rules that pick solvers; empty: ranking.json of the plugin folders"},
                     {"simulation",
                      DELASSUS_OPTION_BOOLEAN,
                      "false",
@@ -149,7 +150,7 @@ PluginInfo auto_info(const Registry& registry) {
                      0.0,
                      {},
                      "",
-                     "The problems are steps of a simulation, each near to the one before"}};
+                     "The problems are steps of a simulation, each close to the one before"}};
     for (const auto& plugin : registry.plugins()) info.capabilities |= plugin.capabilities;
     return info;
 }

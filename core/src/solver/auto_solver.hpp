@@ -12,10 +12,10 @@
 namespace delassus {
 
 inline constexpr const char* auto_name = "auto";
-/// In a plugin folder: who solves what. It is no sidecar.
+/// In a plugin folder: the rules that pick solvers. It is not a sidecar.
 inline constexpr const char* ranking_file_name = "ranking.json";
 
-/// What `delassus plugins info auto` shows. It can what any plugin of the registry can.
+/// What `delassus plugins info auto` shows. Its capabilities are the union of all registered plugins'.
 [[nodiscard]] PluginInfo auto_info(const Registry& registry);
 
 /// Throws InputError on a bad option or ranking. The registry must outlive the solver.

@@ -39,7 +39,7 @@ public:
         StageRunner runner(problem, solution, settings, report);
         const bool done = runner.run(main_, {.reason = "the solver that was asked for", .tolerance = finish_at_}) ||
                           runner.run(finish_, {.reason = "its finish"});
-        if (!done) runner.run(main_, {.reason = "the finish did not get there"});
+        if (!done) runner.run(main_, {.reason = "the finish did not reach the tolerance"});
         report.message = runner.sentence();
     }
 

@@ -18,7 +18,7 @@ struct RankedStage {
     std::string solver;
     OptionTexts options;
     Stage stage;
-    bool last = false;  ///< where this one does not get there, neither would any other: nobody comes after it
+    bool last = false;  ///< no other stage follows: where this one fails, the others would too
 };
 
 /// What a rule looks at, apart from m.

@@ -198,10 +198,9 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
         least > lost_in_rounding * natural_bound) {
         report.status = Status::NumericalFailure;
         report.message = fmt::format(
-            "the natural error is {:.2e} in numbers and {:.1e} or more in truth, the tolerance {:.2e}: the reactions "
-            "are "
-            "so large against the velocities that they correct that these are lost in rounding (masses or lengths of "
-            "too different sizes)",
+            "the natural error is measured as {:.2e} but is in truth {:.1e} or more, the tolerance is {:.2e}: next to "
+            "such large reactions the velocities that they correct are lost in rounding (masses or lengths of too "
+            "different sizes)",
             report.error.natural, least, settings.tolerance);
     }
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;

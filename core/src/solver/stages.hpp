@@ -23,7 +23,7 @@ struct Stage {
     std::optional<Law> law = {};
 };
 
-/// Foretells by measurement whether an iteration will reach a tolerance in time. At iterations 16, 32, 64, … the
+/// Forecasts by measurement whether an iteration will reach a tolerance in time. At iterations 16, 32, 64, … the
 /// natural error e is taken; let ln e fall by r₁ and then by r₂ in the last two doublings. An algebraic rate e ~ k^(−p)
 /// has r₂ = r₁, a linear one e ~ q^k has r₂ = 2 r₁; so the next doublings are taken to bring g r₂, g² r₂, … with g =
 /// r₂/r₁ held between 1 and 2. A forecast is trusted when it fails twice in a row. Iterations, not seconds: the same on

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pages that are whole in one file. Their parts stand beside libdelassus (tools/pages puts them there).
+// Pages in a single file. Their parts stand beside libdelassus (tools/pages puts them there).
 #pragma once
 
 #include <filesystem>

@@ -16,7 +16,7 @@ namespace {
 using hdf5::Group;
 using hdf5::Handle;
 
-/// What of the steps is read.
+/// The datasets of steps that are read.
 constexpr std::array<Column, 5> series_columns = {{{"energy", "J", "energy"},
                                                    {"drift", "m, rad", "constraint drift"},
                                                    {"penetration", "m", "penetration"},
@@ -152,7 +152,7 @@ std::vector<RecordedSystem> read_file(const std::filesystem::path& path, const R
             fmt::format("{} cannot be opened: {}.", name, error ? error.message() : hdf5::last_complaint()));
     const Group root(Handle(H5Gopen2(file.get(), "/", H5P_DEFAULT)), name, "", bytes);
     if (root.attribute_text("format") != "delassus-trajectory")
-        throw InputError(fmt::format("{} is an HDF5 file, but no trajectory of Delassus.", name));
+        throw InputError(fmt::format("{} is an HDF5 file, but not a trajectory of Delassus.", name));
     const Group group = root.group("systems");
     std::vector<RecordedSystem> systems;
     for (const auto& member : group.members()) {

@@ -43,8 +43,7 @@ public:
         step({"natural", "1", "largest natural error of the step's solves"});
         step({"seconds", "s", "wall time of the step"});
         step({"solved", "1", "1 if every solve reached its tolerance", true});
-        step(
-            {"linearization", "1", "what the forces of a linearised method were off by, as a share of the velocities"});
+        step({"linearization", "1", "error of the forces of a linearised method, as a share of the velocities"});
         const Handle frames = group_in(group.get(), "frames", resume, file);
         const auto frame = [&](const Column& column, std::vector<hsize_t> shape = {}) {
             frames_.emplace_back(frames.get(), column, std::move(shape), resume, system.frames, file);

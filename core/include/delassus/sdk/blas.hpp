@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The system's BLAS, found at run time: its kernels fit the processor, which a compiled plugin's need not.
+// The system's BLAS, found at run time: its kernels fit the processor, unlike those of a plugin compiled for all.
 #pragma once
 
 #include <dlfcn.h>

@@ -26,8 +26,8 @@ public:
 
     [[nodiscard]] const Blas* blas() const { return blas_; }
 
-    /// panel: [A11; A21], height × k, becomes [L11; L21]. sign: k. update: A22. What is above the diagonals is of no
-    /// meaning afterwards. False if a pivot has the wrong sign or is not finite.
+    /// panel: [A11; A21], height × k, becomes [L11; L21]. sign: k. update: A22. What is above the diagonals is
+    /// meaningless afterwards. False if a pivot has the wrong sign or is not finite.
     [[nodiscard]] bool factor(Block panel, const double* sign, Block update) {
         if (!factor_columns(panel, sign)) return false;
         const Eigen::Index k = panel.cols();

@@ -13,8 +13,8 @@
 //                    direction c, K = ‖z_t‖/‖Π(z)_t‖ − 1: how far z lies outside, over the radius of curvature.
 // The matrix is symmetric positive semidefinite and the system is solved by conjugate gradients, truncated where the
 // residual is small or δ leaves a trust region: N is singular as a rule (redundant contacts), far along its null space
-// the pieces are others. The step goes to Π(λ + δ), and along the segment to there to the minimum of f, so f never
-// grows: a feasible, monotone acceleration (Moré and Toraldo 1991 for boxes; Dostál and Kučera 2010 for balls).
+// other pieces apply. The step goes to Π(λ + δ), and along the segment to there to the minimum of f, so f never grows:
+// a feasible, monotone acceleration (Moré and Toraldo 1991 for boxes; Dostál and Kučera 2010 for balls).
 #pragma once
 
 #include <algorithm>

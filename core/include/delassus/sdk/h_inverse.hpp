@@ -28,7 +28,7 @@ public:
     enum class Kind { None, Diagonal, Blocks, Sparse };
 
     /// Reads the structure from the needs that the host derived. Throws std::invalid_argument unless H is definite.
-    /// Where the pattern of a sparse H is that of the last call, its analysis is kept, whatever became of D.
+    /// Where the pattern of a sparse H is that of the last call, its analysis is kept, whatever changed in D.
     void analyze(const ProblemView& problem) {
         n_ = problem.n;
         if (problem.needs_any(DELASSUS_CAN_REDUCED) || n_ == 0) {
@@ -132,8 +132,8 @@ public:
     /// The factor of a sparse H.
     [[nodiscard]] const SparseFactor& sparse() const { return *sparse_; }
 
-    /// The smallest L_jj² / H_jj of the Cholesky factor, at most 1: how far each freedom keeps clear of depending on
-    /// the others, whatever its units. At rounding level H is singular to working precision.
+    /// The smallest L_jj² / H_jj of the Cholesky factor, at most 1: how far each freedom is from depending on the
+    /// others, whatever its units. At rounding level H is singular to working precision.
     [[nodiscard]] double smallest_relative_pivot() const { return smallest_relative_pivot_; }
 
     [[nodiscard]] Kind kind() const { return kind_; }

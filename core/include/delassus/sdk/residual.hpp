@@ -50,7 +50,7 @@ public:
         assign(problem, diagonal, r);
     }
 
-    /// In place of what was there; allocates nothing if that was of the same sizes.
+    /// Replaces the former problem; allocates nothing if its sizes were the same.
     void assign(const ProblemView& problem, const Vector& diagonal, const Vector& r) {
         cones_.assign(problem.cones.begin(), problem.cones.end());
         coulomb_ = problem.coulomb;

@@ -9,7 +9,7 @@
 // mass ratios leave D and only the coupling of constraints remains. The factors are powers of two: scaling rounds
 // nothing.
 //
-// Residuals are accumulated in long double, by which iterative refinement reaches the accuracy of the stored answer
+// Residuals are accumulated in long double, so that iterative refinement reaches the accuracy of the stored answer
 // (Higham, Accuracy and Stability of Numerical Algorithms, chapter 12).
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The convex problem behind the associated law, scaled so that its operator has a unit diagonal on the average:
+// The convex problem behind the associated law, scaled so that its operator has a unit diagonal on average:
 //
 //     minimise  f(λ) = ½ λᵀ N λ + rᵀ λ   over Υ,     ∇f(λ) = N λ + r = u           (seed, eq. 120–122, with the ½)
 //
@@ -38,8 +38,8 @@ public:
     struct Interval {
         std::int32_t first, rows;
     };
-    /// About a thousand rows that follow one another, with what belongs to them. Who works by parts, and adds up what
-    /// the parts give in their order, gets the same bits whatever the number of threads.
+    /// About a thousand rows that follow one another, with what belongs to them. A method that works by parts, and adds
+    /// up their results in their order, gets the same bits for any number of threads.
     struct Part {
         std::int32_t first = 0, rows = 0;
         std::size_t first_block = 0, blocks = 0, first_interval = 0, intervals = 0, first_group = 0, groups = 0;

@@ -48,7 +48,7 @@ public:
     /// Counts a product with N that made no new iterate; true: stop now.
     [[nodiscard]] bool count() { return monitor_.check(iteration_++, nullptr, lambda_, latest_); }
 
-    /// Ends the run as stalled: the method knows of no better iterate, and why.
+    /// Ends the run as stalled, with the reason why the method finds no better iterate.
     void stall(std::string reason) {
         monitor_.outcome().status = DELASSUS_STALLED;
         monitor_.outcome().message = std::move(reason);

@@ -68,7 +68,7 @@ class Solver {
 public:
     virtual ~Solver() = default;
 
-    /// A last look at a problem whose needs are all met: an empty string to take it, or the reason to refuse.
+    /// Called for a problem whose needs are all met: an empty string accepts it, anything else is the reason to refuse.
     [[nodiscard]] virtual std::string refusal(const ProblemView&) { return {}; }
 
     /// The pattern is new.

@@ -18,7 +18,7 @@ namespace delassus::sdk {
 /// whose dense front takes the matrix's entries and the updates of its children in the elimination tree, is factored
 /// as far as its own columns go, and leaves its Schur complement to its parent. Order: AMD, or nested
 /// dissection by METIS where it is installed and takes fewer operations. Fronts are factored by Eigen, or by the
-/// system's BLAS where the analysis foretells so much work that loading it pays.
+/// system's BLAS where the analysis foresees so much work that loading it pays.
 class SparseFactor {
 public:
     enum class Kernels { Best, Eigen };
@@ -55,7 +55,7 @@ public:
     [[nodiscard]] bool uses_blas() const { return front_.blas() != nullptr; }
     [[nodiscard]] std::string kernels() const { return front_.blas() ? front_.blas()->description() : "Eigen"; }
 
-    /// Which half-solved rows D L⁻ᵀ have entries where; the pattern of D (any rows, as many columns as the matrix).
+    /// Where the half-solved rows D L⁻ᵀ have entries; the pattern of D (any rows, as many columns as the matrix).
     [[nodiscard]] Reach reach(const SparseRowsView& D) const;
 
     /// Z = L⁻¹ P Dᵀ in dense panels, of a matrix whose pivots are all positive: visit(first, rows, panel) for each

@@ -2,9 +2,9 @@
 // A few threads that work together within one solve, with barriers of less than a microsecond.
 //
 // A team lives for one call of solve(): between calls there is no thread that could burn time, keep a process from
-// ending, or be missing in the child of a fork. Who waits, first watches a counter for about as long as a
-// sweep takes and then sleeps; where the team is larger than the number of processors that the process may use (a
-// benchmark pins its runs to one) it sleeps at once.
+// ending, or be missing in the child of a fork. A member that waits first watches a counter for about as long as a
+// sweep takes, and then sleeps. It sleeps at once if the team is larger than the number of processors that the process
+// may use (a benchmark pins its runs to one).
 #pragma once
 
 #include <pthread.h>
@@ -71,7 +71,7 @@ public:
         barrier();
     }
 
-    /// Called by every member inside run(): nobody goes on before all have come.
+    /// Called by every member inside run(): no member goes on before all have come.
     void barrier() {
         if (size() == 1) return;
         const std::uint32_t turn = turn_.load(std::memory_order_relaxed);

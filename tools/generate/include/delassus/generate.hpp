@@ -49,9 +49,9 @@ struct Generator {
 /// kind or key (with the nearest name), for values out of range, and for parameters that contradict one another.
 [[nodiscard]] DELASSUS_API Problem generate(std::string_view kind, const std::map<std::string, double>& values = {});
 
-// ---- By structure: what each kind is made of
-// ------------------------------------------------------------------------- The functions throw InputError if a member
-// is outside the range that generators() gives, or for contradictions.
+// ---- By structure: the parameters of each kind -------------------------------------------------------------------
+//
+// The functions throw InputError if a member is outside the range that generators() gives, or for contradictions.
 
 /// Rods that hang from a fixed point, joined end to end. Free rows: 3 for a joint (m/s), and for a hinge 2 more (rad/s)
 /// in a block of their own, so that no block mixes units.
@@ -218,8 +218,7 @@ struct MotorsParameters {
 };
 [[nodiscard]] DELASSUS_API Problem generate_motors(const MotorsParameters& parameters);
 
-// ---- From another problem
-// --------------------------------------------------------------------------------------------
+// ---- From another problem ---------------------------------------------------------------------------------------
 
 /// The problem in which every contact sticks: blocks of other cones become free blocks of the same rows, with b = 0
 /// there. So linear solvers can be compared on the geometry of a contact problem, with its redundant rows. These are
