@@ -44,7 +44,8 @@ int parse_and_run(int argc, char** argv) {
     CLI::App program{
         "Solves saddle-point and cone-complementarity problems with solvers that are plugins, compares them, and\n"
         "simulates mechanical systems with them.\n"
-        "Exit codes: 0 solved; 2 bad input or usage, a file that cannot be written, out of memory; 3 not converged; 4 the\n"
+        "Exit codes: 0 solved; 2 bad input or usage, a file that cannot be written, out of memory; 3 not converged; 4 "
+        "the\n"
         "solver cannot take the problem."};
     program.name("delassus");
     program.set_version_flag("--version", "delassus " DELASSUS_VERSION);

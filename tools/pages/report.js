@@ -125,7 +125,7 @@
       animation: false, textStyle: { fontFamily: getComputedStyle(document.body).fontFamily, color: "#1d2329" },
       aria: { enabled: true, label: { description: `Natural error against time on ${problem.name}` } },
       grid: { left: 68, right: Math.min(260, 20 + 6.4 * longest), top: 44, bottom: 52 },
-      legend: { top: 4, left: 0, right: 150, type: "scroll", itemWidth: 38, itemHeight: 4, itemGap: 18, data: rows.map((row) => row.label) },
+      legend: { top: 4, left: 0, right: 150, type: "scroll", itemWidth: 38, itemHeight: 14, itemStyle: { opacity: 0 }, itemGap: 18, data: rows.map((row) => row.label) },
       xAxis: { ...axisStyle, ...xAxis, name: "solver’s own time [s]", nameGap: 32 },
       yAxis: { ...axisStyle, type: "log", name: "natural error", nameGap: 50, min: decade(low, Math.floor), max: decade(high * 1.5, Math.ceil),
                axisLabel: { formatter: power } },
