@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Allocations that fail, one at a time and all above a size, all along a command: it ends with a sentence and an exit
 // code, never by a crash, and leaves nothing half-written.
-#include <nlohmann/json.hpp>
+#include <regex>
 
 #include "fault_fixture.hpp"
 #include "support/scenes.hpp"

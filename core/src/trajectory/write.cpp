@@ -150,6 +150,9 @@ public:
                             : H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
                      name_)) {
         if (!resume) {
+            std::uint64_t bytes = 0;
+            for (const auto& system : systems) bytes += largest_size(system.model);
+            reserve(file_.get(), bytes, name_);
             put_text(file_.get(), "format", "delassus-trajectory", name_);
             put_number(file_.get(), "version", 1.0, name_);
         }
