@@ -19,22 +19,28 @@ std::atomic<void*> reserve{nullptr};
 std::atomic<const char*> activity{nullptr};
 int last_exit_code = 1;
 std::terminate_handler former_handler = nullptr;
+std::atomic<bool> memory_has_ended{false};
 
 /// Called by operator new in place of a failing allocation.
 void give_up_reserve() {
+    memory_has_ended = true;
     std::free(reserve.exchange(nullptr));
     throw std::bad_alloc();
 }
 
 void on_terminate() {
+    // A std::bad_alloc in a noexcept function of the standard library (directory_iterator has one) is not current here.
+    bool by_memory = memory_has_ended;
     try {
         if (const auto cause = std::current_exception()) std::rethrow_exception(cause);
     } catch (const std::bad_alloc&) {
-        say_out_of_memory();
-        _exit(last_exit_code);
+        by_memory = true;
     } catch (...) {
+        by_memory = false;
     }
-    former_handler();
+    if (!by_memory) former_handler();
+    say_out_of_memory();
+    _exit(last_exit_code);
 }
 
 }  // namespace

@@ -47,6 +47,12 @@ Handle::~Handle() {
     if (id_ >= 0) H5Idec_ref(id_);
 }
 
+void require_memory(std::uint64_t bytes) {
+    constexpr std::uint64_t of_hdf5 = 8 << 20;  // caches of metadata and chunks, buffers to convert in
+    void* volatile block = ::operator new(of_hdf5 + bytes);
+    ::operator delete(block);
+}
+
 std::string last_complaint() {
     std::string text;
     // From the innermost failure outwards: the first one says most.

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -35,24 +36,32 @@ void send(std::string_view message, int pipe) {
     }
 }
 
-std::string message_of(const std::filesystem::path& file, const std::function<std::string()>& work) {
+/// What the child is to do with a file.
+struct Task {
+    const std::filesystem::path& file;
+    const char* done;  ///< "read" or "written"
+    rlim_t seconds;    ///< of processor time
+    const std::function<std::string()>& work;
+};
+
+std::string message_of(const Task& task) {
     try {
-        return holds_result + work() + message_end;
+        return holds_result + task.work() + message_end;
     } catch (const InputError& refusal) {
         return holds_refusal + std::string(refusal.what()) + message_end;
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& failure) {
-        return holds_refusal + fmt::format("{} cannot be read: {}.", file.string(), failure.what()) + message_end;
+        return holds_refusal + fmt::format("{} cannot be {}: {}.", task.file.string(), task.done, failure.what()) +
+               message_end;
     }
 }
 
 /// Nothing that is thrown may leave the child: it would go on as a second parent.
-[[noreturn]] void run_in_child(const std::filesystem::path& file, unsigned seconds,
-                               const std::function<std::string()>& work, int pipe) noexcept {
+[[noreturn]] void run_in_child(const Task& task, int pipe) noexcept {
     for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGPIPE}) std::signal(signal, SIG_DFL);
     const rlimit no_core{0, 0};
-    const rlimit processor_time{seconds, seconds};
+    const rlimit processor_time{task.seconds, task.seconds};
     setrlimit(RLIMIT_CORE, &no_core);
     setrlimit(RLIMIT_CPU, &processor_time);
     // What the C library says about a damaged heap is not for the user.
@@ -60,7 +69,7 @@ std::string message_of(const std::filesystem::path& file, const std::function<st
     dup2(nowhere, STDOUT_FILENO);
     dup2(nowhere, STDERR_FILENO);
     try {
-        send(message_of(file, work), pipe);
+        send(message_of(task), pipe);
     } catch (const std::bad_alloc&) {
         send(out_of_memory, pipe);
     } catch (...) {
@@ -87,23 +96,24 @@ std::string read_to_end(int pipe) {
     }
 }
 
-}  // namespace
-
-std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
-                          const std::function<std::string()>& work) {
+/// What the child returned, or nothing and its status if it failed without a sentence.
+std::optional<std::string> result_of(const Task& task, int& status) {
+    const auto refuse = [&] {
+        throw InputError(fmt::format("{} cannot be {}: {}.", task.file.string(), task.done, std::strerror(errno)));
+    };
     int pipe[2];
-    if (pipe2(pipe, O_CLOEXEC) != 0)
-        throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(errno)));
+    if (pipe2(pipe, O_CLOEXEC) != 0) refuse();
     const pid_t child = fork();
     if (child == 0) {
         close(pipe[0]);
-        run_in_child(file, seconds, work, pipe[1]);
+        run_in_child(task, pipe[1]);
     }
     const int fork_error = errno;
     close(pipe[1]);
     if (child < 0) {
         close(pipe[0]);
-        throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(fork_error)));
+        errno = fork_error;
+        refuse();
     }
     std::string message;
     try {
@@ -115,16 +125,32 @@ std::string call_in_child(const std::filesystem::path& file, const char* library
         throw;
     }
     close(pipe[0]);
-    const int status = wait_for(child);
+    status = wait_for(child);
     if (message == out_of_memory) throw std::bad_alloc();
     if (message.size() >= 2 && message.back() == message_end) {
-        const std::string content = message.substr(1, message.size() - 2);
+        std::string content = message.substr(1, message.size() - 2);
         if (message[0] == holds_result) return content;
         if (message[0] == holds_refusal) throw InputError(content);
     }
+    return std::nullopt;
+}
+
+}  // namespace
+
+std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
+                          const std::function<std::string()>& work) {
+    int status = 0;
+    if (auto result = result_of({file, "read", seconds, work}, status)) return std::move(*result);
     const bool too_long = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
     throw InputError(
         fmt::format("{} is damaged: {} {} on it.", file.string(), library, too_long ? "does not end" : "fails"));
+}
+
+void write_in_child(const std::filesystem::path& file, const char* library, const std::function<void()>& work) {
+    int status = 0;
+    const std::function<std::string()> write = [&] { return work(), std::string(); };
+    if (!result_of({file, "written", RLIM_INFINITY, write}, status))
+        throw InputError(fmt::format("{} cannot be written: {} fails.", file.string(), library));
 }
 
 }  // namespace delassus

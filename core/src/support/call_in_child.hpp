@@ -16,4 +16,9 @@ namespace delassus {
 DELASSUS_API std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
                                        const std::function<std::string()>& work);
 
+/// Runs work(), which writes the file, in a child process: for libraries that crash where memory or the disk ends.
+/// Throws likewise.
+DELASSUS_API void write_in_child(const std::filesystem::path& file, const char* library,
+                                 const std::function<void()>& work);
+
 }  // namespace delassus

@@ -129,6 +129,7 @@ public:
         for (const auto* all : {&steps_, &contacts_, &frames_})
             for (const auto& series : *all) growth += series.growth();
         if (growth == 0) return;
+        hdf5::require_memory(growth);
         reserve(file_, growth, name_);
         for (auto* all : {&steps_, &contacts_, &frames_})
             for (auto& series : *all) series.write();
@@ -188,6 +189,7 @@ private:
 
 extern "C" DELASSUS_API delassus::TrajectoryWriter* delassus_trajectory_open(
     const std::filesystem::path& file, const std::vector<delassus::TrajectorySystem>& systems, bool resume) {
+    delassus::hdf5::require_memory();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures become sentences
     return new delassus::trajectory::Hdf5Writer(file, systems, resume);
 }
