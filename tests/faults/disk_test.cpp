@@ -25,7 +25,7 @@ void PrintTo(const Writer& writer, std::ostream* out) {
 }
 
 const std::string run_pendulum = "run " + example_scene("pendulum") + " --end 0.1 --every 5 -o ";
-const std::string compare_boxes = "compare INPUT/boxes --solvers pgs --repeats 1 -o DISK/out";
+const std::string compare_pile = "compare INPUT/pile --solvers apgd --repeats 1 -o DISK/out";
 
 class FullDisk : public testing::TestWithParam<Writer> {
 protected:
@@ -37,9 +37,9 @@ protected:
 #endif
         fs::create_directory(input_);
         fs::create_directory(disk_);
-        run("generate box_stack INPUT/boxes --set boxes=30");
+        run("generate sphere_pile INPUT/pile --set contacts=60");
         run("generate box_stack INPUT/small --set boxes=1");
-        std::ofstream(input_ / "suite.yaml") << "title: T\nproblems: [boxes]\nsolvers: [pgs]\ntolerances: [1e-3]\n"
+        std::ofstream(input_ / "suite.yaml") << "title: T\nproblems: [pile]\nsolvers: [apgd]\ntolerances: [1e-3]\n"
                                                 "repeats: 1\nreferences: {time_limit: 1}\n";
     }
 
@@ -106,16 +106,16 @@ INSTANTIATE_TEST_SUITE_P(
         Writer{"generate", {"generate box_stack DISK/p --set boxes=2"}, "generate box_stack DISK/p --set boxes=30"},
         Writer{"generate_hdf5",
                {"convert INPUT/small DISK/p.hdf5 --law coulomb"},
-               "convert INPUT/boxes DISK/p.hdf5 --law coulomb",
+               "convert INPUT/pile DISK/p.hdf5 --law coulomb",
                true},
-        Writer{"new_hdf5", {}, "convert INPUT/boxes DISK/p.hdf5 --law coulomb", true},
-        Writer{"convert", {"convert INPUT/small DISK/p --law coulomb"}, "convert INPUT/boxes DISK/p --law coulomb"},
+        Writer{"new_hdf5", {}, "convert INPUT/pile DISK/p.hdf5 --law coulomb", true},
+        Writer{"convert", {"convert INPUT/small DISK/p --law coulomb"}, "convert INPUT/pile DISK/p --law coulomb"},
         Writer{"solution",
-               {"solve INPUT/small --solver pgs --solution DISK/s"},
-               "solve INPUT/boxes --solver pgs --solution DISK/s"},
-        Writer{"new_solution", {}, "solve INPUT/boxes --solver pgs --solution DISK/s"},
+               {"solve INPUT/small --solver apgd --solution DISK/s"},
+               "solve INPUT/pile --solver apgd --solution DISK/s"},
+        Writer{"new_solution", {}, "solve INPUT/pile --solver apgd --solution DISK/s"},
         Writer{"view", {run_pendulum + "DISK/run", "view DISK/run"}, "view DISK/run", true, true},
-        Writer{"compare", {compare_boxes}, compare_boxes + " --tolerance 1e-5"},
+        Writer{"compare", {compare_pile}, compare_pile + " --tolerance 1e-5"},
         Writer{
             "bench_report", {"bench run INPUT/suite.yaml -o DISK/out --cache INPUT/cache"}, "bench report DISK/out"}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
@@ -145,7 +145,7 @@ TEST(FullDiskOf, BenchmarkGoesOnLater) {
         EXPECT_EQ(result.exit_code, 2) << result.errors;
         EXPECT_NE(result.errors.find("cannot be"), std::string::npos) << result.errors;
         const std::string rows = text_of(folder / "out" / "results.jsonl");
-        if (!rows.empty()) EXPECT_EQ(rows.back(), '\n');
+        EXPECT_TRUE(rows.empty() || rows.back() == '\n');
     }
     disk.make_room();
     const auto result = run_words(words);
@@ -194,7 +194,8 @@ protected:
         const auto resumed = run("1.5", " --resume " + folder.string());
         ASSERT_EQ(resumed.exit_code, 0) << resumed.errors;
         EXPECT_EQ(state_of(folder), state_of(whole_));
-        if (fs::exists(page_parts() / "echarts.min.js")) EXPECT_EQ(frames_of(folder), frames_of(whole_));
+        if (!fs::exists(page_parts() / "echarts.min.js")) return;
+        EXPECT_EQ(frames_of(folder), frames_of(whole_));
     }
 
     ScratchFolder scratch_;

@@ -3,11 +3,12 @@
    DELASSUS_FAIL_AT=N         the N-th allocation fails, once
    DELASSUS_FAIL_ABOVE=BYTES  whatever would take what main() holds above that size fails: a machine with so much memory
    DELASSUS_FAIL_IN=WORD      only in a program whose first argument is this one
-   DELASSUS_FAIL_NOT_IN=NAME  not those that a library asks for whose file name holds this one
+   DELASSUS_FAIL_NOT_IN=NAME  the N-th is not one for which a library asks whose file name holds this one
    DELASSUS_FAIL_REPORT=FILE  at exit, one line with the number of allocations and the largest size goes to the file */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
+#include <execinfo.h>
 #include <malloc.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -25,21 +26,27 @@ static atomic_long allocations, held, most_held, fail_at;
 static long fail_above;
 static const char *report_file, *spared;
 
-/* caller: an address in the function that asks. The next allocation is tried where this one is spared. */
-static int fails(size_t size, const void* caller) {
+/* Whether the library that is spared is among the callers, libc's functions that it calls included. */
+static int is_spared(void) {
+    void* frames[64];
+    Dl_info place;
+    if (!spared) return 0;
+    const int count = backtrace(frames, 64);
+    for (int k = 0; k < count; ++k)
+        if (dladdr(frames[k], &place) && place.dli_fname && strstr(place.dli_fname, spared)) return 1;
+    return 0;
+}
+
+/* The next allocation is tried where this one is spared. */
+static int fails(size_t size) {
     if (!atomic_load(&armed)) return 0;
     const long number = atomic_fetch_add(&allocations, 1) + 1;
-    long expected = number;
-    if (number == atomic_load(&fail_at)) {
-        Dl_info place;
-        if (spared && dladdr(caller, &place) && place.dli_fname && strstr(place.dli_fname, spared)) {
-            atomic_compare_exchange_strong(&fail_at, &expected, number + 1);
-            return 0;
-        }
-        errno = ENOMEM;
-        return 1;
+    const int above = fail_above > 0 && atomic_load(&held) + (long)size > fail_above;
+    if (number != atomic_load(&fail_at) && !above) return 0;
+    if (!above && is_spared()) {
+        atomic_store(&fail_at, number + 1);
+        return 0;
     }
-    if (fail_above == 0 || atomic_load(&held) + (long)size <= fail_above) return 0;
     errno = ENOMEM;
     return 1;
 }
@@ -54,13 +61,13 @@ static void* taken(void* pointer) {
 }
 
 void* malloc(size_t size) {
-    return fails(size, __builtin_return_address(0)) ? NULL : taken(__libc_malloc(size));
+    return fails(size) ? NULL : taken(__libc_malloc(size));
 }
 void* calloc(size_t count, size_t size) {
-    return fails(count * size, __builtin_return_address(0)) ? NULL : taken(__libc_calloc(count, size));
+    return fails(count * size) ? NULL : taken(__libc_calloc(count, size));
 }
 void* memalign(size_t alignment, size_t size) {
-    return fails(size, __builtin_return_address(0)) ? NULL : taken(__libc_memalign(alignment, size));
+    return fails(size) ? NULL : taken(__libc_memalign(alignment, size));
 }
 void* aligned_alloc(size_t alignment, size_t size) {
     return memalign(alignment, size);
@@ -76,7 +83,7 @@ void free(void* pointer) {
     __libc_free(pointer);
 }
 void* realloc(void* pointer, size_t size) {
-    if (fails(size, __builtin_return_address(0))) return NULL;
+    if (fails(size)) return NULL;
     if (pointer && atomic_load(&armed)) atomic_fetch_sub(&held, (long)malloc_usable_size(pointer));
     return taken(__libc_realloc(pointer, size));
 }
@@ -101,6 +108,7 @@ static int armed_main(int count, char** arguments, char** environment) {
         if (at) atomic_store(&fail_at, atol(at));
         if (above) fail_above = atol(above);
         if (report_file) atexit(report);
+        is_spared();  // the first look loads the unwinder
         atomic_store(&armed, 1);
     }
     return real_main(count, arguments, environment);

@@ -11,8 +11,7 @@ namespace {
 
 struct Command {
     const char* name;
-    std::string line;          ///< INPUT and OUT stand for folders
-    std::string output;        ///< what it writes into OUT; empty for nothing
+    std::string line;          ///< INPUT and OUT stand for folders, of which the second is empty before
     const char* in = nullptr;  ///< only processes with this first argument fail
     int samples = 24;
 };
@@ -71,7 +70,9 @@ protected:
         EXPECT_EQ(result.signal, 0) << told;
         EXPECT_FALSE(result.timed_out) << told;
         const int code = result.exit_code.value_or(-1);
-        EXPECT_TRUE(code == 0 || code == 2 || code == 3 || code == 4) << told;
+        // The dynamic loader ends the process itself where it finds no memory for a thread's data.
+        const bool by_loader = code == 127 && told.find("thread-local data: ABORT") != std::string::npos;
+        EXPECT_TRUE(by_loader || code == 0 || code == 2 || code == 3 || code == 4) << told;
         EXPECT_EQ(told.find("terminate called"), std::string::npos) << told;
         EXPECT_EQ(told.find("crashed"), std::string::npos) << told;
         if (code != 0) {
@@ -105,15 +106,16 @@ TEST_P(OutOfMemory, EndsInOrder) {
 
 INSTANTIATE_TEST_SUITE_P(
     Of, OutOfMemory,
-    testing::Values(
-        Command{"solve", "solve INPUT/boxes --solver pgs --solution OUT/s"},
-        Command{"solve_hdf5", "solve INPUT/boxes.hdf5 --solver pgs"}, Command{"solve_auto", "solve INPUT/boxes --json"},
-        Command{"run", "run " + example_scene("box_on_incline") + " --end 0.05 -o OUT/run"},
-        Command{"inspect", "inspect INPUT/boxes --json"}, Command{"inspect_hdf5", "inspect INPUT/boxes.hdf5"},
-        Command{"convert", "convert INPUT/boxes OUT/p.hdf5 --law coulomb"},
-        Command{"generate", "generate sphere_pile OUT/p --set contacts=30"},
-        Command{"compare", "compare INPUT/boxes --solvers pgs --repeats 1 -o OUT/c", "", "compare", 10},
-        Command{"compares_worker", "compare INPUT/boxes --solvers pgs --repeats 1 -o OUT/c", "", "worker", 10}),
+    testing::Values(Command{"solve", "solve INPUT/boxes --solver pgs --solution OUT/s"},
+                    Command{"solve_hdf5", "solve INPUT/boxes.hdf5 --solver pgs"},
+                    Command{"solve_auto", "solve INPUT/boxes --json"},
+                    Command{"run", "run " + example_scene("box_on_incline") + " --end 0.05 -o OUT/run"},
+                    Command{"inspect", "inspect INPUT/boxes --json"},
+                    Command{"inspect_hdf5", "inspect INPUT/boxes.hdf5"},
+                    Command{"convert", "convert INPUT/boxes OUT/p.hdf5 --law coulomb"},
+                    Command{"generate", "generate sphere_pile OUT/p --set contacts=30"},
+                    Command{"compare", "compare INPUT/boxes --solvers pgs --repeats 1 -o OUT/c", "compare", 10},
+                    Command{"compares_worker", "compare INPUT/boxes --solvers pgs --repeats 1 -o OUT/c", "worker", 10}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
 
 }  // namespace

@@ -82,7 +82,7 @@ int parse_and_run(int argc, char** argv) {
 void say(const char* sentence) {
     std::fputs("delassus: ", stderr);
     std::fputs(sentence, stderr);
-    std::fputs("\n", stderr);
+    std::fputs(memory_has_ended() ? " (after an allocation had failed: out of memory)\n" : "\n", stderr);
 }
 
 }  // namespace

@@ -19,18 +19,18 @@ std::atomic<void*> reserve{nullptr};
 std::atomic<const char*> activity{nullptr};
 int last_exit_code = 1;
 std::terminate_handler former_handler = nullptr;
-std::atomic<bool> memory_has_ended{false};
+std::atomic<bool> allocation_failed{false};
 
 /// Called by operator new in place of a failing allocation.
 void give_up_reserve() {
-    memory_has_ended = true;
+    allocation_failed = true;
     std::free(reserve.exchange(nullptr));
     throw std::bad_alloc();
 }
 
 void on_terminate() {
     // A std::bad_alloc in a noexcept function of the standard library (directory_iterator has one) is not current here.
-    bool by_memory = memory_has_ended;
+    bool by_memory = allocation_failed;
     try {
         if (const auto cause = std::current_exception()) std::rethrow_exception(cause);
     } catch (const std::bad_alloc&) {
@@ -54,6 +54,10 @@ void prepare_for_out_of_memory(int exit_code) {
 
 void set_activity(const char* now) {
     activity = now;
+}
+
+bool memory_has_ended() {
+    return allocation_failed;
 }
 
 void say_out_of_memory() {

@@ -12,6 +12,10 @@ void prepare_for_out_of_memory(int exit_code);
 /// What this process does, for the sentence: "solving", say. The text must live on.
 void set_activity(const char* activity);
 
+/// Whether an allocation has failed in this process. Streams swallow the exception, so that what follows may be told
+/// as something else.
+[[nodiscard]] bool memory_has_ended();
+
 /// "delassus: out of memory while solving" to standard error. Allocates nothing.
 void say_out_of_memory();
 
