@@ -80,7 +80,7 @@ TEST_P(FullDisk, LeavesWhatWasThere) {
     const SmallDisk disk(disk_, 8 << 20);
     if (!disk.refusal().empty()) GTEST_SKIP() << disk.refusal();
     ASSERT_NO_FATAL_FAILURE(prepare());
-    for (const off_t left : {0, 4096, 12288}) {  // nothing fits; something does
+    for (const off_t left : {0, 4096, 8192}) {  // nothing fits; something does
         SCOPED_TRACE(left);
         disk.fill(left);
         auto old = snapshot(disk_);
@@ -124,8 +124,7 @@ TEST(FullDiskOf, StandardOutputIsNoSuccess) {
     for (const char* command : {"--help", "bench list", "plugins list --json"}) {
         const auto result = run_shell(std::string(DELASSUS_COMMAND) + " " + command + " >/dev/full");
         EXPECT_EQ(result.exit_code, 2) << command;
-        EXPECT_NE(result.err.find("standard output cannot be written: No space left on device"), std::string::npos)
-            << command << result.err;
+        EXPECT_NE(result.err.find("No space left on device"), std::string::npos) << command << result.err;
     }
 }
 

@@ -15,6 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#pragma GCC visibility push(default)
+
 extern void* __libc_malloc(size_t size);
 extern void* __libc_calloc(size_t count, size_t size);
 extern void* __libc_realloc(void* pointer, size_t size);
