@@ -77,7 +77,8 @@ protected:
         EXPECT_EQ(told.find("crashed"), std::string::npos) << told;
         if (code != 0) {
             ++failures_;
-            const bool says = std::regex_search(told, std::regex("memory|alloc", std::regex::icase));
+            // The last is how the dynamic loader says it.
+            const bool says = std::regex_search(told, std::regex("memory|alloc|shared object descriptor", std::regex::icase));
             EXPECT_TRUE(says) << told;
         }
         const auto now = snapshot(scratch_ / "out");
