@@ -156,6 +156,22 @@ TEST_F(BenchReport, AxesAreHeatMaps) {
         EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
 }
 
+TEST_F(BenchReport, LinesAreThoseOfOtherPages) {
+    if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
+    const auto run = open(
+        "const root = document.documentElement, look = (name) => { const path = [...document.querySelectorAll('#legend "
+        "button')].find((one) => one.dataset.name === name).querySelector('.swatch path');"
+        "return path.getAttribute('stroke') + path.getAttribute('stroke-dasharray'); };"
+        "root.dataset.solvers = solverLabels.length; root.dataset.looks = new Set(solverLabels.map(look)).size;"
+        "const alone = (name) => { const {colour, dash} = lineStyles([name]).get(name);"
+        "return colour + (dash.join(' ') || 'none'); };"
+        "root.dataset.same = ['apgd', 'pgs', 'hht'].every((name) => look(name) === alone(name));");
+    ASSERT_FALSE(run.timed_out);
+    const std::string head = run.dom.substr(0, 600);
+    for (const char* fact : {"data-solvers=\"5\"", "data-looks=\"5\"", "data-same=\"true\""})
+        EXPECT_NE(head.find(fact), std::string::npos) << fact << head << run.log;
+}
+
 TEST_F(BenchReport, AScreenshotShowsIt) {
     if (!tests::has_browser()) GTEST_SKIP() << "chromium is not installed";
     const auto shot = folder / "report.png", blank = folder / "blank.png";

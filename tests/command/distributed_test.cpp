@@ -40,6 +40,34 @@ TEST_P(DistributedCommand, GivesTheSerialAnswer) {
     EXPECT_LE(difference, 1e-8 * size);
 }
 
+// A process of its own makes no folder where others of its user make and remove theirs, and leaves nothing.
+TEST_P(DistributedCommand, AloneNeedsNoSessionFolder) {
+    const std::string solver = GetParam();
+    if (run_command("plugins info " + solver).exit_code != 0) GTEST_SKIP() << solver << " is not built";
+    const ScratchFolder folder;
+    const std::string problem = (folder / "chain").string(), temporary = (folder / "tmp").string();
+    ASSERT_EQ(run_command("generate chain " + problem + " --set bodies=5").exit_code, 0);
+    const std::string line = std::string(DELASSUS_COMMAND) + " solve " + problem + " --solver " + solver;
+    const auto nowhere = run_shell("TMPDIR=/dev/null/none " + line);
+    EXPECT_EQ(nowhere.exit_code, 0) << nowhere.err;
+    std::filesystem::create_directory(temporary);
+    const auto somewhere = run_shell("TMPDIR=" + temporary + " " + line);
+    EXPECT_EQ(somewhere.exit_code, 0) << somewhere.err;
+    EXPECT_TRUE(std::filesystem::is_empty(temporary));
+}
+
+TEST_P(DistributedCommand, ManyStartAtOnce) {
+    const std::string solver = GetParam();
+    if (run_command("plugins info " + solver).exit_code != 0) GTEST_SKIP() << solver << " is not built";
+    const ScratchFolder folder;
+    const std::string problem = (folder / "chain").string();
+    ASSERT_EQ(run_command("generate chain " + problem + " --set bodies=5").exit_code, 0);
+    const auto all =
+        run_shell("for round in 1 2 3 4 5; do for process in 1 2 3 4 5 6; do " + std::string(DELASSUS_COMMAND) +
+                  " solve " + problem + " --solver " + solver + " >/dev/null || echo failed & done; wait; done");
+    EXPECT_EQ(all.out, "") << all.err;
+}
+
 INSTANTIATE_TEST_SUITE_P(Solvers, DistributedCommand, testing::Values("petsc", "mumps"),
                          [](const auto& parameter) { return std::string(parameter.param); });
 

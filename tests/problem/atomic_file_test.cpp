@@ -2,13 +2,12 @@
 #include "support/atomic_file.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <array>
-#include <csignal>
 #include <fstream>
 
 #include "delassus/error.hpp"
+#include "support/full_disk.hpp"
 #include "support/problem_equality.hpp"
 #include "support/run_command.hpp"
 
@@ -24,27 +23,6 @@ std::ptrdiff_t entries_of(const fs::path& folder) {
     return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
 }
 
-/// No file of this process may grow beyond so many bytes while this lives: a disk that is full.
-class FullDisk {
-public:
-    explicit FullDisk(rlim_t bytes) {
-        old_handler_ = std::signal(SIGXFSZ, SIG_IGN);
-        getrlimit(RLIMIT_FSIZE, &old_);
-        const rlimit limited{bytes, old_.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &limited);
-    }
-    FullDisk(const FullDisk&) = delete;
-    FullDisk& operator=(const FullDisk&) = delete;
-    ~FullDisk() {
-        setrlimit(RLIMIT_FSIZE, &old_);
-        std::signal(SIGXFSZ, old_handler_);
-    }
-
-private:
-    rlimit old_{};
-    void (*old_handler_)(int);
-};
-
 TEST(AtomicFile, WritesAndReplaces) {
     const ScratchFolder scratch;
     write_file_atomically(scratch / "file", "one");
@@ -58,12 +36,42 @@ TEST(AtomicFile, AFailingWriteLeavesTheOldFile) {
     write_file_atomically(scratch / "file", "old");
     std::string sentence;
     {
-        const FullDisk full(1000);
+        const FileSizeLimit full(1000);
         sentence = sentence_of<InputError>([&] { write_file_atomically(scratch / "file", std::string(100000, 'x')); });
     }
     expect_sentence(sentence, "file cannot be written|large");
     EXPECT_EQ(text_of(scratch / "file"), "old");
     EXPECT_EQ(entries_of(scratch.path()), 1);
+}
+
+TEST(AtomicFile, OfSeveralAllOrNone) {
+    const ScratchFolder scratch;
+    write_files_atomically({{scratch / "one", "1"}, {scratch / "two", "2"}});
+    std::string sentence;
+    {
+        const FileSizeLimit full(1000);
+        sentence = sentence_of<InputError>([&] {
+            write_files_atomically({{scratch / "one", "new"}, {scratch / "two", std::string(100000, 'x')}});
+        });
+    }
+    expect_sentence(sentence, "two cannot be written|large");
+    EXPECT_EQ(text_of(scratch / "one") + text_of(scratch / "two"), "12");
+    write_files_atomically({{scratch / "one", "new"}, {scratch / "two", "newer"}});
+    EXPECT_EQ(text_of(scratch / "one") + text_of(scratch / "two"), "newnewer");
+    EXPECT_EQ(entries_of(scratch.path()), 2);
+}
+
+TEST(AtomicFile, AppendsAllOrNothing) {
+    const ScratchFolder scratch;
+    append_to_file(scratch / "file", "one\n");
+    std::string sentence;
+    {
+        const FileSizeLimit full(1000);
+        sentence = sentence_of<InputError>([&] { append_to_file(scratch / "file", std::string(100000, 'x')); });
+    }
+    expect_sentence(sentence, "file cannot be written|large");
+    append_to_file(scratch / "file", "two\n");
+    EXPECT_EQ(text_of(scratch / "file"), "one\ntwo\n");
 }
 
 TEST(AtomicFile, RefusesFoldersAndMissingParents) {

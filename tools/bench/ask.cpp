@@ -11,6 +11,9 @@ namespace delassus::bench {
 
 namespace {
 
+/// How the last words of a worker begin that had no memory left even to answer (process/out_of_memory.hpp).
+constexpr std::string_view no_memory = "delassus: out of memory";
+
 /// Cuts the output into lines of JSON.
 class Lines {
 public:
@@ -95,13 +98,16 @@ void judge_end(std::string& status, std::string& message, const ChildResult& chi
         if (!status.empty()) return;
         ended = "cancelled";
         sentence = "interrupted" + where;
+    } else if (const auto line = last_line(child.errors); !done && child.signal == 0 && line.rfind(no_memory, 0) == 0) {
+        ended = "memory";
+        sentence = line.substr(std::string_view("delassus: ").size()) + where;
     } else if (child.signal != 0 || !done) {
         ended = "crashed";
         sentence =
             (child.signal != 0 ? signal_name(child.signal)
                                : fmt::format("left its process with exit code {}", child.exit_code.value_or(0))) +
             (done ? " when its process ended" : where);
-        if (const auto line = last_line(child.errors); !line.empty()) sentence += ": " + line;
+        if (!line.empty()) sentence += ": " + line;
     } else {
         return;
     }

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <string>
+#include <string_view>
 
 #include "bench/json_text.hpp"
 #include "delassus/error.hpp"
@@ -19,16 +20,24 @@ public:
     void send(const char* event, Json fields = Json::object()) const {
         Json line = {{"event", event}};
         line.update(fields);
-        const std::string text = text_of(line) + "\n";
-        for (std::size_t sent = 0; sent < text.size();) {
-            const ssize_t written = write(descriptor_, text.data() + sent, text.size() - sent);
-            if (written < 0 && errno != EINTR)
-                throw Error("the process that started the worker no longer reads from it");
-            if (written > 0) sent += static_cast<std::size_t>(written);
-        }
+        write_all(text_of(line) + "\n");
+    }
+
+    /// The event "failed" of a worker whose memory does not suffice; needs none itself.
+    void send_out_of_memory() const {
+        write_all("{\"event\":\"failed\",\"kind\":\"memory\",\"message\":\"out of memory\"}\n");
     }
 
 private:
+    void write_all(std::string_view text) const {
+        while (!text.empty()) {
+            const ssize_t written = write(descriptor_, text.data(), text.size());
+            if (written < 0 && errno != EINTR)
+                throw Error("the process that started the worker no longer reads from it");
+            if (written > 0) text.remove_prefix(static_cast<std::size_t>(written));
+        }
+    }
+
     int descriptor_;
 };
 

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "bench/rows.hpp"
 #include "delassus/error.hpp"
+#include "support/atomic_file.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus::bench {
@@ -114,9 +114,7 @@ ResultsFile::ResultsFile(const fs::path& folder) : file_(folder / file_name) {
 }
 
 void ResultsFile::add(const Json& row) {
-    std::ofstream stream(file_, std::ios::binary | std::ios::app);
-    stream << text_of(row) << '\n' << std::flush;
-    if (!stream) throw InputError(fmt::format("{} cannot be written", file_.string()));
+    append_to_file(file_, text_of(row) + '\n');
     note(row);
 }
 

@@ -228,8 +228,8 @@ int run_worker(const std::string& request_text, int descriptor) {
         kind = "input";
         message = error.what();
     } catch (const std::bad_alloc&) {
-        kind = "memory";
-        message = "out of memory";
+        channel.send_out_of_memory();
+        return 2;
     } catch (const std::exception& error) {
         message = error.what();
     }

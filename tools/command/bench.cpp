@@ -13,7 +13,6 @@
 #include "measuring.hpp"
 #include "process/child_process.hpp"
 #include "process/supervision.hpp"
-#include "support/atomic_file.hpp"
 
 namespace delassus::command {
 
@@ -34,12 +33,12 @@ void report(const fs::path& folder) {
     const bench::ResultSet results = bench::read_results(folder);
     const bench::Json analysis = bench::analyse(results);
     const std::string summary = bench::summary_markdown(results, analysis);
-    write_file_atomically(folder / "summary.md", summary);
-    write_file_atomically(folder / "results.csv", bench::solves_csv(results));
-    if (!results.cells.empty()) write_file_atomically(folder / "cells.csv", bench::cells_csv(results));
-    if (!results.simulations.empty())
-        write_file_atomically(folder / "simulations.csv", bench::simulations_csv(results));
-    const auto no_page = write_page(folder / "report.html", [&] { return bench::bench_page(results, analysis); });
+    std::vector<std::pair<fs::path, std::string>> files = {{folder / "summary.md", summary},
+                                                           {folder / "results.csv", bench::solves_csv(results)}};
+    if (!results.cells.empty()) files.emplace_back(folder / "cells.csv", bench::cells_csv(results));
+    if (!results.simulations.empty()) files.emplace_back(folder / "simulations.csv", bench::simulations_csv(results));
+    const auto no_page = write_report_files(std::move(files), folder / "report.html",
+                                            [&] { return bench::bench_page(results, analysis); });
     fmt::print("{}\n{}\n", summary,
                (folder / (no_page.empty() ? "report.html" : "summary.md")).lexically_normal().string());
     if (!no_page.empty()) fmt::print(stderr, "delassus: {}\n", no_page);

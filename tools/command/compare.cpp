@@ -11,7 +11,6 @@
 #include "measuring.hpp"
 #include "process/child_process.hpp"
 #include "process/supervision.hpp"
-#include "support/atomic_file.hpp"
 
 namespace delassus::command {
 
@@ -53,9 +52,9 @@ void check(const CompareArguments& arguments) {
 
 /// Writes the three files; the sentence why there is no page, or nothing.
 std::string write_files(const bench::Comparison& comparison, const fs::path& folder) {
-    write_file_atomically(folder / "results.json", bench::json_text(comparison));
-    write_file_atomically(folder / "results.csv", bench::csv_text(comparison));
-    return write_page(folder / "report.html", [&] { return bench::html_text(comparison); });
+    return write_report_files({{folder / "results.json", bench::json_text(comparison)},
+                               {folder / "results.csv", bench::csv_text(comparison)}},
+                              folder / "report.html", [&] { return bench::html_text(comparison); });
 }
 
 int compare(const CompareArguments& arguments) {

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
+#include <iostream>
 #include <new>
 
 #include "command.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
+#include "process/out_of_memory.hpp"
 
 namespace delassus::command {
 
@@ -27,15 +32,21 @@ std::vector<std::filesystem::path> absolute(std::vector<std::filesystem::path> f
     return folders;
 }
 
-}  // namespace delassus::command
+namespace {
 
-int main(int argc, char** argv) {
-    using namespace delassus;
-    using namespace delassus::command;
+/// What was printed has been written; throws Error if not. A disk may be full where standard output is a file.
+void flush_output() {
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout.flush())
+        throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
+}
+
+int parse_and_run(int argc, char** argv) {
     CLI::App program{
         "Solves saddle-point and cone-complementarity problems with solvers that are plugins, compares them, and\n"
         "simulates mechanical systems with them.\n"
-        "Exit codes: 0 solved; 2 bad input or usage; 3 not converged; 4 the solver cannot take the problem."};
+        "Exit codes: 0 solved; 2 bad input or usage, a file that cannot be written, out of memory; 3 not converged; 4 "
+        "the\n"
+        "solver cannot take the problem."};
     program.name("delassus");
     program.set_version_flag("--version", "delassus " DELASSUS_VERSION);
     program.require_subcommand(1);
@@ -53,20 +64,44 @@ int main(int argc, char** argv) {
     add_convert(program, action);
     add_generate(program, action);
     add_worker(program, action);
+    int exit_code = exit_bad_input;
     try {
         program.parse(argc, argv);
+        static const std::string activity =
+            fmt::format("running \"delassus {}\"", program.get_subcommands().front()->get_name());
+        set_activity(activity.c_str());
+        exit_code = action.run();
     } catch (const CLI::ParseError& error) {
-        return program.exit(error) == 0 ? exit_solved : exit_bad_input;
+        exit_code = program.exit(error) == 0 ? exit_solved : exit_bad_input;
     }
+    flush_output();
+    return exit_code;
+}
+
+/// Writes one sentence to standard error; allocates nothing.
+void say(const char* sentence) {
+    std::fputs("delassus: ", stderr);
+    std::fputs(sentence, stderr);
+    std::fputs(memory_has_ended() ? " (after an allocation had failed: out of memory)\n" : "\n", stderr);
+}
+
+}  // namespace
+}  // namespace delassus::command
+
+int main(int argc, char** argv) {
+    using namespace delassus;
+    using namespace delassus::command;
+    prepare_for_out_of_memory(exit_bad_input);
+    std::signal(SIGXFSZ, SIG_IGN);  // a file beyond the limit of sizes is one that cannot be written, with a sentence
     try {
-        return action.run();
+        return parse_and_run(argc, argv);
     } catch (const Unsupported& error) {
-        fmt::print(stderr, "delassus: {}\n", error.what());
+        say(error.what());
         return exit_unsupported;
     } catch (const std::bad_alloc&) {
-        fmt::print(stderr, "delassus: out of memory\n");
+        say_out_of_memory();
     } catch (const std::exception& error) {
-        fmt::print(stderr, "delassus: {}\n", error.what());
+        say(error.what());
     }
     return exit_bad_input;
 }

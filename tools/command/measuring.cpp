@@ -34,18 +34,19 @@ void MeasuringProgress::show(const std::string& figures) const {
     if (shown_) fmt::print(stderr, "\r\033[K{}  {}", what_, figures);
 }
 
-std::string write_page(const std::filesystem::path& file, const std::function<std::string()>& text) {
-    std::string page;
+std::string write_report_files(std::vector<std::pair<std::filesystem::path, std::string>> files,
+                               const std::filesystem::path& page, const std::function<std::string()>& page_text) {
+    std::string no_page;
     try {
-        page = text();
+        files.emplace_back(page, page_text());
     } catch (const InputError& error) {
-        std::error_code ignored;
-        std::filesystem::remove(file, ignored);
-        return fmt::format("no {} was written, because a part of the page is missing: {}", file.filename().string(),
-                           error.what());
+        no_page = fmt::format("no {} was written, because a part of the page is missing: {}", page.filename().string(),
+                              error.what());
     }
-    write_file_atomically(file, page);
-    return {};
+    write_files_atomically(files);
+    std::error_code ignored;
+    if (!no_page.empty()) std::filesystem::remove(page, ignored);
+    return no_page;
 }
 
 std::vector<std::string> own_command_line() {

@@ -31,9 +31,11 @@ private:
     std::chrono::steady_clock::time_point next_;
 };
 
-/// Writes the page that `text` makes; where a part of the page is missing, removes what was there before, which would
-/// mislead, and returns the sentence why there is none.
-[[nodiscard]] std::string write_page(const std::filesystem::path& file, const std::function<std::string()>& text);
+/// Writes a report: all of its files, and the page that page_text makes, or none of them. Where a part of the page is
+/// missing, removes the page that was there before, which would mislead, and returns the sentence why there is none.
+[[nodiscard]] std::string write_report_files(std::vector<std::pair<std::filesystem::path, std::string>> files,
+                                             const std::filesystem::path& page,
+                                             const std::function<std::string()>& page_text);
 
 /// The command line of this process, as it was given.
 [[nodiscard]] std::vector<std::string> own_command_line();

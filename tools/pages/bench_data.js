@@ -5,10 +5,9 @@ const results = JSON.parse(document.getElementById("results").textContent);
 const solverLabels = [...new Set(results.solves.map((row) => row.label))];
 const steppers = [...new Set(results.simulations.map((row) => row.timestepper))];
 const seriesNames = [...solverLabels, ...steppers];
-const placeOf = (name) => Math.max(solverLabels.indexOf(name), steppers.indexOf(name));
-const colourOf = (name) => colours[placeOf(name) % colours.length];
-// Beyond the colours, lines of the same colour differ by their dashes.
-const dashOf = (name) => ["solid", "dashed", "dotted"][Math.floor(placeOf(name) / colours.length) % 3];
+// Solvers and timesteppers never share a chart, so that each kind has all colours for itself.
+const styles = new Map([...lineStyles(steppers), ...lineStyles(solverLabels)]);
+const colourOf = (name) => styles.get(name)?.colour;
 const problemOf = Object.fromEntries(results.problems.map((problem) => [problem.problem, problem]));
 const sceneOf = Object.fromEntries(results.scenes.map((scene) => [scene.scene, scene]));
 const solvedRow = (row) => row.cause === "";
@@ -17,7 +16,7 @@ const totalSeconds = (row) => (row.seconds.setup === null ? null : row.seconds.s
 const skippedRow = (row) => row.skipped_after !== undefined;
 const statusMark = (row) => element("span", { className: `status ${row.cause || row.status}`,
   textContent: spoken(row.cause || row.status) + (skippedRow(row) ? " (not run)" : "") });
-const swatch = (name) => element("span", { className: "swatch", style: `background:${colourOf(name)}` });
+const swatch = (name) => swatchOf(styles.get(name));
 
 const hidden = new Set();
 const charts = [];
@@ -79,7 +78,7 @@ const baseOption = (description) => ({
 
 const lineSeries = (name, data, more = {}) => ({
   name, type: "line", data, color: colourOf(name), animation: false, symbol: "circle", symbolSize: 6,
-  lineStyle: { width: 1.8, type: dashOf(name) }, emphasis: { disabled: true }, ...more,
+  lineStyle: { width: 1.8, type: dashType(styles.get(name).dash) }, emphasis: { disabled: true }, ...more,
 });
 
 function section(id, title, ...children) {

@@ -54,7 +54,7 @@ function problemOption(rows, title, view, logarithmic) {
       ...all.filter(([name]) => !hidden.has(name)).map(([name, data, own]) => {
         const end = own.find((row) => row.curve.samples.length > 0);
         return lineSeries(name, data, view.curve ? {
-          showSymbol: true, symbolSize: 3,
+          symbolSize: 7, itemStyle: { opacity: 0 }, // samples are dense: seen, they would hide the dash; the mouse finds them
           endLabel: { show: true, formatter: end && end.cause ? `${name}: ${spoken(end.cause)}` : name, color: colourOf(name), fontSize: 11 },
           labelLayout: { moveOverlap: "shiftY" },
         } : {});

@@ -2,8 +2,6 @@
 // What the reports of `delassus compare` and `delassus bench` have in common: elements, numbers, colours, axes.
 "use strict";
 const least = { seconds: 1e-6, error: 1e-17 }; // what logarithmic axes make of zeros
-// Okabe and Ito's colours, which stay apart for colour-blind readers, and three more.
-const colours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#4d4d4d", "#a6761d", "#8a8a00"];
 const spoken = (status) => status.replaceAll("_", " ");
 
 const element = (tag, properties = {}, ...children) => {
@@ -11,6 +9,61 @@ const element = (tag, properties = {}, ...children) => {
   made.append(...children);
   return made;
 };
+
+// How the line of a method is drawn: a colour and a dash that no other line of the page has. Both follow from the name, so that a
+// method looks the same on all pages: its hash names a home. Where two names have one home, the later takes the next that is free;
+// names with options, such as pgs(omega=1.2), come after those without, so that a variant displaces nobody.
+// The colours are Okabe and Ito's without yellow, and purple. Two that are close to one another, for a colour-blind reader above all, have
+// no dash in common among the homes: CIE76 distances with the same dash are at least 20 (Machado's simulation, 2009).
+const dashes = { solid: [], dashed: [8, 4], dotted: [2, 3], dashdot: [10, 3, 2, 3] };
+const homes = [
+  ["#202020", "solid"], ["#cc79a7", "dashdot"], ["#e69f00", "dotted"], ["#0072b2", "dashdot"],
+  ["#56b4e9", "solid"], ["#6a3d9a", "dotted"], ["#d55e00", "solid"], ["#6a3d9a", "dashed"],
+  ["#cc79a7", "solid"], ["#009e73", "dashed"], ["#0072b2", "solid"], ["#009e73", "dotted"],
+  ["#56b4e9", "dashdot"], ["#e69f00", "dashed"], ["#202020", "dashdot"], ["#d55e00", "dashdot"],
+].map(([colour, dash]) => ({ colour, dash: dashes[dash] }));
+
+// FNV-1a from an offset with which the names of the solvers and timesteppers at hand do not collide.
+function homeOf(name) {
+  let hash = 14830;
+  for (const character of name) hash = Math.imul(hash ^ character.codePointAt(0), 16777619) >>> 0;
+  return (hash >>> 16) % homes.length;
+}
+
+// Beyond the homes, the same colours with ever more dots after a dash; the two homes of a colour have even and odd numbers of them.
+function lineStyle(place) {
+  const round = Math.floor(place / homes.length), home = homes[place % homes.length];
+  const dots = 2 * round + Number([dashes.dotted, dashes.dashdot].includes(home.dash));
+  return round === 0 ? home : { colour: home.colour, dash: [10, 3, ...Array(dots).fill([2, 3]).flat()] };
+}
+
+// Name to { colour, dash }; dash: lengths of strokes and gaps in pixels, none for a solid line.
+function lineStyles(names) {
+  const plain = (name) => !name.includes("(");
+  const order = [...new Set(names)].sort((a, b) => plain(b) - plain(a) || (a < b ? -1 : 1));
+  const taken = new Set();
+  return new Map(order.map((name) => {
+    let place = homeOf(name);
+    for (let tries = 1; taken.has(place); ++tries) // around the homes of this round, then of the next
+      place = tries % homes.length === 0 ? homeOf(name) + tries : Math.floor(place / homes.length) * homes.length + (place + 1) % homes.length;
+    taken.add(place);
+    return [name, lineStyle(place)];
+  }));
+}
+
+const dashType = (dash) => (dash.length === 0 ? "solid" : dash); // as ECharts has it
+
+// A piece of the line, as it stands in legends and tables.
+function swatchOf({ colour, dash }) {
+  const picture = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  const line = document.createElementNS(picture.namespaceURI, "path");
+  const attributes = { d: "M1 5H37", stroke: colour, "stroke-width": 2.6, "stroke-dasharray": dash.join(" ") || "none", fill: "none" };
+  for (const [key, value] of Object.entries(attributes)) line.setAttribute(key, value);
+  picture.setAttribute("class", "swatch");
+  picture.setAttribute("aria-hidden", "true");
+  picture.append(line);
+  return picture;
+}
 
 const missing = "—";
 const error = (value) => (value === null || value === undefined ? missing : value === 0 ? "0" : value.toExponential(2));

@@ -4,7 +4,8 @@
 (() => {
   const results = JSON.parse(document.getElementById("results").textContent);
   const labels = [...new Set(results.problems.flatMap((problem) => problem.results.map((row) => row.label)))];
-  const colourOf = (label) => colours[labels.indexOf(label) % colours.length];
+  const styles = lineStyles(labels);
+  const colourOf = (label) => styles.get(label).colour;
   function writeHead() {
     const { settings, machine, build } = results;
     const rows = results.problems.flatMap((problem) => problem.results);
@@ -49,7 +50,7 @@
       const solve = element("td", { textContent: seconds(row.seconds.solve), className: row === fastest ? "best" : "" });
       if (row.seconds.repeats.length > 1) solve.append(element("small", { textContent: ` – ${seconds(slowest)}` }));
       const cells = [
-        element("td", {}, element("span", { className: "swatch", style: `background:${colourOf(row.label)}` }), row.label),
+        element("td", {}, swatchOf(styles.get(row.label)), row.label),
         element("td", {}, element("span", { className: `status ${row.status}`, textContent: spoken(row.status) })),
         element("td", { textContent: whole(row.iterations) }),
         element("td", { textContent: seconds(row.seconds.setup) }),
@@ -90,8 +91,8 @@
       const data = points(row);
       const end = data[data.length - 1];
       return {
-        name: row.label, type: "line", data, color: colourOf(row.label), animation: false, showSymbol: false,
-        lineStyle: { width: 1.8 }, emphasis: { disabled: true },
+        name: row.label, type: "line", data, color: colourOf(row.label), animation: false, symbol: "none",
+        lineStyle: { width: 1.8, type: dashType(styles.get(row.label).dash) }, emphasis: { disabled: true },
         endLabel: { show: true, formatter: ending(row), color: colourOf(row.label), fontSize: 11, distance: 10 },
         labelLayout: { moveOverlap: "shiftY" },
         markPoint: {
@@ -121,10 +122,10 @@
     });
     const longest = Math.max(14, ...rows.map((row) => ending(row).length));
     return {
-      animation: false, color: colours, textStyle: { fontFamily: getComputedStyle(document.body).fontFamily, color: "#1d2329" },
+      animation: false, textStyle: { fontFamily: getComputedStyle(document.body).fontFamily, color: "#1d2329" },
       aria: { enabled: true, label: { description: `Natural error against time on ${problem.name}` } },
       grid: { left: 68, right: Math.min(260, 20 + 6.4 * longest), top: 44, bottom: 52 },
-      legend: { top: 4, left: 0, right: 150, type: "scroll", icon: "roundRect", itemHeight: 4, itemGap: 18, data: rows.map((row) => row.label) },
+      legend: { top: 4, left: 0, right: 150, type: "scroll", itemWidth: 38, itemHeight: 14, itemStyle: { opacity: 0 }, itemGap: 18, data: rows.map((row) => row.label) },
       xAxis: { ...axisStyle, ...xAxis, name: "solver’s own time [s]", nameGap: 32 },
       yAxis: { ...axisStyle, type: "log", name: "natural error", nameGap: 50, min: decade(low, Math.floor), max: decade(high * 1.5, Math.ceil),
                axisLabel: { formatter: power } },

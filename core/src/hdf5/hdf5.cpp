@@ -47,6 +47,12 @@ Handle::~Handle() {
     if (id_ >= 0) H5Idec_ref(id_);
 }
 
+void require_memory(std::uint64_t bytes) {
+    constexpr std::uint64_t of_hdf5 = 8 << 20;  // caches of metadata and chunks, buffers to convert in
+    void* volatile block = ::operator new(of_hdf5 + bytes);
+    ::operator delete(block);
+}
+
 std::string last_complaint() {
     std::string text;
     // From the innermost failure outwards: the first one says most.
@@ -56,6 +62,12 @@ std::string last_complaint() {
         return 0;
     };
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
+    // Of a system call that failed: time, file and addresses, and among them the system's words.
+    const std::string opening = "error message = '";
+    if (const auto at = text.find(opening); at != std::string::npos) {
+        text.erase(0, at + opening.size());
+        text.resize(std::min(text.find('\''), text.size()));
+    }
     return text.substr(0, 200);
 }
 

@@ -43,6 +43,10 @@ private:
     hid_t id_ = H5I_INVALID_HID;
 };
 
+/// Throws std::bad_alloc unless HDF5 has the memory that it needs for small files, and so many bytes more. It crashes
+/// where an allocation of its own fails.
+void require_memory(std::uint64_t bytes = 0);
+
 /// What HDF5 last complained about, in its words; empty if nothing.
 std::string last_complaint();
 

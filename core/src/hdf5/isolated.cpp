@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "delassus/error.hpp"
+#include "hdf5/hdf5.hpp"
 #include "support/call_in_child.hpp"
 
 namespace delassus::hdf5 {
@@ -21,6 +22,7 @@ void read_isolated(const std::filesystem::path& file, const std::function<void(P
     const auto bytes = std::filesystem::file_size(file, error);
     const auto seconds = least_seconds + (error ? 0 : static_cast<unsigned>(bytes / bytes_per_second));
     const std::string message = call_in_child(file, "HDF5", seconds, [&] {
+        require_memory();
         Packer packer;
         read(packer);
         return packer.bytes;

@@ -98,11 +98,12 @@ Problem read_problem_folder(const fs::path& folder) {
 }
 
 void write_problem_folder(const Problem& problem, const fs::path& folder) {
+    const std::string json = problem_json_text(problem);
     AtomicFolder target(folder, problem_files);
     const auto write = [&](const char* name, const std::string& text) {
         write_file_atomically(target.path() / name, text);
     };
-    write("problem.json", problem_json_text(problem));
+    write("problem.json", json);
     if (problem.H.entries() > 0) write("H.mtx", matrix_market_text(problem.H, true));
     if (problem.D.entries() > 0) write("D.mtx", matrix_market_text(problem.D, false));
     if (problem.E.entries() > 0) write("E.mtx", matrix_market_text(problem.E, true));

@@ -6,6 +6,7 @@
 #include <boost/dll/shared_library.hpp>
 #include <cstring>
 #include <mutex>
+#include <new>
 #include <set>
 
 #include "delassus/error.hpp"
@@ -33,6 +34,8 @@ boost::dll::shared_library open(const std::filesystem::path& path, bool global) 
     // The overload with an error_code loses the loader's message, so the exception is caught instead.
     try {
         return boost::dll::shared_library(path, rtld_now | (global ? rtld_global : rtld_local));
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception& error) {
         throw PluginError(fmt::format("cannot load the plugin {}: {}", path.string(), error.what()));
     }
@@ -131,6 +134,8 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
     try {
         plugin->descriptor_ = library.get<const delassus_plugin_descriptor*()>(DELASSUS_PLUGIN_SYMBOL)();
         plugin->info_ = read_descriptor(plugin->descriptor_);
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception& error) {
         throw PluginError(fmt::format("the plugin {}: {}", absolute.string(), error.what()));
     } catch (...) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 
 #include "delassus/error.hpp"
 #include "problem/infeasibility.hpp"
@@ -47,7 +48,7 @@ struct Listener {
     double seconds_before;  // setup
     double next_sample = 0.0;
     Clock::time_point next_display = Clock::now();
-    std::string failure = {};
+    std::exception_ptr failure = {};
     bool given_up = false;
 
     [[nodiscard]] double elapsed() const { return seconds_before + watch.seconds(); }
@@ -81,9 +82,9 @@ struct Listener {
             self.watch.stop();
             answer = self.hear(iteration, x, lambda);
             if (self.given_up && answer == DELASSUS_CONTINUE) answer = DELASSUS_STOP_CANCEL;
-        } catch (const std::exception& error) {
+        } catch (...) {
             self.watch.stop();
-            self.failure = error.what();
+            self.failure = std::current_exception();
         }
         self.watch.start();
         return answer;
@@ -239,7 +240,7 @@ void PluginSolver::run(const PreparedProblem& problem, Solution& solution, const
                                   &outcome);
         });
         watch.stop();
-        if (!listener.failure.empty()) throw Error(listener.failure);
+        if (listener.failure) std::rethrow_exception(listener.failure);
         if (thrown.empty()) report.iterations = outcome.iterations;
         given_up = listener.given_up;
     }

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+#include <system_error>
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
@@ -58,6 +60,7 @@ void Registry::scan(const fs::path& folder) {
             sidecars.insert(entry.path());
         if (entry.path().extension() == ".so") libraries.insert(entry.path());
     }
+    if (error == std::errc::not_enough_memory) throw std::bad_alloc();
     if (error) {
         rejected_.push_back({folder, fmt::format("cannot be read: {}", error.message())});
         return;

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <deque>
 
 #include "delassus/error.hpp"
 
@@ -39,6 +40,16 @@ void require_parent(const fs::path& target) {
 
 [[noreturn]] void refuse_write(const fs::path& target, int error_number) {
     throw InputError(fmt::format("{} cannot be written: {}.", target.string(), std::strerror(error_number)));
+}
+
+/// 0, or why not all could be written.
+int write_all(int file, std::string_view content) {
+    while (!content.empty()) {
+        const ssize_t written = ::write(file, content.data(), content.size());
+        if (written < 0 && errno != EINTR) return errno;
+        if (written > 0) content.remove_prefix(static_cast<std::size_t>(written));
+    }
+    return 0;
 }
 
 /// A name beside target that nothing has yet.
@@ -88,6 +99,14 @@ AtomicFile::~AtomicFile() {
     if (!temporary_.empty()) unlink(temporary_.c_str());
 }
 
+void AtomicFile::write(std::string_view content) {
+    const int file = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file < 0) refuse_write(target_, errno);
+    int failure = write_all(file, content);
+    if (close(file) != 0 && failure == 0) failure = errno;
+    if (failure != 0) refuse_write(target_, failure);
+}
+
 void AtomicFile::commit() {
     if (std::rename(temporary_.c_str(), target_.c_str()) != 0) refuse_write(target_, errno);
     temporary_.clear();
@@ -95,20 +114,24 @@ void AtomicFile::commit() {
 
 void write_file_atomically(const fs::path& path, std::string_view content) {
     AtomicFile target(path);
-    const int file = open(target.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    target.write(content);
+    target.commit();
+}
+
+void write_files_atomically(const std::vector<std::pair<fs::path, std::string>>& contents) {
+    std::deque<AtomicFile> files;
+    for (const auto& [path, content] : contents) files.emplace_back(path).write(content);
+    for (AtomicFile& file : files) file.commit();
+}
+
+void append_to_file(const fs::path& path, std::string_view content) {
+    const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
     if (file < 0) refuse_write(path, errno);
-    int failure = 0;
-    while (!content.empty() && failure == 0) {
-        const ssize_t written = write(file, content.data(), content.size());
-        if (written >= 0) {
-            content.remove_prefix(static_cast<std::size_t>(written));
-        } else if (errno != EINTR) {
-            failure = errno;
-        }
-    }
+    const off_t end = lseek(file, 0, SEEK_END);
+    int failure = write_all(file, content);
+    if (failure != 0 && end >= 0 && ftruncate(file, end) != 0) failure = errno;
     if (close(file) != 0 && failure == 0) failure = errno;
     if (failure != 0) refuse_write(path, failure);
-    target.commit();
 }
 
 AtomicFolder::AtomicFolder(fs::path target, std::span<const std::string_view> own_files)

@@ -4,7 +4,10 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "delassus/export.hpp"
 
@@ -14,8 +17,14 @@ namespace delassus {
 /// InputError says why.
 DELASSUS_API void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
-/// A file under construction by a library that opens files itself. Let it create path(), then commit(); a file that
-/// is not committed disappears.
+/// The same with several files that belong together: none is replaced before all are written.
+DELASSUS_API void write_files_atomically(const std::vector<std::pair<std::filesystem::path, std::string>>& contents);
+
+/// Adds to the end of the file, or creates it; all or nothing. Throws InputError if that fails.
+DELASSUS_API void append_to_file(const std::filesystem::path& path, std::string_view content);
+
+/// A file under construction: write() it, or let a library create path(); then commit(). A file that is not committed
+/// disappears.
 class DELASSUS_API AtomicFile {
 public:
     /// Throws InputError if target is a folder or its parent is missing.
@@ -26,6 +35,9 @@ public:
 
     /// The temporary name; nothing has it yet.
     [[nodiscard]] const std::filesystem::path& path() const { return temporary_; }
+
+    /// Creates it with this content; throws InputError if that fails.
+    void write(std::string_view content);
 
     /// Puts the file in its place; throws InputError and leaves the old one if that fails.
     void commit();

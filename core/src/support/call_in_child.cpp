@@ -11,6 +11,8 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <new>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -23,33 +25,65 @@ namespace {
 constexpr char holds_result = 'R';
 constexpr char holds_refusal = 'E';
 constexpr char message_end = '.';
+/// The message of a child whose memory did not suffice.
+constexpr std::string_view out_of_memory = "M.";
 
-[[noreturn]] void run_in_child(const std::filesystem::path& file, unsigned seconds,
-                               const std::function<std::string()>& work, int pipe) {
+void send(std::string_view message, int pipe) {
+    while (!message.empty()) {
+        const ssize_t written = write(pipe, message.data(), message.size());
+        if (written < 0 && errno != EINTR) _exit(1);
+        if (written > 0) message.remove_prefix(static_cast<std::size_t>(written));
+    }
+}
+
+/// What the child is to do with a file.
+struct Task {
+    const std::filesystem::path& file;
+    const char* done;  ///< "read" or "written"
+    rlim_t seconds;    ///< of processor time
+    const std::function<std::string()>& work;
+};
+
+std::string message_of(const Task& task) {
+    try {
+        return holds_result + task.work() + message_end;
+    } catch (const InputError& refusal) {
+        return holds_refusal + std::string(refusal.what()) + message_end;
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& failure) {
+        return holds_refusal + fmt::format("{} cannot be {}: {}.", task.file.string(), task.done, failure.what()) +
+               message_end;
+    }
+}
+
+/// Nothing that is thrown may leave the child: it would go on as a second parent.
+[[noreturn]] void run_in_child(const Task& task, int pipe) noexcept {
     for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGPIPE}) std::signal(signal, SIG_DFL);
     const rlimit no_core{0, 0};
-    const rlimit processor_time{seconds, seconds};
+    const rlimit processor_time{task.seconds, task.seconds};
     setrlimit(RLIMIT_CORE, &no_core);
     setrlimit(RLIMIT_CPU, &processor_time);
     // What the C library says about a damaged heap is not for the user.
     const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
     dup2(nowhere, STDOUT_FILENO);
     dup2(nowhere, STDERR_FILENO);
-    std::string message;
     try {
-        message = holds_result + work();
-    } catch (const InputError& refusal) {
-        message = std::string(1, holds_refusal) + refusal.what();
-    } catch (const std::exception& failure) {
-        message = holds_refusal + fmt::format("{} cannot be read: {}.", file.string(), failure.what());
-    }
-    message += message_end;
-    for (std::string_view rest = message; !rest.empty();) {
-        const ssize_t written = write(pipe, rest.data(), rest.size());
-        if (written < 0 && errno != EINTR) _exit(1);
-        if (written > 0) rest.remove_prefix(static_cast<std::size_t>(written));
+        send(message_of(task), pipe);
+    } catch (const std::bad_alloc&) {
+        send(out_of_memory, pipe);
+    } catch (...) {
+        _exit(1);
     }
     _exit(0);
+}
+
+/// The child's status, once it has ended.
+int wait_for(pid_t child) {
+    int status = 0;
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    return status;
 }
 
 std::string read_to_end(int pipe) {
@@ -62,35 +96,61 @@ std::string read_to_end(int pipe) {
     }
 }
 
+/// What the child returned, or nothing and its status if it failed without a sentence.
+std::optional<std::string> result_of(const Task& task, int& status) {
+    const auto refuse = [&] {
+        throw InputError(fmt::format("{} cannot be {}: {}.", task.file.string(), task.done, std::strerror(errno)));
+    };
+    int pipe[2];
+    if (pipe2(pipe, O_CLOEXEC) != 0) refuse();
+    const pid_t child = fork();
+    if (child == 0) {
+        close(pipe[0]);
+        run_in_child(task, pipe[1]);
+    }
+    const int fork_error = errno;
+    close(pipe[1]);
+    if (child < 0) {
+        close(pipe[0]);
+        errno = fork_error;
+        refuse();
+    }
+    std::string message;
+    try {
+        message = read_to_end(pipe[0]);
+    } catch (...) {
+        close(pipe[0]);
+        kill(child, SIGKILL);
+        wait_for(child);
+        throw;
+    }
+    close(pipe[0]);
+    status = wait_for(child);
+    if (message == out_of_memory) throw std::bad_alloc();
+    if (message.size() >= 2 && message.back() == message_end) {
+        std::string content = message.substr(1, message.size() - 2);
+        if (message[0] == holds_result) return content;
+        if (message[0] == holds_refusal) throw InputError(content);
+    }
+    return std::nullopt;
+}
+
 }  // namespace
 
 std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
                           const std::function<std::string()>& work) {
-    int pipe[2];
-    if (pipe2(pipe, O_CLOEXEC) != 0)
-        throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(errno)));
-    const pid_t child = fork();
-    if (child == 0) {
-        close(pipe[0]);
-        run_in_child(file, seconds, work, pipe[1]);
-    }
-    const int fork_error = errno;
-    close(pipe[1]);
-    std::string message;
-    if (child > 0) message = read_to_end(pipe[0]);
-    close(pipe[0]);
-    if (child < 0) throw InputError(fmt::format("{} cannot be read: {}.", file.string(), std::strerror(fork_error)));
     int status = 0;
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-    }
-    if (message.size() >= 2 && message.back() == message_end) {
-        const std::string content = message.substr(1, message.size() - 2);
-        if (message[0] == holds_result) return content;
-        if (message[0] == holds_refusal) throw InputError(content);
-    }
+    if (auto result = result_of({file, "read", seconds, work}, status)) return std::move(*result);
     const bool too_long = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
     throw InputError(
         fmt::format("{} is damaged: {} {} on it.", file.string(), library, too_long ? "does not end" : "fails"));
+}
+
+void write_in_child(const std::filesystem::path& file, const char* library, const std::function<void()>& work) {
+    int status = 0;
+    const std::function<std::string()> write = [&] { return work(), std::string(); };
+    if (!result_of({file, "written", RLIM_INFINITY, write}, status))
+        throw InputError(fmt::format("{} cannot be written: {} fails.", file.string(), library));
 }
 
 }  // namespace delassus

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "trajectory/datasets.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 
 #include "delassus/error.hpp"
 
@@ -36,7 +42,33 @@ void put(hid_t group, const Column& column, hid_t stored, hid_t native, const vo
     describe(set.get(), column, file);
 }
 
+/// The descriptor of an open HDF5 file, −1 if it has none.
+int descriptor_of(hid_t open_file) {
+    void* descriptor = nullptr;
+    return H5Fget_vfd_handle(open_file, H5P_DEFAULT, &descriptor) < 0 ? -1 : *static_cast<int*>(descriptor);
+}
+
 }  // namespace
+
+void reserve(hid_t open_file, std::uint64_t bytes, const std::string& file) {
+    const int descriptor = descriptor_of(open_file);
+    hsize_t end = 0;
+    if (descriptor < 0 || H5Fget_filesize(open_file, &end) < 0) fail(file);
+    rlimit largest{};
+    getrlimit(RLIMIT_FSIZE, &largest);
+    int failure = largest.rlim_cur != RLIM_INFINITY && end + bytes > largest.rlim_cur ? EFBIG : 0;
+    if (failure == 0 &&
+        fallocate(descriptor, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(end), static_cast<off_t>(bytes)) != 0)
+        failure = errno;
+    if (failure == 0 || failure == EOPNOTSUPP || failure == ENOSYS) return;  // not every file system can reserve
+    throw InputError(fmt::format("{}: the trajectory cannot be written: {}", file, std::strerror(failure)));
+}
+
+void release_reserve(hid_t open_file) {
+    const int descriptor = descriptor_of(open_file);
+    struct stat status {};
+    if (descriptor >= 0 && fstat(descriptor, &status) == 0 && ftruncate(descriptor, status.st_size) != 0) return;
+}
 
 Handle made(hid_t id, const std::string& file) {
     if (id < 0) throw InputError(fmt::format("{}: HDF5 cannot write or continue the trajectory", file));
@@ -55,14 +87,14 @@ void put_text(hid_t object, const char* name, const std::string& text, const std
     H5Tset_cset(type.get(), H5T_CSET_UTF8);
     const Handle space = made(H5Screate(H5S_SCALAR), file);
     const Handle attribute = made(H5Acreate2(object, name, type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), file);
-    H5Awrite(attribute.get(), type.get(), text.data());
+    if (H5Awrite(attribute.get(), type.get(), text.data()) < 0) fail(file);
 }
 
 void put_number(hid_t object, const char* name, double value, const std::string& file) {
     const Handle space = made(H5Screate(H5S_SCALAR), file);
     const Handle attribute =
         made(H5Acreate2(object, name, H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), file);
-    H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, &value);
+    if (H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, &value) < 0) fail(file);
 }
 
 void put_texts(hid_t group, const char* name, const std::vector<std::string>& texts, const std::string& file) {
@@ -107,6 +139,17 @@ hsize_t Series::width() const {
     return width;
 }
 
+std::uint64_t Series::growth() const {
+    /// A node of the tree that finds the chunks, with room to spare.
+    constexpr std::uint64_t tree_node = 8192;
+    if (waiting_.empty()) return 0;
+    return sizeof(double) * (waiting_.size() + 2 * rows_of_chunk() * width()) + tree_node;
+}
+
+hsize_t Series::rows_of_chunk() const {
+    return std::max<hsize_t>(1, 4096 / width());
+}
+
 void Series::write() {
     if (waiting_.empty()) return;
     const hsize_t count = waiting_.size() / width();
@@ -143,7 +186,7 @@ double Series::last() const {
 }
 
 Handle Series::create(hid_t group, const Column& column) const {
-    std::vector<hsize_t> size = {0}, most = {H5S_UNLIMITED}, chunk = {std::max<hsize_t>(1, 4096 / width())};
+    std::vector<hsize_t> size = {0}, most = {H5S_UNLIMITED}, chunk = {rows_of_chunk()};
     for (const auto extent : shape_) {
         size.push_back(extent);
         most.push_back(extent);

@@ -10,6 +10,13 @@
 
 namespace delassus::trajectory {
 
+/// Sees to it that the disk has room for so many bytes at the end of the file, before HDF5 begins to change it: HDF5
+/// changes what is there in place, and a file that it cannot end to change is lost.
+void reserve(hid_t open_file, std::uint64_t bytes, const std::string& file);
+
+/// Gives back what was reserved and is not part of the file.
+void release_reserve(hid_t open_file);
+
 /// A handle of what HDF5 has just made or opened.
 hdf5::Handle made(hid_t id, const std::string& file);
 
@@ -46,6 +53,9 @@ public:
     void add(const double* values, std::size_t count) { waiting_.insert(waiting_.end(), values, values + count); }
     void write();
 
+    /// How many bytes write() makes the file longer, at most.
+    [[nodiscard]] std::uint64_t growth() const;
+
     /// The last number on disk, 0 if there is none.
     [[nodiscard]] double last() const;
 
@@ -53,6 +63,7 @@ private:
     [[nodiscard]] hdf5::Handle create(hid_t group, const Column& column) const;
     [[nodiscard]] hdf5::Handle open(hid_t group, const Column& column, std::int64_t rows) const;
     [[nodiscard]] hsize_t width() const;
+    [[nodiscard]] hsize_t rows_of_chunk() const;
 
     const std::string& file_;
     std::vector<hsize_t> shape_;

@@ -180,7 +180,35 @@ std::vector<TrajectoryLink> read_links(const Group& model, std::int64_t body_cou
     return links;
 }
 
+/// Bytes of texts, each as long as the longest.
+std::uint64_t size_of(const std::vector<std::string>& texts) {
+    std::size_t longest = 1;
+    for (const auto& text : texts) longest = std::max(longest, text.size());
+    return texts.size() * longest;
+}
+
+template <class Element>
+std::uint64_t size_of(const std::vector<Element>& rows) {
+    return rows.size() * sizeof(Element);
+}
+
 }  // namespace
+
+std::uint64_t largest_size(const TrajectoryModel& model) {
+    constexpr std::uint64_t of_a_shape = 256;  // kind, body, size, pose, ends
+    constexpr std::uint64_t of_headers = 256 * 1024;
+    std::uint64_t bytes = of_headers + size_of(model.bodies) + size_of(model.fixed) + size_of(model.nodes) +
+                          size_of(model.node_entry) + size_of(model.loose) + size_of(model.surface) +
+                          size_of(model.cables) + of_a_shape * model.shapes.size();
+    for (const Shape& shape : model.shapes)
+        if (shape.mesh) bytes += size_of(shape.mesh->vertices) + size_of(shape.mesh->triangles);
+    std::vector<std::string> names, kinds;
+    for (const TrajectoryLink& link : model.links) {
+        names.push_back(link.name);
+        kinds.push_back(link.kind);
+    }
+    return bytes + size_of(model.links) + size_of(names) + size_of(kinds);
+}
 
 void write_model(hid_t system, const TrajectoryModel& model, const std::string& file) {
     const Handle group = group_in(system, "model", false, file);

@@ -6,6 +6,9 @@
 
 namespace delassus::trajectory {
 
+/// Bytes that a new system takes of the file before its first step, at most.
+std::uint64_t largest_size(const TrajectoryModel& model);
+
 /// Puts the group `model` into that of a system (docs/running.md lists its datasets).
 void write_model(hid_t system, const TrajectoryModel& model, const std::string& file);
 

@@ -16,7 +16,9 @@ constexpr std::size_t step_columns = 13;
 
 class SystemFile {
 public:
-    SystemFile(hid_t parent, const TrajectorySystem& system, bool resume, const std::string& file) {
+    /// file: the open file's name, which outlives this.
+    SystemFile(hid_t open_file, hid_t parent, const TrajectorySystem& system, bool resume, const std::string& file)
+        : file_(open_file), name_(file) {
         const Handle group = group_in(parent, system.name.c_str(), resume, file);
         if (!resume) {
             put_text(group.get(), "integrator", system.integrator, file);
@@ -123,13 +125,20 @@ public:
     }
 
     void write() {
-        for (auto& series : steps_) series.write();
-        for (auto& series : contacts_) series.write();
-        for (auto& series : frames_) series.write();
+        std::uint64_t growth = 0;
+        for (const auto* all : {&steps_, &contacts_, &frames_})
+            for (const auto& series : *all) growth += series.growth();
+        if (growth == 0) return;
+        hdf5::require_memory(growth);
+        reserve(file_, growth, name_);
+        for (auto* all : {&steps_, &contacts_, &frames_})
+            for (auto& series : *all) series.write();
         waiting_ = 0;
     }
 
 private:
+    hid_t file_;
+    const std::string& name_;
     std::vector<Series> steps_, frames_, contacts_;
     std::int64_t waiting_ = 0, contacts_before_ = 0;
 };
@@ -142,12 +151,20 @@ public:
                             : H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
                      name_)) {
         if (!resume) {
+            std::uint64_t bytes = 0;
+            for (const auto& system : systems) bytes += largest_size(system.model);
+            reserve(file_.get(), bytes, name_);
             put_text(file_.get(), "format", "delassus-trajectory", name_);
             put_number(file_.get(), "version", 1.0, name_);
         }
         const Handle group = group_in(file_.get(), "systems", resume, name_);
         systems_.reserve(systems.size());
-        for (const auto& system : systems) systems_.emplace_back(group.get(), system, resume, name_);
+        for (const auto& system : systems) systems_.emplace_back(file_.get(), group.get(), system, resume, name_);
+    }
+    Hdf5Writer(const Hdf5Writer&) = delete;
+    Hdf5Writer& operator=(const Hdf5Writer&) = delete;
+    ~Hdf5Writer() override {
+        if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) >= 0) release_reserve(file_.get());
     }
 
     void add_step(std::size_t system, const StepRecord& record) override { systems_[system].add_step(record); }
@@ -172,6 +189,7 @@ private:
 
 extern "C" DELASSUS_API delassus::TrajectoryWriter* delassus_trajectory_open(
     const std::filesystem::path& file, const std::vector<delassus::TrajectorySystem>& systems, bool resume) {
+    delassus::hdf5::require_memory();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures become sentences
     return new delassus::trajectory::Hdf5Writer(file, systems, resume);
 }

@@ -30,8 +30,10 @@ namespace mpi_detail {
 
 // A process that no launcher started needs none of Open MPI's networks, nor its daemon. Looking for them takes most
 // of a second (measured: 0.30 s against 0.025 s for start and end), so they are left out by default; what the user
-// has set stays. The settings are taken back after the start, since children of this process (an mpirun, say) would
-// inherit them. Other MPIs ignore these names.
+// has set stays. It needs no session folder either, a place for files that processes of one run share: all processes of
+// a user have it below the same folder, which the last to end removes, and one that starts at that moment fails
+// ("orte_session_dir failed") and ends its program. The settings are taken back after the start, since children of this
+// process (an mpirun, say) would inherit them. Other MPIs ignore these names.
 class SingletonEnvironment {
 public:
     SingletonEnvironment() {
@@ -51,8 +53,9 @@ public:
     SingletonEnvironment& operator=(const SingletonEnvironment&) = delete;
 
 private:
-    static constexpr std::array<std::array<const char*, 2>, 6> defaults = {{
+    static constexpr std::array<std::array<const char*, 2>, 7> defaults = {{
         {"OMPI_MCA_ess_singleton_isolated", "1"},  // no daemon is forked
+        {"OMPI_MCA_orte_create_session_dirs", "0"},
         {"OMPI_MCA_btl", "self"},
         {"OMPI_MCA_pml", "ob1"},
         {"OMPI_MCA_mtl", "^ofi,psm2,psm"},

@@ -148,16 +148,24 @@ private:
         try {
             return body();
         } catch (const NumericalFailure& failure) {
-            error = failure.what();
+            keep(error, failure.what());
             return DELASSUS_NUMERICAL_FAILURE;
         } catch (const std::bad_alloc&) {
-            error = "out of memory";
+            keep(error, "out of memory");
         } catch (const std::exception& failure) {
-            error = failure.what();
+            keep(error, failure.what());
         } catch (...) {
-            error = "an exception that is not a std::exception";
+            keep(error, "an exception that is not a std::exception");
         }
         return DELASSUS_ERROR;
+    }
+
+    static void keep(std::string& error, const char* sentence) noexcept {
+        try {
+            error = sentence;
+        } catch (const std::bad_alloc&) {
+            error = "out of memory";  // short enough to need none
+        }
     }
 
     static std::int32_t create(const delassus_option_value* values, std::int32_t count, void** solver) {
