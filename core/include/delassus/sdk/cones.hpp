@@ -11,6 +11,9 @@
 #include <string_view>
 
 #include "delassus/plugin.h"
+#ifdef DELASSUS_TEST_CONE
+#include "delassus/sdk/cones/ball.hpp"
+#endif
 #include "delassus/sdk/cones/box.hpp"
 #include "delassus/sdk/cones/free.hpp"
 #include "delassus/sdk/cones/friction.hpp"
@@ -52,6 +55,9 @@ constexpr ConeOperations cone_operations() {
 inline constexpr std::array cone_table = {
     cone_operations<FreeCone>(), cone_operations<NonnegativeCone>(),
     cone_operations<BoxCone>(),  cone_operations<FrictionCone>(),
+#ifdef DELASSUS_TEST_CONE
+    cone_operations<BallCone>(),
+#endif
 };
 
 static_assert([] {
