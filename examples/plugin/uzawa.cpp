@@ -77,10 +77,9 @@ constexpr PluginInfo info{
     .version = "1.0.0",
     .description = "Uzawa's method with projection: an example",
     .licence = "BSD-3-Clause",
-    .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
-                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
-                    DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |
-                    DELASSUS_CAN_WARM_START,
+    .capabilities = delassus::sdk::all_cones | DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL |
+                    DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE |
+                    DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
 };
 
 }  // namespace

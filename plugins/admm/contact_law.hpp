@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "delassus/sdk/cones.hpp"
@@ -32,7 +31,7 @@ public:
         for (const delassus_cone& cone : problem.cones) {
             if (!sdk::is_separable(cone)) {
                 blocks_.push_back(cone);
-            } else if (cone.kind != DELASSUS_CONE_FREE) {
+            } else if (!sdk::operations_of(cone).is_linear) {
                 add_intervals(cone, scale);
             }
         }
@@ -57,12 +56,11 @@ public:
 
 private:
     void add_intervals(const delassus_cone& cone, const sdk::Vector& scale) {
-        constexpr double infinity = std::numeric_limits<double>::infinity();
-        const bool box = cone.kind == DELASSUS_CONE_BOX;
         for (std::int32_t i = 0; i < cone.rows; ++i) {
+            const auto [lo, hi] = sdk::operations_of(cone).interval(cone, i);
             intervals_.push_back(cone.first_row + i);
-            lower_.push_back(box ? cone.lo[i] / scale[cone.first_row + i] : 0.0);
-            upper_.push_back(box ? cone.hi[i] / scale[cone.first_row + i] : infinity);
+            lower_.push_back(lo / scale[cone.first_row + i]);
+            upper_.push_back(hi / scale[cone.first_row + i]);
         }
     }
 
@@ -71,7 +69,7 @@ private:
             std::fill_n(v, cone.rows, 0.0);
             return;
         }
-        const double radius = cone.mu * v[0];
+        const double radius = sdk::friction_coefficient(cone) * v[0];
         const double length = sdk::FrictionCone::tangent_norm(cone, v);
         if (length <= radius) return;
         for (std::int32_t i = 1; i < cone.rows; ++i) v[i] *= radius / length;

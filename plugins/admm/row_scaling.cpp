@@ -33,7 +33,7 @@ void RowScaling::factorize(const sdk::ProblemView& problem) {
         const bool whole = !sdk::is_separable(cone);
         for (std::int32_t i = cone.first_row; i < cone.first_row + cone.rows; ++i)
             scale_[i] = whole || !(diagonal_[i] > 0.0) ? block[c] : 1.0 / std::sqrt(diagonal_[i]);
-        if (cone.kind == DELASSUS_CONE_FREE) scale_.segment(cone.first_row, cone.rows) *= equation_factor;
+        if (sdk::operations_of(cone).is_linear) scale_.segment(cone.first_row, cone.rows) *= equation_factor;
     }
 }
 

@@ -92,7 +92,7 @@ void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& 
         }
     };
     for (const delassus_cone& cone : problem.cones) {
-        if (cone.kind == DELASSUS_CONE_FRICTION && cone.mu > 0.0) {
+        if (cone.kind == DELASSUS_CONE_FRICTION && sdk::friction_coefficient(cone) > 0.0) {
             block_of_group_.push_back(static_cast<std::int32_t>(blocks_.size()));
             Block block{};
             block.first = cone.first_row;

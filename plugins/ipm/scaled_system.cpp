@@ -47,7 +47,8 @@ void Scaling::load(const sdk::ProblemView& problem) {
     sdk::Vector p(problem.m);
     for (const delassus_cone& cone : problem.cones) {
         const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
-        const double normal = friction && cone.mu > 0.0 ? 1.0 / cone.mu : 1.0;
+        const double mu = friction ? sdk::friction_coefficient(cone) : 0.0;
+        const double normal = mu > 0.0 ? 1.0 / mu : 1.0;
         double square = 0.0;
         for (std::int32_t i = 0; i < cone.rows; ++i)
             square += diagonal_[cone.first_row + i] * (i == 0 ? normal * normal : 1.0) / cone.rows;

@@ -23,7 +23,7 @@ struct Block {
 
 /// Blocks that a sweep visits: a friction cone is one, free rows are one where there are at most six of them, and the
 /// other kinds are visited row by row.
-inline std::vector<Block> blocks_of(std::span<const delassus_cone> cones) {
+inline std::vector<Block> blocks_of(const sdk::ConeRange& cones) {
     std::vector<Block> blocks;
     for (std::size_t c = 0; c < cones.size(); ++c) {
         const bool together = cones[c].kind == DELASSUS_CONE_FRICTION ||
@@ -84,7 +84,7 @@ public:
         for (std::size_t k = 0; k < blocks_.size(); ++k) {
             const delassus_cone& cone = problem.cones[static_cast<std::size_t>(blocks_[k].cone)];
             LocalBlock& local = local_.block[k];
-            local.mu = cone.mu;
+            if (cone.kind == DELASSUS_CONE_FRICTION) local.mu = sdk::friction_coefficient(cone);
             if (cone.kind == DELASSUS_CONE_NONNEGATIVE) local.lo = 0.0;
             if (cone.kind == DELASSUS_CONE_BOX) {
                 local.lo = cone.lo[blocks_[k].rows.first - cone.first_row];

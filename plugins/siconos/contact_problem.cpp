@@ -73,7 +73,8 @@ void ContactProblem::load(const ProblemView& problem) {
     mu_.assign(groups.size(), 0.0);
     for (const delassus_cone& cone : problem.cones)
         if (cone.kind == DELASSUS_CONE_FRICTION)
-            mu_[static_cast<std::size_t>(place_[static_cast<std::size_t>(cone.first_row)] / 3)] = cone.mu;
+            mu_[static_cast<std::size_t>(place_[static_cast<std::size_t>(cone.first_row)] / 3)] =
+                friction_coefficient(cone);
     raw_ = {3, static_cast<int>(groups.size()), matrix_.get(), q_.data(), mu_.data()};
 }
 

@@ -96,7 +96,7 @@ void NaturalMap::linearise_row(Piece& piece, double z, double residual, const Pr
 
 void NaturalMap::linearise_friction(Piece& piece, const Triple& z, const Triple& p, const Triple& w, const double* F,
                                     const Proximal& proximal, double* normal, double* local) const {
-    const double mu = piece.cone->mu;
+    const double mu = sdk::friction_coefficient(*piece.cone);
     const auto rows = static_cast<std::size_t>(piece.rows);
     piece.A.fill(0.0);
     piece.B.fill(0.0);

@@ -56,15 +56,16 @@ static void project(const delassus_cone* cone, double* l) {
     if (cone->kind == DELASSUS_CONE_NONNEGATIVE)
         for (int32_t i = 0; i < cone->rows; ++i) l[i] = fmax(l[i], 0.0);
     if (cone->kind != DELASSUS_CONE_FRICTION) return;
+    const double mu = cone->parameters[0];
     double norm = 0.0;
     for (int32_t i = 1; i < cone->rows; ++i) norm = hypot(norm, l[i]);
-    if (norm <= cone->mu * l[0]) return;
-    if (cone->mu * norm <= -l[0]) {
+    if (norm <= mu * l[0]) return;
+    if (mu * norm <= -l[0]) {
         for (int32_t i = 0; i < cone->rows; ++i) l[i] = 0.0;
         return;
     }
-    const double normal = (l[0] + cone->mu * norm) / (1.0 + cone->mu * cone->mu);
-    for (int32_t i = 1; i < cone->rows; ++i) l[i] *= cone->mu * normal / norm;
+    const double normal = (l[0] + mu * norm) / (1.0 + mu * mu);
+    for (int32_t i = 1; i < cone->rows; ++i) l[i] *= mu * normal / norm;
     l[0] = normal;
 }
 
@@ -88,7 +89,7 @@ static int32_t solve(void* solver, const delassus_problem* p, const delassus_req
     for (; sweep < 100000 && change > 1e-30; ++sweep) {
         change = 0.0;
         for (int32_t c = 0; c < p->cone_count; ++c) {
-            const delassus_cone* cone = &p->cones[c];
+            const delassus_cone* cone = delassus_cone_at(p, c);
             double trace = 0.0, before[8], u[8];
             for (int32_t i = 0; i < cone->rows; ++i) {
                 const int32_t row = cone->first_row + i;

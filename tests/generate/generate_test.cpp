@@ -141,7 +141,7 @@ TEST(Glued, TurnsEveryContactIntoConsistentFreeRows) {
     for (std::size_t c = 0; c < stuck.cones.size(); ++c) {
         EXPECT_EQ(stuck.cones[c].kind, ConeKind::Free);
         EXPECT_TRUE(stuck.cones[c].lo.empty());
-        EXPECT_EQ(stuck.cones[c].mu, 0.0);
+        EXPECT_EQ(stuck.cones[c].parameters[0], 0.0);
         EXPECT_EQ(stuck.cones[c].rows, pile.cones[c].rows);
         for (std::int32_t i = 0; i < stuck.cones[c].rows; ++i, ++row) {
             EXPECT_EQ(stuck.b[row], pile.cones[c].kind == ConeKind::Free ? pile.b[row] : 0.0);

@@ -154,10 +154,10 @@ double natural_by_hand(const Problem& problem, const std::vector<double>& soluti
                 p = z.cwiseMax(dense(cone.lo)).cwiseMin(dense(cone.hi));
                 break;
             case ConeKind::Friction:
-                if (t.norm() > cone.mu * z[0]) {
+                if (t.norm() > cone.parameters[0] * z[0]) {
                     // the nearest point of the ray (1, μ t/‖t‖), or the apex
                     Eigen::VectorXd ray(rows);
-                    ray << 1.0, cone.mu * t.normalized();
+                    ray << 1.0, cone.parameters[0] * t.normalized();
                     p = std::max(0.0, ray.dot(z)) / ray.squaredNorm() * ray;
                 }
                 break;

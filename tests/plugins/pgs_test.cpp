@@ -65,7 +65,7 @@ struct RandomContact {
         const double s2 = static_cast<double>(q.size()) / N.trace();
         const Eigen::VectorXd u = N * lambda + q;
         const delassus_cone cone{
-            DELASSUS_CONE_FRICTION, 0, static_cast<std::int32_t>(q.size()), 0, mu, nullptr, nullptr};
+            DELASSUS_CONE_FRICTION, 0, static_cast<std::int32_t>(q.size()), 1, &mu, nullptr, nullptr};
         Eigen::VectorXd trial = lambda - s2 * u;
         if (coulomb) trial[0] -= s2 * sdk::FrictionCone::de_saxce(cone, u.data());
         sdk::FrictionCone::project(cone, trial.data());

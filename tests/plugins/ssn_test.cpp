@@ -83,7 +83,8 @@ TEST_P(NewtonStep, SolvesTheLinearisedMap) {
             scaled.gradient(lambda, u);
             map.linearise(lambda, u, proximal, F, normal, local);
             for (const ssn::Piece& piece : map.pieces())
-                if (piece.cone && piece.cone->mu > 0.0) regions.insert({piece.rows, piece.active});
+                if (piece.cone && sdk::friction_coefficient(*piece.cone) > 0.0)
+                    regions.insert({piece.rows, piece.active});
 
             // (A (N + τ) B + K/ρ) δ_B = local − A (N + τ) δ_⊥, with the rows beyond the active ones left as they are.
             sdk::Vector work(m), product(m), column(m);

@@ -101,7 +101,7 @@ TEST(FclibFile, LocalWithBilateralRows) {
         "E");
     ASSERT_EQ(problem.cones.size(), 2U);
     EXPECT_EQ(problem.cones[0].rows, 2);
-    EXPECT_EQ(problem.cones[0].mu, 0.5);
+    EXPECT_EQ(problem.cones[0].parameters[0], 0.5);
     EXPECT_EQ(problem.cones[1].kind, ConeKind::Free);
 }
 
@@ -113,7 +113,7 @@ TEST(FclibFile, GlobalWithBilateralRows) {
     expect_same(problem.D, SparseMatrix::from_triplets(4, 2, {{0, 0, 3}, {1, 1, 4}, {3, 1, 5}}), "D");
     EXPECT_EQ(problem.E.rows, 0);
     ASSERT_EQ(problem.cones.size(), 2U);
-    EXPECT_EQ(problem.cones[0].mu, 0.25);
+    EXPECT_EQ(problem.cones[0].parameters[0], 0.25);
     EXPECT_EQ(problem.cones[1].rows, 1);
 }
 
@@ -219,7 +219,7 @@ TEST(FclibFile, EqualsTheFolderOfTheSameName) {
         ASSERT_EQ(file.cones.size(), folder.cones.size());
         for (std::size_t c = 0; c < file.cones.size(); ++c) {
             EXPECT_EQ(file.cones[c].rows, folder.cones[c].rows);
-            EXPECT_EQ(file.cones[c].mu, folder.cones[c].mu);
+            EXPECT_EQ(file.cones[c].parameters[0], folder.cones[c].parameters[0]);
         }
         // Explicit zeros aside; the folders were symmetrised by another program, which may have rounded otherwise.
         const auto compare = [](const SparseMatrix& left, const SparseMatrix& right, const char* name) {

@@ -37,7 +37,8 @@ inline void expect_same(const Problem& left, const Problem& right) {
     for (std::size_t c = 0; c < left.cones.size(); ++c) {
         EXPECT_EQ(left.cones[c].kind, right.cones[c].kind) << c;
         EXPECT_EQ(left.cones[c].rows, right.cones[c].rows) << c;
-        EXPECT_TRUE(same_bits({left.cones[c].mu}, {right.cones[c].mu})) << c;
+        const auto &l = left.cones[c].parameters, &r = right.cones[c].parameters;
+        EXPECT_TRUE(same_bits({l.begin(), l.end()}, {r.begin(), r.end()})) << c;
         EXPECT_TRUE(same_bits(left.cones[c].lo, right.cones[c].lo)) << c;
         EXPECT_TRUE(same_bits(left.cones[c].hi, right.cones[c].hi)) << c;
     }

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "bench/statistics.hpp"
+#include "problem/cone_kinds.hpp"
 
 namespace delassus::bench {
 
@@ -43,7 +44,12 @@ std::string class_of(const Json& row, const std::map<std::string, const Json*>& 
     if (problem != problems.end()) {
         const Json& cones = problem->second->at("cones");
         const std::string structure = problem->second->at("structure");
-        if (cones.size() == (cones.contains("free") ? 1U : 0U))
+        bool linear = true;
+        for (const auto& [name, count] : cones.items()) {
+            const auto* kind = find_cone_kind(name);
+            linear = linear && kind && kind->is_linear;
+        }
+        if (linear)
             return structure == "unsymmetric" || structure == "indefinite" ? structure : "linear";
     }
     return row.at("law");

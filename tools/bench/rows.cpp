@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "problem/cone_kinds.hpp"
+
 namespace delassus::bench {
 
 namespace {
@@ -18,7 +20,7 @@ constexpr double diverged_error = 1e3;
 std::int64_t size_of(const ProblemFacts& facts) {
     std::int64_t size = 0;
     for (const auto& [kind, count] : facts.cones)
-        if (kind != name_of(ConeKind::Free)) size += count;
+        if (const auto* row = find_cone_kind(kind); row && !row->is_linear) size += count;
     return size > 0 ? size : facts.m;
 }
 

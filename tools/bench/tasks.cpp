@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bench/key.hpp"
+#include "problem/cone_kinds.hpp"
 
 namespace delassus::bench {
 
@@ -34,11 +35,13 @@ std::string unique_name(const std::string& name, const std::vector<TaskProblem>&
 void add_solves(Tasks& tasks, const Suite& suite, const std::string& code) {
     for (std::size_t p = 0; p < tasks.problems.size(); ++p) {
         const ProblemFacts& facts = tasks.problems[p].facts;
-        const bool friction = std::any_of(facts.cones.begin(), facts.cones.end(),
-                                          [](const auto& cone) { return cone.first == name_of(ConeKind::Friction); });
+        const bool lawful = std::any_of(facts.cones.begin(), facts.cones.end(), [](const auto& cone) {
+            const auto* kind = find_cone_kind(cone.first);
+            return kind && kind->has_law();
+        });
         std::set<std::string> laws;
         for (const auto& chosen : suite.laws) {
-            const std::string law = chosen.empty() || !friction ? facts.law : chosen;
+            const std::string law = chosen.empty() || !lawful ? facts.law : chosen;
             if (!laws.insert(law).second) continue;
             for (std::size_t s = 0; s < suite.solvers.size(); ++s)
                 for (const double tolerance : suite.tolerances)

@@ -16,6 +16,7 @@
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
+#include "problem/cone_kinds.hpp"
 #include "problem/structure.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
@@ -46,7 +47,7 @@ std::string content_hash(const PreparedProblem& prepared) {
     hash.add(problem.a);
     hash.add(problem.b);
     for (const Cone& cone : problem.cones) {
-        hash.add(&cone.mu, sizeof cone.mu);
+        hash.add(cone.parameters.data(), parameter_bytes(cone));
         hash.add(cone.lo);
         hash.add(cone.hi);
     }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "check/checks.hpp"
+#include "check/raw_solver.hpp"
 #include "delassus/error.hpp"
 
 namespace delassus::check {
@@ -30,6 +31,37 @@ std::string check_shown(const Subject& subject) {
     expect(hidden == 0, fmt::format("it declares {}, and takes none of the known problems that need it",
                                     fmt::join(capability_names(hidden), ", ")));
     return fmt::format("{} of {} known problems taken", problems.size(), known_problems().size());
+}
+
+/// Hosts of later minor versions have longer cones, and so a longer way from one to the next.
+std::string check_cone_stride(const Subject& subject) {
+    struct LongerCone {
+        delassus_cone cone;
+        double later[3];
+    };
+    int solves = 0;
+    for (const auto& known : subject.problems()) {
+        const PreparedProblem problem(known.problem);
+        if (problem.raw().cone_count < 2) continue;
+        std::vector<LongerCone> cones;
+        for (std::int32_t c = 0; c < problem.raw().cone_count; ++c)
+            cones.push_back({*delassus_cone_at(&problem.raw(), c), {-1.0, -1.0, -1.0}});
+        delassus_problem longer = problem.raw();
+        longer.cones = &cones.front().cone;
+        longer.cone_stride = sizeof(LongerCone);
+        RawSolver here(subject), there(subject);
+        expect(here.set_up(problem.raw()) == DELASSUS_SOLVED && there.set_up(longer) == DELASSUS_SOLVED,
+               fmt::format("\"{}\" cannot be set up", known.problem.name));
+        const auto expected = here.solve(problem.raw(), settings_of(fine_tolerance), nullptr);
+        const auto found = there.solve(longer, settings_of(fine_tolerance), nullptr);
+        expect(found.status == expected.status && found.solution.lambda == expected.solution.lambda &&
+                   found.solution.x == expected.solution.x,
+               fmt::format("\"{}\" has another answer where cones are {} bytes apart", known.problem.name,
+                           sizeof(LongerCone)));
+        ++solves;
+    }
+    if (solves == 0) throw Skip("it takes no known problem of two cones");
+    return fmt::format("{} problems with cones {} bytes apart", solves, sizeof(LongerCone));
 }
 
 std::string check_refusal(const Subject& subject) {
@@ -103,6 +135,7 @@ std::vector<Check> capability_checks() {
         checks.push_back(
             {"known/" + known.problem.name, [known](const Subject& subject) { return solve_one(subject, known); }});
     checks.push_back({"capabilities/shown", check_shown});
+    checks.push_back({"capabilities/cone_stride", check_cone_stride});
     checks.push_back({"capabilities/refusal", check_refusal});
     checks.push_back({"claims/tolerances", check_tolerances});
     checks.push_back({"claims/impossible_tolerance", check_impossible_tolerance});

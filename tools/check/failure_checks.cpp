@@ -3,6 +3,7 @@
 
 #include "check/checks.hpp"
 #include "check/raw_solver.hpp"
+#include "problem/cone_kinds.hpp"
 
 namespace delassus::check {
 
@@ -15,14 +16,14 @@ std::string fail_honestly(const Subject& subject, const Problem& data) {
         throw Skip(fmt::format("it does not declare {}", fmt::join(capability_names(missing), ", ")));
     if (const auto reason = subject.solver().refusal(problem, SolveSettings{}); !reason.empty()) throw Skip(reason);
     RawSolver solver(subject);
-    if (const auto status = solver.set_up(problem); status != DELASSUS_SOLVED) {
+    if (const auto status = solver.set_up(problem.raw()); status != DELASSUS_SOLVED) {
         const auto sentence = solver.last_error();
         expect(!sentence.empty(), "its set-up fails without a sentence");
         return fmt::format("set-up: {}", sentence);
     }
     auto settings = settings_of(fine_tolerance);
     settings.max_iterations = 5000;
-    const auto result = solver.solve(problem, settings, nullptr);
+    const auto result = solver.solve(problem.raw(), settings, nullptr);
     expect(result.status != DELASSUS_SOLVED, fmt::format("it says that \"{}\" is solved", data.name));
     return fmt::format("status {}", result.status);
 }
@@ -62,9 +63,13 @@ std::string check_units(const Subject& subject) {
         for (auto known : subject.problems()) {
             for (auto* values : {&known.problem.a, &known.problem.b})
                 for (double& value : *values) value *= factor;
-            for (auto& cone : known.problem.cones)
+            for (auto& cone : known.problem.cones) {
                 for (auto* bounds : {&cone.lo, &cone.hi})
                     for (double& bound : *bounds) bound *= factor;
+                const auto parameters = operations_of(cone).named_parameters();
+                for (std::size_t k = 0; k < parameters.size(); ++k)
+                    if (parameters[k].is_reaction) cone.parameters[k] *= factor;
+            }
             Solver solver = subject.solver();
             auto settings = settings_of(1e-6);
             settings.time_limit = 1.0;

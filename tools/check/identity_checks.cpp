@@ -3,6 +3,7 @@
 
 #include "check/checks.hpp"
 #include "check/raw_solver.hpp"
+#include "delassus/sdk/cones.hpp"
 
 namespace delassus::check {
 
@@ -21,8 +22,6 @@ std::string check_descriptor(const Subject& subject) {
 }
 
 std::string check_capability_bits(const Subject& subject) {
-    constexpr std::uint64_t cones =
-        DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
     constexpr std::uint64_t laws = DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB;
     constexpr std::uint64_t structures = DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE |
                                          DELASSUS_CAN_H_SEMIDEFINITE | DELASSUS_CAN_H_INDEFINITE |
@@ -30,10 +29,11 @@ std::string check_capability_bits(const Subject& subject) {
     constexpr std::uint64_t others =
         DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START | DELASSUS_CAN_DISTRIBUTED;
     const auto bits = subject.info().capabilities;
-    expect((bits & ~(cones | laws | structures | others)) == 0, "it sets capability bits that have no meaning");
-    expect((bits & cones) != 0, "it declares no kind of cone");
+    expect((bits & ~(sdk::all_cones | laws | structures | others)) == 0,
+           "it sets capability bits that have no meaning");
+    expect((bits & sdk::all_cones) != 0, "it declares no kind of cone");
     expect((bits & structures) != 0, "it declares no structure of H");
-    expect(((bits & DELASSUS_CAN_FRICTION) != 0) == ((bits & laws) != 0),
+    expect(((bits & sdk::cones_with_law) != 0) == ((bits & laws) != 0),
            "friction cones and a friction law are declared together or not at all");
     return fmt::format("{}", fmt::join(capability_names(bits), " "));
 }

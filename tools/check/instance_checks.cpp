@@ -67,7 +67,8 @@ std::string check_unused(const Subject& subject) {
     { const RawSolver created(subject); }
     RawSolver twice(subject);
     for (int k = 0; k < 2; ++k)
-        expect(twice.set_up(problem) == DELASSUS_SOLVED, fmt::format("set-up {} failed: {}", k, twice.last_error()));
+        expect(twice.set_up(problem.raw()) == DELASSUS_SOLVED,
+               fmt::format("set-up {} failed: {}", k, twice.last_error()));
     return {};
 }
 

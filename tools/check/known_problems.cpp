@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "problem/cone_kinds.hpp"
+
 namespace delassus::check {
 
 namespace {
@@ -266,6 +268,43 @@ void add_mixed(std::vector<KnownProblem>& list) {
                          {3, -1, 10, 3, 4, 2, 0, -1}, {0, 0, 0.5, -0.6, -0.8, 0, 1, 2}));
 }
 
+/// Three blocks of each kind in the table, by pairs that its own projection makes: with any z, λ = P(z) and u = λ − z
+/// fulfil −u ∈ N_Υ(λ). z is small, large, and large with a negative first row.
+void add_projected(std::vector<KnownProblem>& list) {
+    for (const sdk::ConeOperations& kind : sdk::cone_table) {
+        const std::int32_t rows = kind.usual_rows, m = 3 * rows;
+        Cone cone{static_cast<ConeKind>(kind.kind), rows, {}, {}, {}};
+        for (std::size_t k = 0; k < kind.named_parameters().size(); ++k)
+            cone.parameters[k] = kind.parameters[k].example;
+        if (kind.has_bounds) {
+            cone.lo.assign(static_cast<std::size_t>(rows), -1.0);
+            cone.hi.assign(static_cast<std::size_t>(rows), 2.0);
+        }
+        Numbers lambda, u;
+        for (const double size : {0.5, 4.0, -4.0}) {
+            Numbers z(static_cast<std::size_t>(rows), size);
+            for (std::size_t i = 1; i < z.size(); ++i)
+                z[i] = (i % 2 == 0 ? -0.5 : 0.75) * size * (size == 0.5 ? 0.25 : 1.0);
+            Numbers projected = z;
+            kind.project(raw_cone(cone), projected.data());
+            for (std::size_t i = 0; i < z.size(); ++i) u.push_back(projected[i] - z[i]);
+            lambda.insert(lambda.end(), projected.begin(), projected.end());
+        }
+        const std::vector<Cone> cones(3, cone);
+        const std::string name = "projected_" + std::string(kind.name);
+        Numbers masses;
+        std::vector<Triplet> between;
+        for (std::int32_t i = 0; i < m; ++i) {
+            masses.push_back(1.0 + i / rows);
+            between.push_back({i, i, 1.0});
+            if (i >= rows) between.push_back({i, i - rows, -0.5});
+        }
+        list.push_back(known(name + "_diagonal", diagonal(masses), SparseMatrix::from_triplets(m, m, between), {},
+                             cones, lambda, u));
+        list.push_back(reduced(name + "_reduced", diagonal(masses), cones, lambda, u));
+    }
+}
+
 /// Body i stands on body i − 1, and the first on the ground: N = D Dᵀ is tridiagonal by blocks, of condition about
 /// bodies².
 KnownProblem tower(const std::string& name, const Cone& cone, double sideways, Law law, bool is_reduced) {
@@ -310,7 +349,7 @@ KnownProblem KnownProblem::with_right_hand_side(int k) const {
     for (std::size_t i = 0; i < other.solution.x.size(); ++i)
         other.solution.x[i] += std::sin(static_cast<double>(i) + k);
     const bool are_cones = std::none_of(problem.cones.begin(), problem.cones.end(),
-                                        [](const Cone& cone) { return cone.kind == ConeKind::Box; });
+                                        [](const Cone& cone) { return !operations_of(cone).is_cone; });
     if (are_cones) {
         for (double& value : other.solution.lambda) value *= 1.0 + 0.125 * k;
         for (double& value : other.u) value *= 1.0 + 0.125 * k;
@@ -335,6 +374,7 @@ std::vector<KnownProblem> known_problems() {
     add_box(list);
     add_friction(list);
     add_mixed(list);
+    add_projected(list);
     return list;
 }
 

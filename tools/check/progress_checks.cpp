@@ -19,7 +19,7 @@ std::string check_iterates(const Subject& subject) {
     const PreparedProblem problem(known.problem);
     const auto n = known.problem.a.size(), m = known.problem.b.size();
     RawSolver solver(subject);
-    expect(solver.set_up(problem) == DELASSUS_SOLVED, solver.last_error());
+    expect(solver.set_up(problem.raw()) == DELASSUS_SOLVED, solver.last_error());
     std::int64_t calls = 0, last = -1;
     std::string fault;
     const auto listen = [&](std::int64_t iteration, const double* x, const double* lambda) -> std::int32_t {
@@ -35,9 +35,9 @@ std::string check_iterates(const Subject& subject) {
     };
     auto settings = settings_of(1e-6);
     settings.max_iterations = heard_iterations;
-    const auto heard = solver.solve(problem, settings, listen);
+    const auto heard = solver.solve(problem.raw(), settings, listen);
     expect(fault.empty(), fault);
-    const auto unheard = solver.solve(problem, settings, nullptr);
+    const auto unheard = solver.solve(problem.raw(), settings, nullptr);
     expect(heard.status == unheard.status, "a null progress changes the status of the solve");
     if (calls == 0) throw Skip(silent);
     return fmt::format("{} calls, {} iterations", calls, heard.outcome.iterations);

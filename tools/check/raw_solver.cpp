@@ -56,13 +56,13 @@ RawSolver::~RawSolver() {
     border_.destroy(solver_);
 }
 
-std::int32_t RawSolver::set_up(const PreparedProblem& problem) {
-    if (const auto status = border_.analyze(solver_, &problem.raw()); status != DELASSUS_SOLVED) return status;
-    return border_.factorize(solver_, &problem.raw());
+std::int32_t RawSolver::set_up(const delassus_problem& problem) {
+    if (const auto status = border_.analyze(solver_, &problem); status != DELASSUS_SOLVED) return status;
+    return border_.factorize(solver_, &problem);
 }
 
-RawResult RawSolver::solve(const PreparedProblem& problem, const SolveSettings& settings, const Listener& listener) {
-    GuardedVector x(problem.problem().a.size()), lambda(problem.problem().b.size());
+RawResult RawSolver::solve(const delassus_problem& problem, const SolveSettings& settings, const Listener& listener) {
+    GuardedVector x(static_cast<std::size_t>(problem.n)), lambda(static_cast<std::size_t>(problem.m));
     RawResult result;
     result.outcome.struct_size = sizeof result.outcome;
     result.outcome.residual = NAN;
@@ -73,7 +73,7 @@ RawResult RawSolver::solve(const PreparedProblem& problem, const SolveSettings& 
                                    settings.time_limit,
                                    listener ? &call_listener : nullptr,
                                    const_cast<Listener*>(&listener)};
-    result.status = border_.solve(solver_, &problem.raw(), &request, x.begin(), lambda.begin(), &result.outcome);
+    result.status = border_.solve(solver_, &problem, &request, x.begin(), lambda.begin(), &result.outcome);
     result.solution = {x.content("x"), lambda.content("λ")};
     expect(result.status == result.outcome.status,
            fmt::format("solve returned status {} and wrote {} into the outcome", result.status, result.outcome.status));

@@ -24,14 +24,14 @@ public:
     RawSolver& operator=(const RawSolver&) = delete;
 
     /// analyze and factorize; the first status that is not DELASSUS_SOLVED.
-    std::int32_t set_up(const PreparedProblem& problem);
+    std::int32_t set_up(const delassus_problem& problem);
 
     /// Called with iteration, x and λ; returns a delassus_answer.
     using Listener = std::function<std::int32_t(std::int64_t, const double*, const double*)>;
 
     /// Solves from zero. Guards around x and λ show whether the plugin wrote beyond them, which throws Failure, as does
     /// a value that is not finite. An empty listener passes a null progress.
-    RawResult solve(const PreparedProblem& problem, const SolveSettings& settings, const Listener& listener);
+    RawResult solve(const delassus_problem& problem, const SolveSettings& settings, const Listener& listener);
 
     /// Throws Failure if last_error gives NULL.
     [[nodiscard]] std::string last_error() const;

@@ -9,6 +9,7 @@
 #include "delassus/config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/needs.hpp"
+#include "delassus/sdk/cones.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"
@@ -28,15 +29,19 @@ struct PluginsArguments {
 /// The table solver × what it can take, for the README: one row a plugin.
 void print_capability_table(const Registry& registry) {
     struct Column {
-        std::string_view title;
+        std::string title;
         std::uint64_t bits;
     };
-    constexpr Column columns[] = {
-        {"free", DELASSUS_CAN_FREE},
-        {"nonnegative", DELASSUS_CAN_NONNEGATIVE},
-        {"box", DELASSUS_CAN_BOX},
-        {"friction, associated", DELASSUS_CAN_FRICTION | DELASSUS_CAN_ASSOCIATED},
-        {"friction, Coulomb", DELASSUS_CAN_FRICTION | DELASSUS_CAN_COULOMB},
+    std::vector<Column> columns;
+    for (const sdk::ConeOperations& kind : sdk::cone_table) {
+        if (kind.has_law()) {
+            columns.push_back({fmt::format("{}, associated", kind.name), kind.capability() | DELASSUS_CAN_ASSOCIATED});
+            columns.push_back({fmt::format("{}, Coulomb", kind.name), kind.capability() | DELASSUS_CAN_COULOMB});
+        } else {
+            columns.push_back({std::string(kind.name), kind.capability()});
+        }
+    }
+    const Column others[] = {
         {"H diagonal or blocks", DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS},
         {"H sparse definite", DELASSUS_CAN_H_DEFINITE},
         {"H semidefinite", DELASSUS_CAN_H_SEMIDEFINITE},
@@ -48,10 +53,11 @@ void print_capability_table(const Registry& registry) {
         {"warm start", DELASSUS_CAN_WARM_START},
         {"MPI", DELASSUS_CAN_DISTRIBUTED},
     };
+    columns.insert(columns.end(), std::begin(others), std::end(others));
     fmt::print("| solver |");
     for (const auto& column : columns) fmt::print(" {} |", column.title);
     fmt::print("\n|---|");
-    for (std::size_t k = 0; k < std::size(columns); ++k) fmt::print(":-:|");
+    for (std::size_t k = 0; k < columns.size(); ++k) fmt::print(":-:|");
     fmt::print("\n");
     for (const auto& plugin : registry.plugins()) {
         fmt::print("| [{0}](plugins/{0}/README.md) |", plugin.name);

@@ -21,6 +21,7 @@
 #include "delassus/export.hpp"
 #include "delassus/matrix_assembler.hpp"
 #include "delassus/problem.hpp"
+#include "delassus/sdk/cones.hpp"
 
 namespace delassus {
 
@@ -55,7 +56,8 @@ public:
 
         /// Whether its first row is the distance of two things that cannot overlap.
         [[nodiscard]] bool along_normal() const {
-            return cone.kind == ConeKind::Friction || cone.kind == ConeKind::Nonnegative;
+            const auto& kind = sdk::cone_table[static_cast<std::size_t>(cone.kind)];
+            return kind.is_cone && !kind.is_linear;
         }
     };
     struct Row {

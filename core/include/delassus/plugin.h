@@ -16,13 +16,14 @@
  * Life of a solver: create → (analyze → (factorize → solve*)*)* → destroy. The host calls
  *   analyze    when the pattern changed: n, m, the sparsity of H, D or E, the kinds and sizes of the cones;
  *   factorize  when values of H, D or E changed (always after analyze);
- *   solve      for every right-hand side. a, b, μ, box bounds and the law may differ at each call.
+ *   solve      for every right-hand side. a, b, cones' parameters and bounds, and the law may differ at each call.
  * Each call is given the whole problem; its pointers are valid during that call only.
  * A solver is used by one thread at a time; two solvers of one plugin may be used by two threads.
  */
 #ifndef DELASSUS_PLUGIN_H
 #define DELASSUS_PLUGIN_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -30,8 +31,11 @@ extern "C" {
 #endif
 
 #define DELASSUS_PLUGIN_MAGIC 0x53414c44u /* "DLAS" in memory order on a little-endian machine */
-#define DELASSUS_ABI_MAJOR 1              /* must be equal on both sides */
-#define DELASSUS_ABI_MINOR 0              /* the host accepts any; struct_size tells which fields exist */
+/* A minor version adds fields at the end of structs, and bits and numbers; it changes nothing that is there. Either
+ * side may be the older one: a field marked "since 1.k" is read only if the struct_size that comes with it covers it.
+ * Of a descriptor the host checks that itself: it takes any that has all fields of 1.0. */
+#define DELASSUS_ABI_MAJOR 1 /* must be equal on both sides */
+#define DELASSUS_ABI_MINOR 1
 
 #if defined(_WIN32)
 #define DELASSUS_PLUGIN_EXPORT __declspec(dllexport)
@@ -58,14 +62,17 @@ typedef enum delassus_cone_kind {
     DELASSUS_CONE_FRICTION = 3     /* ‖λ_t‖ ≤ μ λ_n, normal first; 3 rows, or 2 in the plane */
 } delassus_cone_kind;
 
+/* Cones stand cone_stride bytes apart, so that a minor version can add fields here: see delassus_cone_at(). It can also
+ * append parameters to those of a kind. Where such a field or parameter matters, the problem needs a DELASSUS_CAN_* bit
+ * of its own: a plugin that does not know it is not called. */
 typedef struct delassus_cone {
     int32_t kind;      /* delassus_cone_kind */
     int32_t first_row; /* blocks follow one another and cover all m rows */
     int32_t rows;      /* ≥ 1 */
-    int32_t reserved;
-    double mu;        /* friction coefficient ≥ 0; 0 for other kinds */
-    const double* lo; /* rows values, −INFINITY allowed; NULL unless a box */
-    const double* hi; /* rows values, +INFINITY allowed; NULL unless a box */
+    int32_t parameter_count;
+    const double* parameters; /* parameter_count; friction: [0] is μ ≥ 0. NULL where there are none */
+    const double* lo;         /* rows values, −INFINITY allowed; NULL unless a box */
+    const double* hi;         /* rows values, +INFINITY allowed; NULL unless a box */
 } delassus_cone;
 
 typedef enum delassus_law {
@@ -73,11 +80,13 @@ typedef enum delassus_law {
     DELASSUS_LAW_COULOMB = 1     /* exact Coulomb: u is replaced by u + (μ‖u_t‖, 0, 0) (seed, eq. 72) */
 } delassus_law;
 
-/* What a problem can need and a solver can offer. A problem sets exactly one DELASSUS_H_* or DELASSUS_REDUCED. */
-#define DELASSUS_CAN_FREE (UINT64_C(1) << 0)
-#define DELASSUS_CAN_NONNEGATIVE (UINT64_C(1) << 1)
-#define DELASSUS_CAN_BOX (UINT64_C(1) << 2)
-#define DELASSUS_CAN_FRICTION (UINT64_C(1) << 3)
+/* What a problem can need and a solver can offer. A problem sets exactly one DELASSUS_CAN_H_* or DELASSUS_CAN_REDUCED.
+ * The bits 0 to 15 are those of the kinds of cones, by number. */
+#define DELASSUS_CAN_CONE(kind) (UINT64_C(1) << (kind))
+#define DELASSUS_CAN_FREE DELASSUS_CAN_CONE(0)
+#define DELASSUS_CAN_NONNEGATIVE DELASSUS_CAN_CONE(1)
+#define DELASSUS_CAN_BOX DELASSUS_CAN_CONE(2)
+#define DELASSUS_CAN_FRICTION DELASSUS_CAN_CONE(3)
 #define DELASSUS_CAN_ASSOCIATED (UINT64_C(1) << 16)     /* needed only where there are friction cones */
 #define DELASSUS_CAN_COULOMB (UINT64_C(1) << 17)        /* likewise */
 #define DELASSUS_CAN_H_DIAGONAL (UINT64_C(1) << 24)     /* positive diagonal */
@@ -102,14 +111,21 @@ typedef struct delassus_problem {
     const double* a;   /* n */
     const double* b;   /* m */
     int32_t cone_count;
-    int32_t h_block_count;        /* diagonal blocks of H (connected components of its pattern) */
-    const delassus_cone* cones;   /* cone_count */
+    int32_t cone_stride;        /* bytes from one cone to the next, ≥ sizeof(delassus_cone) of version 1.0 */
+    const delassus_cone* cones; /* cone_count; delassus_cone_at(problem, k) is the k-th */
+    int32_t h_block_count;      /* diagonal blocks of H (connected components of its pattern) */
+    int32_t reserved;
     const int32_t* h_block_start; /* h_block_count + 1 positions in h_block_index */
     const int32_t* h_block_index; /* n: the rows of block k are h_block_index[h_block_start[k] … h_block_start[k+1]) */
     uint64_t needs;               /* DELASSUS_CAN_* bits that a solver must have */
     uint64_t pattern_id;          /* equal ids: equal patterns (what analyze may keep) */
     uint64_t values_id;           /* equal ids: equal values of H, D and E (what factorize may keep) */
 } delassus_problem;
+
+/* Cone k of a problem, 0 ≤ k < cone_count. */
+static inline const delassus_cone* delassus_cone_at(const delassus_problem* problem, int32_t k) {
+    return (const delassus_cone*)((const char*)problem->cones + (size_t)k * (size_t)problem->cone_stride);
+}
 
 /* ---- Options ------------------------------------------------------------------------------------------------- */
 
@@ -211,10 +227,6 @@ typedef struct delassus_plugin_descriptor {
     int32_t (*create)(const delassus_option_value* values, int32_t count, void** solver);
     void (*destroy)(void* solver);
 
-    /* Optional (may be NULL): a last look at a problem whose needs are all met. Returns 1 to take it, or 0 after
-     * writing a short NUL-terminated reason. Cheap: no factorisation. */
-    int32_t (*accepts)(void* solver, const delassus_problem* problem, char* reason, int32_t capacity);
-
     int32_t (*analyze)(void* solver, const delassus_problem* problem);
     int32_t (*factorize)(void* solver, const delassus_problem* problem);
 
@@ -224,6 +236,10 @@ typedef struct delassus_plugin_descriptor {
 
     /* One sentence on the last DELASSUS_ERROR or DELASSUS_NUMERICAL_FAILURE; never NULL. */
     const char* (*last_error)(void* solver);
+
+    /* Since 1.1. Optional (may be NULL): a last look at a problem whose needs are all met. Returns 1 to take it, or 0
+     * after writing a short NUL-terminated reason. Cheap: no factorisation. */
+    int32_t (*accepts)(void* solver, const delassus_problem* problem, char* reason, int32_t capacity);
 } delassus_plugin_descriptor;
 
 /* The one exported symbol. */

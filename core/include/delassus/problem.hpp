@@ -8,6 +8,7 @@
 // No Eigen type appears here: a program may include this header whatever vector instructions it is compiled for.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -51,6 +52,8 @@ struct SparseMatrix {
     DELASSUS_API void transpose_multiply_add(double factor, const double* vector, double* result) const;
 };
 
+/// By number, as in delassus_cone_kind. What there is to know of a kind is in the table of cones
+/// (delassus/sdk/cones.hpp); kinds that only the table has need no enumerator.
 enum class ConeKind : std::int32_t { Free = 0, Nonnegative = 1, Box = 2, Friction = 3 };
 enum class Law : std::int32_t { Associated = 0, Coulomb = 1 };
 
@@ -63,19 +66,20 @@ enum class Law : std::int32_t { Associated = 0, Coulomb = 1 };
 struct Cone {
     ConeKind kind = ConeKind::Free;
     std::int32_t rows = 1;
-    double mu = 0.0;         ///< friction coefficient ≥ 0; friction only
-    std::vector<double> lo;  ///< `rows` lower bounds, −infinity allowed; box only
-    std::vector<double> hi;  ///< `rows` upper bounds, +infinity allowed; box only
+    /// As many as the kind has, then zeros; friction: the coefficient μ ≥ 0.
+    std::array<double, 4> parameters = {};
+    std::vector<double> lo;  ///< `rows` lower bounds, −infinity allowed; kinds with bounds (box) only
+    std::vector<double> hi;  ///< `rows` upper bounds, +infinity allowed; kinds with bounds (box) only
 
-    [[nodiscard]] static Cone free(std::int32_t rows) { return {ConeKind::Free, rows, 0.0, {}, {}}; }
-    [[nodiscard]] static Cone nonnegative(std::int32_t rows) { return {ConeKind::Nonnegative, rows, 0.0, {}, {}}; }
+    [[nodiscard]] static Cone free(std::int32_t rows) { return {ConeKind::Free, rows, {}, {}, {}}; }
+    [[nodiscard]] static Cone nonnegative(std::int32_t rows) { return {ConeKind::Nonnegative, rows, {}, {}, {}}; }
     [[nodiscard]] static Cone box(std::vector<double> lo, std::vector<double> hi) {
         const auto rows = static_cast<std::int32_t>(lo.size());
-        return {ConeKind::Box, rows, 0.0, std::move(lo), std::move(hi)};
+        return {ConeKind::Box, rows, {}, std::move(lo), std::move(hi)};
     }
     /// Normal first; rows = 3, or 2 in the plane.
     [[nodiscard]] static Cone friction(double mu, std::int32_t rows = 3) {
-        return {ConeKind::Friction, rows, mu, {}, {}};
+        return {ConeKind::Friction, rows, {mu}, {}, {}};
     }
 };
 

@@ -20,12 +20,13 @@ public:
     [[nodiscard]] DELASSUS_API static std::shared_ptr<const Plugin> load(const std::filesystem::path& library);
 
     [[nodiscard]] const PluginInfo& info() const { return info_; }
-    [[nodiscard]] const delassus_plugin_descriptor& descriptor() const { return *descriptor_; }
+    /// A copy; fields that the plugin's version of the border does not have are zero.
+    [[nodiscard]] const delassus_plugin_descriptor& descriptor() const { return descriptor_; }
 
 private:
     Plugin() = default;
     PluginInfo info_;
-    const delassus_plugin_descriptor* descriptor_ = nullptr;
+    delassus_plugin_descriptor descriptor_{};
 };
 
 /// Whether a solver's name is the path of a shared library: it has a slash or ends in .so.

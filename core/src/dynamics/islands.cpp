@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "problem/cone_kinds.hpp"
 #include "problem/structure.hpp"
 
 namespace delassus {
@@ -221,7 +222,7 @@ std::uint64_t Islands::identity(const Island& island) const {
         const Cone& cone = whole.cones[index];
         hash.add_size(static_cast<std::uint64_t>(cone.kind));
         hash.add_size(static_cast<std::uint64_t>(cone.rows));
-        hash.add(&cone.mu, sizeof cone.mu);
+        hash.add(cone.parameters.data(), parameter_bytes(cone));
         hash.add(cone.lo);
         hash.add(cone.hi);
         const auto first = first_row_[index], last = first_row_[index + 1];

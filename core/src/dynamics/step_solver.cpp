@@ -10,6 +10,7 @@
 #include <set>
 
 #include "delassus/error.hpp"
+#include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
 #include "dynamics/islands.hpp"
 #include "solver/auto_solver.hpp"
@@ -78,8 +79,7 @@ void StepSolver::leave_nothing_out() {
     auto& self = *implementation_;
     self.leaves_out = false;
     self.also_needs = DELASSUS_CAN_H_DEFINITE;
-    if (self.config.name == auto_name)
-        self.also_needs |= DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
+    if (self.config.name == auto_name) self.also_needs |= sdk::all_cones;
 }
 
 bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {

@@ -22,7 +22,7 @@ void transfer(Message& message, Problem& problem) {
     message.each(problem.cones, [&](Cone& cone) {
         message(cone.kind);
         message(cone.rows);
-        message(cone.mu);
+        message(cone.parameters[0]);
     });
     message(problem.law);
     for (std::string* text : {&problem.name, &problem.source, &problem.notes}) message(*text);

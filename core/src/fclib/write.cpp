@@ -41,7 +41,7 @@ Rows order_rows(const Problem& problem, const std::string& name) {
                             c, cone.rows, rows.dimension));
         }
         rows.dimension = cone.rows;
-        rows.mu.push_back(cone.mu);
+        rows.mu.push_back(cone.parameters[0]);
         rows.contact_rows += cone.rows;
     }
     if (!rows.mu.empty() && problem.law != Law::Coulomb) {

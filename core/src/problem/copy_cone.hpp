@@ -9,7 +9,7 @@ namespace delassus {
 inline void copy_cone(const Cone& from, Cone& to) {
     to.kind = from.kind;
     to.rows = from.rows;
-    to.mu = from.mu;
+    to.parameters = from.parameters;
     if (!from.lo.empty() || !to.lo.empty()) to.lo = from.lo;
     if (!from.hi.empty() || !to.hi.empty()) to.hi = from.hi;
 }

@@ -86,10 +86,12 @@ struct SpatialFriction : sdk::FrictionCone {
         v[1] *= kept;
         v[2] *= kept;
     }
-    static void project(const delassus_cone& cone, double* lambda) { project_with_slope(cone.mu, lambda); }
+    static void project(const delassus_cone& cone, double* lambda) {
+        project_with_slope(sdk::friction_coefficient(cone), lambda);
+    }
     static void project_dual(const delassus_cone& cone, double* u) {
-        if (cone.mu > 0.0) {
-            project_with_slope(1.0 / cone.mu, u);
+        if (const double mu = sdk::friction_coefficient(cone); mu > 0.0) {
+            project_with_slope(1.0 / mu, u);
         } else {
             u[0] = std::max(0.0, u[0]);
         }
@@ -156,7 +158,7 @@ struct ErrorMeter::Implementation {
     /// u and the sum of the magnitudes of its terms for the rows of a cone, and its part of impulse = Dᵀ λ.
     void pass_over_rows(std::size_t c, const double* x, const double* lambda, double* u, double* magnitude) const {
         const delassus_matrix &D = view.raw->D, &E = view.raw->E;
-        const auto& cone = view.cones[c];
+        const auto& cone = prepared.cones[c];
         const auto first = cone.first_row;
         for (std::int32_t i = 0; i < cone.rows; ++i) {
             u[i] = view.b[first + i];
@@ -183,7 +185,7 @@ struct ErrorMeter::Implementation {
     template <class Projections>
     void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* u, double* trial,
                   Sums& sums) const {
-        const auto& cone = view.cones[c];
+        const auto& cone = prepared.cones[c];
         const std::int32_t rows = on.rows(cone);
         const double square = residual.scaling()[c] * residual.scaling()[c];
         const auto squared_distance = [&](const double* from) {
@@ -194,7 +196,7 @@ struct ErrorMeter::Implementation {
         double squared_velocity = 0.0;
         for (std::int32_t i = 0; i < rows; ++i) squared_velocity += u[i] * u[i];
         sums.velocity += squared_velocity;
-        if (cone.kind == DELASSUS_CONE_FREE) {  // λ cancels; it must not leave its rounding
+        if (sdk::operations_of(cone).is_linear) {  // λ cancels; it must not leave its rounding
             sums.natural += square * squared_velocity;
         } else {
             for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - square * u[i];
@@ -220,8 +222,8 @@ struct ErrorMeter::Implementation {
         Sums sums;
         impulse.setZero(view.n);
         work.resize(3 * largest_cone());
-        for (std::size_t c = 0; c < view.cones.size(); ++c) {
-            const auto& cone = view.cones[c];
+        for (std::size_t c = 0; c < prepared.cones.size(); ++c) {
+            const auto& cone = prepared.cones[c];
             const double* lambda_c = lambda + cone.first_row;
             double *u = work.data(), *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
             prefetch_after(view.raw->D, cone.first_row);
@@ -231,9 +233,8 @@ struct ErrorMeter::Implementation {
                 const double scaled = s * magnitude[i] + std::abs(lambda_c[i]) / s;
                 sums.rounding += scaled * scaled;
             }
-            const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
-            if (friction && view.coulomb) u[0] += sdk::FrictionCone::de_saxce(cone, u);
-            if (friction && cone.rows == 3) {
+            if (view.coulomb) u[0] += sdk::de_saxce(cone, u);
+            if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
                 std::array<double, 3> of_three;
                 add_cone(SpatialFriction{}, c, lambda_c, u, of_three.data(), sums);
             } else {

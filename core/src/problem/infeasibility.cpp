@@ -42,14 +42,14 @@ double bound(const VectorView& data, const Vector& direction, double cost, doubl
 
 // Let d lie in the recession cone of Υ. A solution has ⟨u, d⟩ ≥ 0 with u = D x + E λ + b, hence
 //     −bᵀd ≤ xᵀDᵀd + λᵀE d ≤ ‖(R⁻¹x, S⁻¹λ)‖ ‖(R Dᵀd, S E d)‖.
-// With Coulomb's law only u_n ≥ 0 holds for a friction block, so that d has no tangential part there.
+// With Coulomb's law only u_n ≥ 0 holds for a block of friction, so that d has no tangential part there.
 double size_by_reactions(const sdk::ProblemView& problem, const Units& units, const Vector& direction) {
     Vector opposite = -direction, minus_d = opposite;  // −d = −λ − P*(−λ) (Moreau)
     for (const auto& cone : problem.cones) {
         auto block = minus_d.segment(cone.first_row, cone.rows);
         sdk::operations_of(cone).project_dual(cone, opposite.data() + cone.first_row);
         block -= opposite.segment(cone.first_row, cone.rows);
-        if (problem.coulomb && cone.kind == DELASSUS_CONE_FRICTION) block.tail(cone.rows - 1).setZero();
+        if (problem.coulomb && sdk::operations_of(cone).has_law()) block.tail(cone.rows - 1).setZero();
     }
     double cost = Vector(problem.E * minus_d).cwiseProduct(units.S).norm();
     if (problem.n > 0) cost = std::hypot(cost, Vector(problem.D.transpose() * minus_d).cwiseProduct(units.R).norm());
@@ -58,12 +58,12 @@ double size_by_reactions(const sdk::ProblemView& problem, const Units& units, co
 
 // Likewise for y with D y in Υ*, where H is singular:
 //     aᵀy = xᵀH y − λᵀD y ≤ ‖(R⁻¹x, S⁻¹λ)‖ ‖(R Hᵀy, S (D y − P* D y))‖.
-// The λ of a box may have any sign, so that P* is zero there.
+// Where Υ is no cone (a box), ⟨λ, D y⟩ may have any sign, so that P* is zero there.
 double size_by_velocities(const sdk::ProblemView& problem, const Units& units, const Vector& y) {
     if (problem.n == 0) return 0.0;
     Vector outside = problem.D * y;
     for (const auto& cone : problem.cones) {
-        if (cone.kind == DELASSUS_CONE_BOX) continue;
+        if (!sdk::operations_of(cone).is_cone) continue;
         Vector inside = outside.segment(cone.first_row, cone.rows);
         sdk::operations_of(cone).project_dual(cone, inside.data());
         outside.segment(cone.first_row, cone.rows) -= inside;

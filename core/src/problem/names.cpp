@@ -5,21 +5,13 @@
 
 #include "delassus/error.hpp"
 #include "delassus/problem.hpp"
+#include "problem/cone_kinds.hpp"
 #include "support/nearest_name.hpp"
 
 namespace delassus {
 
 std::string_view name_of(ConeKind kind) {
-    switch (kind) {
-        case ConeKind::Free:
-            return "free";
-        case ConeKind::Nonnegative:
-            return "nonnegative";
-        case ConeKind::Box:
-            return "box";
-        case ConeKind::Friction:
-            return "friction";
-    }
+    if (is_known(kind)) return operations_of(kind).name;
     throw InputError(fmt::format("There is no cone kind number {}.", static_cast<int>(kind)));
 }
 

@@ -8,23 +8,19 @@
 #include <array>
 
 #include "delassus/error.hpp"
-#include "delassus/sdk/cones.hpp"
+#include "problem/cone_kinds.hpp"
 
 namespace delassus {
 
 namespace {
 
 struct Capability {
-    std::uint64_t bit;
-    std::string_view name;    // in sidecars
-    std::string_view phrase;  // in refusals
+    std::uint64_t bit = 0;
+    std::string_view name = {};    // in sidecars
+    std::string_view phrase = {};  // in refusals
 };
 
-constexpr std::array capability_table = {
-    Capability{DELASSUS_CAN_FREE, "free", "free rows"},
-    Capability{DELASSUS_CAN_NONNEGATIVE, "nonnegative", "nonnegative rows"},
-    Capability{DELASSUS_CAN_BOX, "box", "box rows"},
-    Capability{DELASSUS_CAN_FRICTION, "friction", "friction cones"},
+constexpr std::array other_capabilities = {
     Capability{DELASSUS_CAN_ASSOCIATED, "associated", "the associated friction law"},
     Capability{DELASSUS_CAN_COULOMB, "coulomb", "the exact Coulomb law"},
     Capability{DELASSUS_CAN_H_DIAGONAL, "h_diagonal", "a diagonal H"},
@@ -39,6 +35,15 @@ constexpr std::array capability_table = {
     Capability{DELASSUS_CAN_WARM_START, "warm_start", "a warm start"},
     Capability{DELASSUS_CAN_DISTRIBUTED, "distributed", "a distributed run"},
 };
+
+/// The kinds of cones, then the others.
+constexpr auto capability_table = [] {
+    std::array<Capability, sdk::cone_table.size() + other_capabilities.size()> table{};
+    auto* end = table.begin();
+    for (const sdk::ConeOperations& kind : sdk::cone_table) *end++ = {kind.capability(), kind.name, kind.plural};
+    for (const Capability& other : other_capabilities) *end++ = other;
+    return table;
+}();
 
 }  // namespace
 
@@ -88,9 +93,8 @@ std::string PreparedProblem::describe(std::uint64_t missing) const {
         if (!(missing & capability.bit)) continue;
         std::int64_t count = 0;
         for (const Cone& cone : problem().cones) {
-            const auto kind = static_cast<std::size_t>(cone.kind);
-            if (sdk::cone_table[kind].capability == capability.bit)
-                count += cone.kind == ConeKind::Friction ? 1 : cone.rows;
+            const sdk::ConeOperations& kind = operations_of(cone);
+            if (kind.capability() == capability.bit) count += kind.is_separable() ? cone.rows : 1;
         }
         std::string phrase(capability.phrase);
         if (count == 1) phrase.pop_back();  // "1 friction cone"

@@ -7,7 +7,7 @@
 #include <atomic>
 
 #include "delassus/error.hpp"
-#include "delassus/sdk/cones.hpp"
+#include "problem/cone_kinds.hpp"
 #include "problem/need_of.hpp"
 #include "problem/validate.hpp"
 #include "support/finite.hpp"
@@ -190,10 +190,10 @@ bool same_places(const SparseMatrix& here, const SparseMatrix& there) {
 
 /// Solvers may keep where bounds stand as long as the pattern stays.
 void exchange_cones(std::vector<Cone>& here, std::vector<Cone>& there, bool new_places) {
-    const auto is_box = [](const Cone& cone) { return cone.kind == ConeKind::Box; };
-    if (new_places || std::none_of(there.begin(), there.end(), is_box)) return here.swap(there);
+    const auto has_bounds = [](const Cone& cone) { return operations_of(cone).has_bounds; };
+    if (new_places || std::none_of(there.begin(), there.end(), has_bounds)) return here.swap(there);
     for (std::size_t c = 0; c < here.size(); ++c) {
-        std::swap(here[c].mu, there[c].mu);
+        std::swap(here[c].parameters, there[c].parameters);
         std::swap_ranges(here[c].lo.begin(), here[c].lo.end(), there[c].lo.begin());
         std::swap_ranges(here[c].hi.begin(), here[c].hi.end(), there[c].hi.begin());
     }
@@ -268,14 +268,19 @@ void PreparedProblem::Implementation::find_shared_columns() {
 
 void PreparedProblem::Implementation::point_to_arrays() {
     cones.resize(problem.cones.size());
-    std::int32_t first_row = 0;
+    std::int32_t first_row = 0, parameter_count = 0;
     for (std::size_t c = 0; c < cones.size(); ++c) {
-        const Cone& cone = problem.cones[c];
-        const bool box = cone.kind == ConeKind::Box;
-        cones[c] = {
-            static_cast<std::int32_t>(cone.kind), first_row, cone.rows, 0, cone.mu, box ? cone.lo.data() : nullptr,
-            box ? cone.hi.data() : nullptr};
-        first_row += cone.rows;
+        cones[c] = raw_cone(problem.cones[c], first_row);
+        first_row += cones[c].rows;
+        parameter_count += cones[c].parameter_count;
+    }
+    parameters.resize(static_cast<std::size_t>(parameter_count));
+    double* place = parameters.data();
+    for (delassus_cone& cone : cones) {
+        if (cone.parameter_count == 0) continue;
+        std::copy_n(cone.parameters, cone.parameter_count, place);
+        cone.parameters = place;
+        place += cone.parameter_count;
     }
     raw.law = static_cast<std::int32_t>(problem.law);
     raw.H = raw_of(problem.H);
@@ -285,6 +290,7 @@ void PreparedProblem::Implementation::point_to_arrays() {
     raw.b = problem.b.data();
     raw.cone_count = static_cast<std::int32_t>(cones.size());
     raw.h_block_count = static_cast<std::int32_t>(blocks.start.size()) - 1;
+    raw.cone_stride = sizeof(delassus_cone);
     raw.cones = cones.data();
     raw.h_block_start = blocks.start.data();
     raw.h_block_index = blocks.index.data();
@@ -319,8 +325,8 @@ void PreparedProblem::Implementation::detect_structure() {
 
 void PreparedProblem::Implementation::derive_needs(bool new_places) {
     raw.needs = need_of(structure);
-    raw.needs |= also_needs & (DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION);
-    for (const auto& cone : cones) raw.needs |= sdk::operations_of(cone).capability;
+    raw.needs |= also_needs & sdk::all_cones;
+    for (const auto& cone : cones) raw.needs |= DELASSUS_CAN_CONE(cone.kind);
     set_law_needs();
     if (raw.n > 0 && problem.E.entries() > 0) raw.needs |= DELASSUS_CAN_COMPLIANCE;
     if (raw.n > 0 && raw.m > 0 && redundancy(problem.D, problem.E, new_places)) raw.needs |= DELASSUS_CAN_REDUNDANT;
@@ -328,7 +334,7 @@ void PreparedProblem::Implementation::derive_needs(bool new_places) {
 
 void PreparedProblem::Implementation::set_law_needs() {
     raw.needs &= ~static_cast<std::uint64_t>(DELASSUS_CAN_COULOMB | DELASSUS_CAN_ASSOCIATED);
-    if (raw.needs & DELASSUS_CAN_FRICTION) raw.needs |= need_of(problem.law);
+    if (raw.needs & sdk::cones_with_law) raw.needs |= need_of(problem.law);
 }
 
 void PreparedProblem::Implementation::identify() {

@@ -17,6 +17,7 @@ struct PreparedProblem::Implementation {
     std::uint64_t also_needs = 0;
     BlockPartition blocks;
     std::vector<delassus_cone> cones;
+    std::vector<double> parameters;    ///< of all cones, one after another: solvers read them in every sweep
     std::vector<char> shares_columns;  ///< of cones: whether all rows have their entries in D in the same columns
     delassus_problem raw{};
     /// Factored where H is definite or n = 0; null otherwise. The error meter measures with it.

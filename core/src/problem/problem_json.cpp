@@ -11,6 +11,7 @@
 #include <span>
 
 #include "delassus/error.hpp"
+#include "problem/cone_kinds.hpp"
 #include "support/nearest_name.hpp"
 
 namespace delassus {
@@ -22,10 +23,19 @@ using OrderedJson = nlohmann::ordered_json;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::array<std::string_view, 9> top_keys = {"format", "version", "n",     "m",    "law",
                                                       "cones",  "source",  "notes", "extra"};
-constexpr std::array<std::string_view, 4> kinds = {"free", "nonnegative", "box", "friction"};
-constexpr std::array<std::string_view, 2> rows_keys = {"kind", "rows"};
-constexpr std::array<std::string_view, 4> box_keys = {"kind", "rows", "lo", "hi"};
-constexpr std::array<std::string_view, 4> friction_keys = {"kind", "count", "mu", "dimension"};
+
+/// The keys of a run of cones: rows one by one, or `count` blocks of `dimension` rows.
+std::vector<std::string_view> keys_of(const sdk::ConeOperations& kind) {
+    std::vector<std::string_view> keys = {"kind"};
+    if (kind.is_separable()) {
+        keys.emplace_back("rows");
+    } else {
+        keys.insert(keys.end(), {"count", "dimension"});
+    }
+    for (const auto& parameter : kind.named_parameters()) keys.push_back(parameter.key);
+    if (kind.has_bounds) keys.insert(keys.end(), {"lo", "hi"});
+    return keys;
+}
 
 /// A JSON value with the place where it stands, for messages.
 class Node {
@@ -46,9 +56,9 @@ public:
         }
     }
 
-    [[nodiscard]] bool has(const char* key) const { return json_.contains(key); }
+    [[nodiscard]] bool has(std::string_view key) const { return json_.contains(key); }
 
-    [[nodiscard]] Node at(const char* key) const {
+    [[nodiscard]] Node at(std::string_view key) const {
         const auto found = json_.find(key);
         if (found == json_.end()) refuse("lacks the key \"{}\"", key);
         return {*found, fmt::format("{}{}\"{}\"", place_, place_.back() == ':' ? " " : ": ", key)};
@@ -107,34 +117,38 @@ private:
 ProblemJson::Run parse_run(const Node& node) {
     if (!node.json().is_object()) node.refuse("must be an object like {{\"kind\": \"free\", \"rows\": 3}}");
     const std::string kind = node.at("kind").text();
-    const auto found = std::find(kinds.begin(), kinds.end(), kind);
-    if (found == kinds.end()) {
-        node.refuse("has the unknown kind \"{}\"{}", kind.substr(0, 80), nearest_name_hint(kind, kinds));
+    const auto* found = find_cone_kind(kind);
+    if (!found) {
+        std::vector<std::string_view> names;
+        for (const auto& row : sdk::cone_table) names.push_back(row.name);
+        node.refuse("has the unknown kind \"{}\"{}", kind.substr(0, 80), nearest_name_hint(kind, names));
     }
     ProblemJson::Run run;
-    run.kind = static_cast<ConeKind>(found - kinds.begin());
-    if (run.kind == ConeKind::Friction) {
-        node.keys(friction_keys);
+    run.kind = static_cast<ConeKind>(found->kind);
+    node.keys(keys_of(*found));
+    if (found->is_separable()) {
+        run.rows = node.at("rows").integer(1);
+    } else {
         run.count = node.at("count").integer(1);
-        run.mu = node.at("mu").numbers(run.count, std::numeric_limits<double>::quiet_NaN());
-        for (const double mu : run.mu) {
-            if (!(mu >= 0)) node.at("mu").refuse("is {}, but a friction coefficient is at least 0", mu);
-        }
-        run.rows = 3;
-        if (node.has("dimension")) {
-            const Node dimension = node.at("dimension");
-            run.rows = dimension.integer(0);
-            if (run.rows != 2 && run.rows != 3) dimension.refuse("is {}, but must be 3, or 2 in the plane", run.rows);
-        }
-        return run;
+        run.rows = found->usual_rows;
     }
-    run.rows = node.at("rows").integer(1);
-    if (run.kind == ConeKind::Box) {
-        node.keys(box_keys);
+    for (const auto& parameter : found->named_parameters()) {
+        const Node values = node.at(parameter.key);
+        run.parameters.push_back(values.numbers(run.count, std::numeric_limits<double>::quiet_NaN()));
+        for (const double value : run.parameters.back()) {
+            if (!(value >= parameter.least))
+                values.refuse("is {}, but a {} is at least {}", value, parameter.name, parameter.least);
+        }
+    }
+    if (!found->is_separable() && node.has("dimension")) {
+        const Node dimension = node.at("dimension");
+        run.rows = dimension.integer(0);
+        if (run.rows < found->least_rows || run.rows > found->most_rows)
+            dimension.refuse("is {}, but must be {}", run.rows, found->allowed_rows);
+    }
+    if (found->has_bounds) {
         run.lo = node.at("lo").numbers(run.rows, -infinity);
         run.hi = node.at("hi").numbers(run.rows, infinity);
-    } else {
-        node.keys(rows_keys);
     }
     return run;
 }
@@ -148,13 +162,15 @@ OrderedJson bounds_json(const std::vector<double>& bounds) {
     return same ? list[0] : list;
 }
 
-OrderedJson mu_json(std::span<const Cone> cones) {
+/// Parameter k of all cones of a run.
+OrderedJson parameter_json(std::span<const Cone> cones, std::size_t k) {
+    const double first = cones[0].parameters[k];
     const bool same = std::all_of(cones.begin(), cones.end(), [&](const Cone& cone) {
-        return cone.mu == cones[0].mu && std::signbit(cone.mu) == std::signbit(cones[0].mu);
+        return cone.parameters[k] == first && std::signbit(cone.parameters[k]) == std::signbit(first);
     });
-    if (same) return cones[0].mu;
+    if (same) return first;
     OrderedJson list = OrderedJson::array();
-    for (const Cone& cone : cones) list.push_back(cone.mu);
+    for (const Cone& cone : cones) list.push_back(cone.parameters[k]);
     return list;
 }
 
@@ -190,12 +206,12 @@ ProblemJson parse_problem_json(std::string_view text, const std::string& file) {
     const Node cones = top.at("cones");
     if (!cones.json().is_array()) cones.refuse("must be a list of runs of cones");
     std::int64_t rows = 0;
-    bool friction = false;
+    std::string lawful;  // a kind of cone that asks for a law
     for (std::size_t k = 0; k < cones.json().size(); ++k) {
         result.runs.push_back(parse_run({cones.json()[k], fmt::format("{}: cones[{}]", file, k)}));
         const ProblemJson::Run& run = result.runs.back();
         rows += std::int64_t{run.rows} * run.count;
-        friction = friction || run.kind == ConeKind::Friction;
+        if (const auto& kind = operations_of(run.kind); kind.has_law()) lawful = kind.plural;
         if (rows > result.m) break;
     }
     if (rows != result.m) {
@@ -208,8 +224,8 @@ ProblemJson parse_problem_json(std::string_view text, const std::string& file) {
         } catch (const InputError& error) {
             throw InputError(fmt::format("{}: {}", file, error.what()));
         }
-    } else if (friction) {
-        top.refuse("lacks the key \"law\", which must say associated or coulomb where there are friction cones");
+    } else if (!lawful.empty()) {
+        top.refuse("lacks the key \"law\", which must say associated or coulomb where there are {}", lawful);
     }
     return result;
 }
@@ -220,20 +236,13 @@ std::vector<Cone> expand_cones(const ProblemJson& json) {
     };
     std::vector<Cone> cones;
     for (const ProblemJson::Run& run : json.runs) {
-        switch (run.kind) {
-            case ConeKind::Free:
-                cones.push_back(Cone::free(run.rows));
-                break;
-            case ConeKind::Nonnegative:
-                cones.push_back(Cone::nonnegative(run.rows));
-                break;
-            case ConeKind::Box:
-                cones.push_back(Cone::box(spread(run.lo, run.rows), spread(run.hi, run.rows)));
-                break;
-            case ConeKind::Friction:
-                for (std::int32_t k = 0; k < run.count; ++k) {
-                    cones.push_back(Cone::friction(run.mu.size() == 1 ? run.mu[0] : run.mu[k], run.rows));
-                }
+        Cone cone{run.kind, run.rows, {}, spread(run.lo, run.rows), spread(run.hi, run.rows)};
+        for (std::int32_t block = 0; block < run.count; ++block) {
+            for (std::size_t k = 0; k < run.parameters.size(); ++k) {
+                const auto& values = run.parameters[k];
+                cone.parameters[k] = values.size() == 1 ? values[0] : values[static_cast<std::size_t>(block)];
+            }
+            cones.push_back(cone);
         }
     }
     return cones;
@@ -252,18 +261,18 @@ std::string problem_json_text(const Problem& problem) {
         const Cone& cone = cones[first];
         last = first + 1;
         OrderedJson run;
-        run["kind"] = name_of(cone.kind);
-        if (cone.kind == ConeKind::Friction) {
-            while (last < cones.size() && cones[last].kind == ConeKind::Friction && cones[last].rows == cone.rows) {
-                ++last;
-            }
-            run["count"] = last - first;
-            run["mu"] = mu_json(cones.subspan(first, last - first));
-            if (cone.rows != 3) run["dimension"] = cone.rows;
-        } else {
+        const sdk::ConeOperations& kind = operations_of(cone);
+        run["kind"] = kind.name;
+        if (kind.is_separable()) {
             run["rows"] = cone.rows;
+        } else {
+            while (last < cones.size() && cones[last].kind == cone.kind && cones[last].rows == cone.rows) ++last;
+            run["count"] = last - first;
         }
-        if (cone.kind == ConeKind::Box) {
+        for (std::size_t k = 0; k < kind.named_parameters().size(); ++k)
+            run[std::string(kind.parameters[k].key)] = parameter_json(cones.subspan(first, last - first), k);
+        if (!kind.is_separable() && cone.rows != kind.usual_rows) run["dimension"] = cone.rows;
+        if (kind.has_bounds) {
             run["lo"] = bounds_json(cone.lo);
             run["hi"] = bounds_json(cone.hi);
         }

@@ -22,10 +22,10 @@ struct ProblemJson {
     /// have shown that m is honest.
     struct Run {
         ConeKind kind = ConeKind::Free;
-        std::int32_t rows = 0;       ///< of a block
-        std::int32_t count = 1;      ///< blocks
-        std::vector<double> mu;      ///< one for all, or one for each block
-        std::vector<double> lo, hi;  ///< one for all rows, or one for each
+        std::int32_t rows = 0;                        ///< of a block
+        std::int32_t count = 1;                       ///< blocks
+        std::vector<std::vector<double>> parameters;  ///< of the kind: each one for all, or one for each block
+        std::vector<double> lo, hi;                   ///< one for all rows, or one for each
     };
     std::vector<Run> runs;
 };
@@ -33,10 +33,10 @@ struct ProblemJson {
 /// Parses the text, key by key; file names it in messages. Throws InputError.
 ProblemJson parse_problem_json(std::string_view text, const std::string& file);
 
-/// One block for each run of rows and for each of the friction cones.
+/// One block for each run of separate rows, and for each of the cones whose rows do not separate.
 std::vector<Cone> expand_cones(const ProblemJson& json);
 
-/// The text for a valid problem; neighbouring friction cones of one dimension form a run.
+/// The text for a valid problem; neighbouring cones of one kind and dimension whose rows do not separate form a run.
 std::string problem_json_text(const Problem& problem);
 
 }  // namespace delassus

@@ -6,6 +6,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/problem.hpp"
+#include "problem/cone_kinds.hpp"
 #include "problem/symmetry.hpp"
 #include "problem/validate.hpp"
 #include "support/finite.hpp"
@@ -115,26 +116,16 @@ private:
         std::int64_t rows = 0;
         for (std::size_t c = 0; c < problem_.cones.size(); ++c) {
             const Cone& block = problem_.cones[c];
-            switch (block.kind) {
-                case ConeKind::Free:
-                case ConeKind::Nonnegative:
-                case ConeKind::Box:
-                    if (block.rows < 1) refuse("cone {} has {} rows; it needs at least one.", c, block.rows);
-                    break;
-                case ConeKind::Friction:
-                    if (block.rows != 2 && block.rows != 3) {
-                        refuse("cone {} is a friction cone of {} rows; it must have 3, or 2 in the plane.", c,
-                               block.rows);
-                    }
-                    if (!std::isfinite(block.mu) || block.mu < 0) {
-                        refuse("cone {} has the friction coefficient {}; it must be finite and not negative.", c,
-                               block.mu);
-                    }
-                    break;
-                default:
-                    refuse("cone {} has the kind number {}; 0 to 3 exist.", c, static_cast<int>(block.kind));
+            if (!is_known(block.kind)) {
+                refuse("cone {} has the kind number {}; 0 to {} exist.", c, static_cast<int>(block.kind),
+                       sdk::cone_table.size() - 1);
             }
-            bounds(block, c);
+            const sdk::ConeOperations& kind = operations_of(block);
+            if (block.rows < kind.least_rows || block.rows > kind.most_rows) {
+                refuse("cone {} has {} rows; one of the kind {} has {}.", c, block.rows, kind.name, kind.allowed_rows);
+            }
+            parameters(block, kind, c);
+            bounds(block, kind, c);
             rows += block.rows;
         }
         if (rows != problem_.m()) {
@@ -142,11 +133,27 @@ private:
         }
     }
 
-    void bounds(const Cone& block, std::size_t c) const {
-        const std::size_t wanted = block.kind == ConeKind::Box ? static_cast<std::size_t>(block.rows) : 0;
+    void parameters(const Cone& block, const sdk::ConeOperations& kind, std::size_t c) const {
+        const auto known = kind.named_parameters();
+        for (std::size_t k = 0; k < known.size(); ++k) {
+            if (!std::isfinite(block.parameters[k]) || block.parameters[k] < known[k].least) {
+                refuse("cone {} has the {} {}; it must be finite and at least {}.", c, known[k].name,
+                       block.parameters[k], known[k].least);
+            }
+        }
+        for (std::size_t k = known.size(); k < block.parameters.size(); ++k) {
+            if (block.parameters[k] != 0) {
+                refuse("cone {} has {} as parameter {}; one of the kind {} has {} of them.", c, block.parameters[k], k,
+                       kind.name, known.size());
+            }
+        }
+    }
+
+    void bounds(const Cone& block, const sdk::ConeOperations& kind, std::size_t c) const {
+        const std::size_t wanted = kind.has_bounds ? static_cast<std::size_t>(block.rows) : 0;
         if (block.lo.size() != wanted || block.hi.size() != wanted) {
-            refuse("cone {} ({}, {} rows) has {} lower and {} upper bounds; it must have {} of each.", c,
-                   name_of(block.kind), block.rows, block.lo.size(), block.hi.size(), wanted);
+            refuse("cone {} ({}, {} rows) has {} lower and {} upper bounds; it must have {} of each.", c, kind.name,
+                   block.rows, block.lo.size(), block.hi.size(), wanted);
         }
         constexpr double infinity = std::numeric_limits<double>::infinity();
         for (std::size_t k = 0; k < wanted; ++k) {
@@ -181,7 +188,7 @@ private:
 
     void symmetry_of_H() const {
         for (std::size_t c = 0; c < problem_.cones.size(); ++c) {
-            if (problem_.cones[c].kind == ConeKind::Free) continue;
+            if (operations_of(problem_.cones[c]).is_linear) continue;
             const Asymmetry asymmetry = asymmetry_of(problem_.H);
             if (asymmetry.relative > symmetry_tolerance) {
                 refuse(

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "delassus/error.hpp"
+#include "delassus/sdk/cones.hpp"
 #include "delassus/simulation.hpp"
 #include "solver/auto_solver.hpp"
 
@@ -262,15 +263,12 @@ private:
     }
 
     void solvers() {
-        constexpr std::uint64_t cones =
-            DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
-        constexpr std::uint64_t unilateral = cones & ~static_cast<std::uint64_t>(DELASSUS_CAN_FREE);
-        if ((needs_ & cones) == 0) {
+        if ((needs_ & sdk::all_cones) == 0) {
             nothing_.push_back({"a solver", "no row in any problem: velocities follow from H alone"});
             return;
         }
         // Contacts that are not there yet: bodies may touch, with any kind of redundancy among their rows.
-        if (needs_ & unilateral) {
+        if (needs_ & sdk::cones_not_linear) {
             std::uint64_t all = needs_ | (sparse_ ? DELASSUS_CAN_H_DEFINITE : DELASSUS_CAN_H_BLOCKS);
             if (!touching_.pairs().empty()) all |= DELASSUS_CAN_REDUNDANT;
             const std::string name = simulation_.solver().choice(all);

@@ -8,6 +8,7 @@
 
 #include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
+#include "delassus/sdk/cones.hpp"
 #include "delassus/version.hpp"
 #include "problem/need_of.hpp"
 #include "solver/finished_solver.hpp"
@@ -171,7 +172,7 @@ AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint6
     const auto rules = chosen.ranking.rules({needs, tolerance, chosen.simulation});
     const auto able = [&](const RankedStage& ranked) {
         std::uint64_t own = needs;
-        if (const auto law = ranked.stage.law; law && (needs & DELASSUS_CAN_FRICTION))
+        if (const auto law = ranked.stage.law; law && (needs & sdk::cones_with_law))
             own = (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
         return can(registry, ranked.solver, own);
     };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <boost/dll/shared_library.hpp>
+#include <cstddef>
 #include <cstring>
 #include <mutex>
 #include <new>
@@ -16,8 +17,9 @@ namespace delassus {
 
 namespace {
 
-// The descriptor of the first ABI: a plugin must have at least these fields.
-constexpr std::uint32_t smallest_descriptor = sizeof(delassus_plugin_descriptor);
+// The descriptor of version 1.0, whose last field is last_error: a plugin must have at least these fields.
+constexpr std::uint32_t smallest_descriptor =
+    offsetof(delassus_plugin_descriptor, last_error) + sizeof(delassus_plugin_descriptor::last_error);
 
 /// Keeps a library loaded until the process ends: PETSc and MPI are not safe to unload.
 void keep_forever(const boost::dll::shared_library& library) {
@@ -87,8 +89,9 @@ const char* missing_operation(const delassus_plugin_descriptor& descriptor) {
     return nullptr;
 }
 
-/// Checks the handshake and copies what the descriptor says. Throws PluginError with the part after "the plugin X: ".
-PluginInfo read_descriptor(const delassus_plugin_descriptor* descriptor) {
+/// Checks the handshake. Returns a copy without what a later minor version appended, and with zeros for what an earlier
+/// one does not have. Throws PluginError with the part after "the plugin X: ".
+delassus_plugin_descriptor shake_hands(const delassus_plugin_descriptor* descriptor) {
     if (!descriptor) throw PluginError("delassus_plugin() returned nothing");
     if (descriptor->magic != DELASSUS_PLUGIN_MAGIC)
         throw PluginError(
@@ -100,21 +103,28 @@ PluginInfo read_descriptor(const delassus_plugin_descriptor* descriptor) {
     if (descriptor->struct_size < smallest_descriptor)
         throw PluginError(
             fmt::format("its descriptor has {} bytes; {} are needed", descriptor->struct_size, smallest_descriptor));
+    delassus_plugin_descriptor copy{};
+    std::memcpy(&copy, descriptor, std::min<std::size_t>(descriptor->struct_size, sizeof copy));
+    return copy;
+}
+
+/// What the descriptor says. Throws as shake_hands().
+PluginInfo read_descriptor(const delassus_plugin_descriptor& descriptor) {
     PluginInfo info;
-    info.name = text_of(descriptor->name);
+    info.name = text_of(descriptor.name);
     if (!is_plugin_name(info.name))
         throw PluginError(
             fmt::format("its name \"{}\" is not a word of a–z, 0–9, _ and - that begins with a letter", info.name));
-    if (const char* operation = missing_operation(*descriptor))
+    if (const char* operation = missing_operation(descriptor))
         throw PluginError(fmt::format("it lacks the operation {}", operation));
-    info.version = text_of(descriptor->version);
-    info.description = text_of(descriptor->description);
-    info.licence = text_of(descriptor->licence);
-    info.abi_major = descriptor->abi_major;
-    info.abi_minor = descriptor->abi_minor;
-    info.flags = descriptor->flags;
-    info.capabilities = descriptor->capabilities;
-    info.options = read_options(*descriptor);
+    info.version = text_of(descriptor.version);
+    info.description = text_of(descriptor.description);
+    info.licence = text_of(descriptor.licence);
+    info.abi_major = descriptor.abi_major;
+    info.abi_minor = descriptor.abi_minor;
+    info.flags = descriptor.flags;
+    info.capabilities = descriptor.capabilities;
+    info.options = read_options(descriptor);
     static_cast<void>(resolve_options(info.name, info.options, {}));  // the defaults must lie in their own domains
     return info;
 }
@@ -132,7 +142,7 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
                                       DELASSUS_PLUGIN_SYMBOL));
     std::shared_ptr<Plugin> plugin(new Plugin);
     try {
-        plugin->descriptor_ = library.get<const delassus_plugin_descriptor*()>(DELASSUS_PLUGIN_SYMBOL)();
+        plugin->descriptor_ = shake_hands(library.get<const delassus_plugin_descriptor*()>(DELASSUS_PLUGIN_SYMBOL)());
         plugin->info_ = read_descriptor(plugin->descriptor_);
     } catch (const std::bad_alloc&) {
         throw;

@@ -22,6 +22,7 @@
 #include "delassus/errors.hpp"
 #include "delassus/rank.hpp"
 #include "delassus/solver.hpp"
+#include "problem/cone_kinds.hpp"
 
 namespace delassus {
 
@@ -68,23 +69,25 @@ Recession recession_of(const Problem& problem) {
     Recession recession;
     std::int32_t first = 0;
     for (const Cone& cone : problem.cones) {
+        const sdk::ConeOperations& kind = operations_of(cone);
+        const delassus_cone raw = raw_cone(cone);
         for (std::int32_t i = 0; i < cone.rows; ++i) {
             const std::int32_t index = first + i;
-            const auto place = static_cast<std::size_t>(i);
-            const bool below = cone.kind == ConeKind::Box && std::isinf(cone.lo[place]);
-            const bool above = cone.kind == ConeKind::Box && std::isinf(cone.hi[place]);
-            if (cone.kind == ConeKind::Friction) {
-                recession.rows.push_back({index, 1.0, i == 0});
-            } else if (cone.kind == ConeKind::Free || (below && above)) {
+            if (!kind.is_separable()) {
+                if (kind.is_cone) recession.rows.push_back({index, 1.0, i == 0});
+                continue;
+            }
+            const auto [lo, hi] = kind.interval(raw, i);
+            if (std::isinf(lo) && std::isinf(hi)) {
                 recession.add({index, 1.0, false}, Cone::free(1));
                 recession.free.push_back(index);
-            } else if (cone.kind == ConeKind::Nonnegative || above) {
+            } else if (std::isinf(hi)) {
                 recession.add({index, 1.0, true}, Cone::nonnegative(1));
-            } else if (below) {
+            } else if (std::isinf(lo)) {
                 recession.add({index, -1.0, true}, Cone::nonnegative(1));
             }
         }
-        if (cone.kind == ConeKind::Friction) recession.cones.push_back(cone);
+        if (!kind.is_separable() && kind.is_cone) recession.cones.push_back(cone);
         first += cone.rows;
     }
     return recession;

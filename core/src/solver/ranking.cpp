@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delassus/error.hpp"
+#include "delassus/sdk/cones.hpp"
 #include "problem/need_of.hpp"
 #include "support/nearest_name.hpp"
 #include "support/text_file.hpp"
@@ -71,8 +72,7 @@ RankingRule read_rule(const nlohmann::json& json) {
 }  // namespace
 
 bool RankingRule::matches(const RankedNeeds& asked) const {
-    constexpr std::uint64_t cones = DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION;
-    if (linear && *linear != ((asked.needs & cones) == 0)) return false;
+    if (linear && *linear != ((asked.needs & sdk::cones_not_linear) == 0)) return false;
     if (simulation && *simulation != asked.simulation) return false;
     if (law && (asked.needs & need_of(*law)) == 0) return false;
     if (!structures.empty() && std::none_of(structures.begin(), structures.end(), [&](Structure structure) {

@@ -10,6 +10,7 @@
 
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
+#include "problem/cone_kinds.hpp"
 #include "solver/solver_implementation.hpp"
 #include "support/finite.hpp"
 
@@ -34,10 +35,11 @@ constexpr double lost_in_rounding = 10.0;
 ///     ‖R‖ ≥ dist(F, Υ*)      and      ‖R‖ ‖z + F‖ + ‖R‖² ≥ |⟨z, F⟩|
 ///
 /// are Errors::dual and Errors::gap. In numbers, reactions that are large enough swallow a velocity to the last digit:
-/// then R is 0, whatever u. rounding/ε is ‖z‖/‖S r‖ or more. A box has no Υ*, and a gap of another kind.
+/// then R is 0, whatever u. rounding/ε is ‖z‖/‖S r‖ or more. A set that is no cone (a box) has no Υ*, and a gap of
+/// another kind.
 double least_natural(const Problem& problem, const Errors& error) {
     for (const Cone& cone : problem.cones)
-        if (cone.kind == ConeKind::Box) return 0.0;
+        if (!operations_of(cone).is_cone) return 0.0;
     constexpr double unit_roundoff = 0.5 * std::numeric_limits<double>::epsilon();
     const double by_gap = error.rounding > 0.0 ? unit_roundoff * error.gap / error.rounding : 0.0;
     return std::max(error.dual, by_gap);

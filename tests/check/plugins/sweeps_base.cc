@@ -23,10 +23,10 @@ constexpr delassus_option options[] = {
     choice_option("order", "forward", orders, "order in which the rows are visited"),
 };
 
-constexpr std::uint64_t capabilities =
-    DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION | DELASSUS_CAN_ASSOCIATED |
-    DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE |
-    DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START;
+constexpr std::uint64_t capabilities = all_cones | DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB |
+                                       DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE |
+                                       DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |
+                                       DELASSUS_CAN_WARM_START;
 
 class Sweeps : public Solver {
 public:
@@ -82,10 +82,9 @@ private:
     void step_row(const delassus_cone& cone, std::int32_t i, const Vector& r, Vector& lambda) const {
         const Eigen::Index row = cone.first_row + i;
         if (N_(row, row) <= 0.0) return;
-        const delassus_cone alone{
-            cone.kind, 0, 1, 0, 0.0, cone.lo ? cone.lo + i : nullptr, cone.hi ? cone.hi + i : nullptr};
-        lambda[row] -= relaxation_ * (N_.row(row).dot(lambda) + r[row]) / N_(row, row);
-        project(alone, &lambda[row]);
+        const auto [lo, hi] = operations_of(cone).interval(cone, i);
+        const double trial = lambda[row] - relaxation_ * (N_.row(row).dot(lambda) + r[row]) / N_(row, row);
+        lambda[row] = std::min(hi, std::max(lo, trial));
     }
 
     void step_block(const ProblemView& problem, const delassus_cone& cone, const Vector& r, Vector& lambda) const {
@@ -94,7 +93,7 @@ private:
         const double bound = N_.block(cone.first_row, cone.first_row, rows, rows).cwiseAbs().rowwise().sum().maxCoeff();
         if (bound <= 0.0) return;
         Vector u = N_.middleRows(cone.first_row, rows) * lambda + r.segment(cone.first_row, rows);
-        if (problem.coulomb) u[0] += FrictionCone::de_saxce(cone, u.data());
+        if (problem.coulomb) u[0] += de_saxce(cone, u.data());
         lambda.segment(cone.first_row, rows) -= relaxation_ / bound * u;
         project(cone, lambda.data() + cone.first_row);
     }

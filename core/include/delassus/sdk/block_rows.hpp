@@ -21,8 +21,10 @@ struct RowGroup {
     std::int32_t rows = 0;
 };
 
-/// The rows of a problem by what is projected together: the blocks of friction, and single rows of the other kinds.
-inline std::vector<RowGroup> row_groups(std::span<const delassus_cone> cones) {
+static_assert(largest_block_rows <= largest_group);
+
+/// The rows of a problem by what is projected together: the blocks of friction, and single rows of separable kinds.
+inline std::vector<RowGroup> row_groups(const ConeRange& cones) {
     std::vector<RowGroup> groups;
     for (const delassus_cone& cone : cones) {
         const std::int32_t rows = is_separable(cone) ? 1 : cone.rows;

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "delassus/plugin.h"
+#include "delassus/sdk/cones.hpp"
 
 namespace delassus::sdk {
 
@@ -33,7 +34,7 @@ struct ProblemView {
           E(view_of(problem.E)),
           a(problem.a, problem.n),
           b(problem.b, problem.m),
-          cones(problem.cones, static_cast<std::size_t>(problem.cone_count)),
+          cones(problem),
           h_block_start(problem.h_block_start, static_cast<std::size_t>(problem.h_block_count) + 1),
           h_block_index(problem.h_block_index, static_cast<std::size_t>(problem.n)),
           coulomb(problem.law == DELASSUS_LAW_COULOMB),
@@ -48,7 +49,7 @@ struct ProblemView {
     SparseRowsView E;  ///< m × m, both triangles; no entries if absent
     VectorView a;      ///< n
     VectorView b;      ///< m
-    std::span<const delassus_cone> cones;
+    ConeRange cones;
     std::span<const std::int32_t> h_block_start, h_block_index;
     bool coulomb;         ///< exact Coulomb law; otherwise associated
     std::uint64_t needs;  ///< DELASSUS_CAN_* bits

@@ -20,7 +20,7 @@ namespace delassus::sdk {
 
 /// s_c for every block, from the diagonal of N. A block without mobility (zero trace) takes the mean trace of the
 /// others.
-inline void block_scaling(std::span<const delassus_cone> cones, const Vector& diagonal, std::vector<double>& scaling) {
+inline void block_scaling(const ConeRange& cones, const Vector& diagonal, std::vector<double>& scaling) {
     scaling.resize(cones.size());
     double sum = 0.0;
     std::size_t positive = 0;
@@ -34,7 +34,7 @@ inline void block_scaling(std::span<const delassus_cone> cones, const Vector& di
     const double fallback = positive > 0 ? sum / static_cast<double>(positive) : 1.0;
     for (double& s : scaling) s = 1.0 / std::sqrt(s > 0.0 ? s : fallback);
 }
-inline std::vector<double> block_scaling(std::span<const delassus_cone> cones, const Vector& diagonal) {
+inline std::vector<double> block_scaling(const ConeRange& cones, const Vector& diagonal) {
     std::vector<double> scaling;
     block_scaling(cones, diagonal, scaling);
     return scaling;
@@ -82,7 +82,7 @@ public:
         const delassus_cone& cone = cones_[c];
         const double s = scaling_[c];
         double sum = 0.0;
-        if (cone.kind == DELASSUS_CONE_FREE) {
+        if (operations_of(cone).is_linear) {
             for (int i = 0; i < cone.rows; ++i) sum += u[i] * u[i];
             return s * s * sum;
         }
@@ -94,7 +94,7 @@ public:
             trial = large.data();
         }
         for (int i = 0; i < cone.rows; ++i) trial[i] = lambda[i] - s * s * u[i];
-        if (coulomb_ && cone.kind == DELASSUS_CONE_FRICTION) trial[0] -= s * s * FrictionCone::de_saxce(cone, u);
+        if (coulomb_) trial[0] -= s * s * de_saxce(cone, u);
         project(cone, trial);
         for (int i = 0; i < cone.rows; ++i) sum += (lambda[i] - trial[i]) * (lambda[i] - trial[i]);
         return sum / (s * s);

@@ -4,9 +4,9 @@
 //     minimise  f(λ) = ½ λᵀ N λ + rᵀ λ   over Υ,     ∇f(λ) = N λ + r = u           (seed, eq. 120–122, with the ½)
 //
 // With λ = P λ̂, P diagonal and positive, f is ½ λ̂ᵀ N̂ λ̂ + r̂ᵀ λ̂ with N̂ = P N P, r̂ = P r, û = P u, and the set becomes
-// Υ̂ = P⁻¹Υ. P has one scalar for a friction block, p = (tr N_cc / rows)^(−½), so that Υ̂ is the same cone; a row of any
-// other kind has its own p = N_ii^(−½), and Υ̂ is the interval [lo/p, hi/p]. λ̂ and û are both in √energy: the iterates
-// of a method that works on λ̂ do not depend on the units of length, time or mass.
+// Υ̂ = P⁻¹Υ. P has one scalar for a block whose rows do not separate (friction), p = (tr N_cc / rows)^(−½), so that a
+// cone stays the same; a separate row has its own p = N_ii^(−½), and Υ̂ is the interval [lo/p, hi/p]. λ̂ and û are both
+// in √energy: the iterates of a method that works on λ̂ do not depend on the units of length, time or mass.
 //
 // N̂ = Ŵ Ŵᵀ + Ê with Ŵ = P D L⁻ᵀ, H = L Lᵀ and Ê = P E P: where Ŵ has few entries a product with N̂ needs no H⁻¹.
 #pragma once
@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -33,6 +32,7 @@ public:
     struct Block {
         delassus_cone cone;
         std::int32_t first, rows;
+        double unit;  ///< λ = unit · λ̂ where Υ is no cone, and so has a size; 1 for a cone
     };
     /// Rows that are projected one by one onto [lower, upper].
     struct Interval {
@@ -59,7 +59,7 @@ public:
         build_operator(problem);
     }
 
-    /// Takes a, b, μ and the bounds for the solves that follow.
+    /// Takes a, b, the cones' parameters and bounds for the solve that follows.
     void load(const ProblemView& problem) {
         r_ = operator_.free_velocity(problem);
         residual_ = NaturalResidual(problem, operator_.diagonal(), r_);
@@ -68,20 +68,21 @@ public:
         blocks_.clear();
         contacts_.clear();
         intervals_.clear();
-        lower_.setConstant(problem.m, -unbounded_value);
-        upper_.setConstant(problem.m, unbounded_value);
+        lower_.setZero(problem.m);
+        upper_.setZero(problem.m);
         for (const delassus_cone& cone : problem.cones) {
-            if (!is_separable(cone)) {
-                blocks_.push_back({cone, cone.first_row, cone.rows});
-                contacts_.push_back({cone.mu, cone.first_row, cone.kind == DELASSUS_CONE_FRICTION ? cone.rows : 0});
+            const ConeOperations& kind = operations_of(cone);
+            if (!kind.is_separable()) {
+                const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
+                blocks_.push_back({cone, cone.first_row, cone.rows, kind.is_cone ? 1.0 : p_[cone.first_row]});
+                contacts_.push_back(
+                    {friction ? friction_coefficient(cone) : 0.0, cone.first_row, friction ? cone.rows : 0});
                 continue;
             }
-            if (cone.kind == DELASSUS_CONE_NONNEGATIVE) lower_.segment(cone.first_row, cone.rows).setZero();
-            if (cone.kind == DELASSUS_CONE_BOX) {
-                for (std::int32_t i = 0; i < cone.rows; ++i) {
-                    lower_[cone.first_row + i] = cone.lo[i] / p_[cone.first_row + i];
-                    upper_[cone.first_row + i] = cone.hi[i] / p_[cone.first_row + i];
-                }
+            for (std::int32_t i = 0; i < cone.rows; ++i) {
+                const auto [lo, hi] = kind.interval(cone, i);
+                lower_[cone.first_row + i] = lo / p_[cone.first_row + i];
+                upper_[cone.first_row + i] = hi / p_[cone.first_row + i];
             }
             for (std::int32_t i = 0; i < cone.rows; i += longest_interval)
                 intervals_.push_back({cone.first_row + i, std::min(longest_interval, cone.rows - i)});
@@ -171,7 +172,7 @@ public:
             if (contact.rows == 3) {
                 FrictionCone::project_with_slope(contact.mu, 3, lambda.data() + contact.first);
             } else {
-                sdk::project(blocks_[k].cone, lambda.data() + blocks_[k].first);
+                project_block(blocks_[k], lambda.data() + blocks_[k].first);
             }
         }
         for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k)
@@ -192,7 +193,7 @@ public:
     /// One part's share.
     [[nodiscard]] double natural_square(const Part& part, const Vector& lambda, const Vector& velocity) const {
         double sum = 0.0, sums[3] = {};  // of three rows apart: their additions do not wait for one another
-        std::array<double, largest_block> trial;
+        std::array<double, largest_block_rows> trial;
         for (std::size_t k = part.first_block; k < part.first_block + part.blocks; ++k) {
             const Contact& contact = contacts_[k];
             const double* l = lambda.data() + contact.first;
@@ -205,9 +206,8 @@ public:
             }
             const Block& block = blocks_[k];
             for (std::int32_t i = 0; i < block.rows; ++i) trial[i] = l[i] - u[i];
-            if (coulomb_ && block.cone.kind == DELASSUS_CONE_FRICTION)
-                trial[0] -= FrictionCone::de_saxce(block.cone, u);
-            sdk::project(block.cone, trial.data());
+            if (coulomb_) trial[0] -= de_saxce(block.cone, u);
+            project_block(block, trial.data());
             for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - trial[i]) * (l[i] - trial[i]);
         }
         for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k) {
@@ -247,9 +247,14 @@ private:
         std::int32_t first, rows;  // rows: 0 where the block is not one of friction
     };
 
-    static constexpr std::size_t largest_block = 16;  // rows of a block that is projected as a whole
     static constexpr std::int32_t longest_interval = 512, part_rows = 1024;
-    static constexpr double unbounded_value = std::numeric_limits<double>::infinity();
+
+    static void project_block(const Block& block, double* lambda) {
+        if (block.unit == 1.0) return sdk::project(block.cone, lambda);
+        for (std::int32_t i = 0; i < block.rows; ++i) lambda[i] *= block.unit;
+        sdk::project(block.cone, lambda);
+        for (std::int32_t i = 0; i < block.rows; ++i) lambda[i] /= block.unit;
+    }
 
     void scale_rows(const ProblemView& problem) {
         const Vector& diagonal = operator_.diagonal();

@@ -130,11 +130,11 @@ private:
                 0,
                 &create,
                 &destroy,
-                &accepts,
                 &analyze,
                 &factorize,
                 &solve,
-                &last_error};
+                &last_error,
+                &accepts};
     }
 
     static std::string& creation_error() {

@@ -4,13 +4,26 @@
 #include <algorithm>
 #include <cmath>
 
-#include "delassus/plugin.h"
+#include "delassus/sdk/cones/description.hpp"
 
 namespace delassus::sdk {
 
 /// Motors with limits, friction of constant threshold: lo ≤ λ ≤ hi, and ⟨u, y − λ⟩ ≥ 0 for all y in the box, that is,
 /// u = 0 inside, u ≥ 0 at lo, u ≤ 0 at hi.
 struct BoxCone {
+    static constexpr ConeDescription description = {
+        .kind = DELASSUS_CONE_BOX,
+        .name = "box",
+        .plural = "box rows",
+        .set = "lo ≤ λ ≤ hi, infinite bounds allowed",
+        .dual = "the variational inequality of the box",
+        .use = "motors with limits, friction of constant threshold",
+        .allowed_rows = "at least one",
+        .has_bounds = true,
+        .is_cone = false,
+    };
+
+    static Interval interval(const delassus_cone& cone, std::int32_t row) { return {cone.lo[row], cone.hi[row]}; }
     static void project(const delassus_cone& cone, double* lambda) {
         for (int i = 0; i < cone.rows; ++i) lambda[i] = std::min(cone.hi[i], std::max(cone.lo[i], lambda[i]));
     }

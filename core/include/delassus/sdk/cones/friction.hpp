@@ -4,12 +4,32 @@
 #include <algorithm>
 #include <cmath>
 
-#include "delassus/plugin.h"
+#include "delassus/sdk/cones/description.hpp"
 
 namespace delassus::sdk {
 
+/// μ of a friction cone, which is its first parameter.
+inline double friction_coefficient(const delassus_cone& cone) {
+    return cone.parameters[0];
+}
+
 /// The friction cone ‖λ_t‖ ≤ μ λ_n, its dual μ‖u_t‖ ≤ u_n; normal first, one or two tangents.
 struct FrictionCone {
+    static constexpr ConeDescription description = {
+        .kind = DELASSUS_CONE_FRICTION,
+        .name = "friction",
+        .plural = "friction cones",
+        .set = "‖λ_t‖ ≤ μ λ_n, normal first",
+        .dual = "μ‖u_t‖ ≤ u_n",
+        .use = "contact with friction",
+        .allowed_rows = "3, or 2 in the plane",
+        .least_rows = 2,
+        .most_rows = 3,
+        .usual_rows = 3,
+        .parameter_count = 1,
+        .parameters = {{.key = "mu", .name = "friction coefficient", .example = 0.5}},
+    };
+
     static double tangent_norm(const delassus_cone& cone, const double* v) {
         return cone.rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
     }
@@ -31,12 +51,14 @@ struct FrictionCone {
         for (int i = 1; i < rows; ++i) v[i] *= factor;
     }
 
-    static void project(const delassus_cone& cone, double* lambda) { project_with_slope(cone.mu, cone.rows, lambda); }
+    static void project(const delassus_cone& cone, double* lambda) {
+        project_with_slope(friction_coefficient(cone), cone.rows, lambda);
+    }
 
     /// μ‖u_t‖ ≤ u_n is the cone of slope 1/μ; for μ = 0 it is the half space u_n ≥ 0.
     static void project_dual(const delassus_cone& cone, double* u) {
-        if (cone.mu > 0.0) {
-            project_with_slope(1.0 / cone.mu, cone.rows, u);
+        if (const double mu = friction_coefficient(cone); mu > 0.0) {
+            project_with_slope(1.0 / mu, cone.rows, u);
         } else {
             u[0] = std::max(0.0, u[0]);
         }
@@ -49,7 +71,9 @@ struct FrictionCone {
     }
 
     /// The De Saxcé term of the exact Coulomb law (seed, eq. 72): u_n grows by μ‖u_t‖.
-    static double de_saxce(const delassus_cone& cone, const double* u) { return cone.mu * tangent_norm(cone, u); }
+    static double de_saxce(const delassus_cone& cone, const double* u) {
+        return friction_coefficient(cone) * tangent_norm(cone, u);
+    }
 };
 
 }  // namespace delassus::sdk

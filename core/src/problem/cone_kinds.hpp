@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The table of cones for what the host keeps.
+#pragma once
+
+#include <algorithm>
+#include <string_view>
+#include <tuple>
+
+#include "delassus/problem.hpp"
+#include "delassus/sdk/cones.hpp"
+
+namespace delassus {
+
+static_assert(sdk::most_parameters == std::tuple_size_v<decltype(Cone::parameters)>);
+
+/// The kind's row of the table; the kind must be one of the table's.
+inline const sdk::ConeOperations& operations_of(ConeKind kind) {
+    return sdk::cone_table[static_cast<std::size_t>(kind)];
+}
+inline const sdk::ConeOperations& operations_of(const Cone& cone) {
+    return operations_of(cone.kind);
+}
+
+[[nodiscard]] inline bool is_known(ConeKind kind) {
+    const auto number = static_cast<std::int32_t>(kind);
+    return number >= 0 && static_cast<std::size_t>(number) < sdk::cone_table.size();
+}
+
+/// The row of the kind of that name; null if there is none.
+inline const sdk::ConeOperations* find_cone_kind(std::string_view name) {
+    const auto* row = std::find_if(sdk::cone_table.begin(), sdk::cone_table.end(),
+                                   [&](const sdk::ConeOperations& kind) { return kind.name == name; });
+    return row == sdk::cone_table.end() ? nullptr : row;
+}
+
+/// What of its parameters counts in a hash: the first one always, as when μ was the only one.
+inline std::size_t parameter_bytes(const Cone& cone) {
+    return sizeof(double) * static_cast<std::size_t>(std::max(1, operations_of(cone).parameter_count));
+}
+
+/// The cone as it crosses the border: valid as long as the cone stays where it is.
+inline delassus_cone raw_cone(const Cone& cone, std::int32_t first_row = 0) {
+    const sdk::ConeOperations& kind = operations_of(cone);
+    return {kind.kind,
+            first_row,
+            cone.rows,
+            kind.parameter_count,
+            kind.parameter_count > 0 ? cone.parameters.data() : nullptr,
+            kind.has_bounds ? cone.lo.data() : nullptr,
+            kind.has_bounds ? cone.hi.data() : nullptr};
+}
+
+}  // namespace delassus
