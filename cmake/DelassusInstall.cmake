@@ -24,7 +24,7 @@ install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" tools/
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus COMPONENT development)
 install(DIRECTORY examples/plugin examples/embed examples/system DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         COMPONENT development)
-install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
+install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development
         FILES_MATCHING PATTERN "*.md" PATTERN "*.svg")
 
