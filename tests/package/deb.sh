@@ -30,8 +30,8 @@ for name in "${names[@]}"; do
     dpkg-deb -c "$file" >"$scratch/$name.contents"
     if grep -vE '^[^ ]+ root/root .* \./(usr/.*)?$' "$scratch/$name.contents"; then fail "$name has files outside /usr, or not root's"; fi
     grep -q " ./usr/share/doc/$name/copyright$" "$scratch/$name.contents" || fail "$name has no copyright file"
-    printf '%s: %s kB, installed %s kB; depends on %s; recommends %s\n' "$name" "$(($(stat -c %s "$file") / 1024))" \
-        "$(dpkg-deb -f "$file" Installed-Size)" "$(dpkg-deb -f "$file" Depends)" "$(dpkg-deb -f "$file" Recommends)"
+    printf '%s: %s kB; depends on %s; recommends %s\n' "$name" "$(($(stat -c %s "$file") / 1024))" \
+        "$(dpkg-deb -f "$file" Depends)" "$(dpkg-deb -f "$file" Recommends)"
 done
 depends() { dpkg-deb -f "$scratch/packages/$1"_*.deb Depends; }
 [[ $(depends libdelassus) == *libyaml-cpp* ]] || fail "libdelassus does not depend on what it links"
