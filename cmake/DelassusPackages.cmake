@@ -24,6 +24,7 @@ set(same_version "(= ${PROJECT_VERSION})")
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libdelassus)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS libmetis5)  # opened at run time, so dpkg-shlibdeps does not see it
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_RECOMMENDS delassus-plugins)
 set(CPACK_COMPONENT_LIBRARY_DESCRIPTION "Saddle-point and cone-complementarity problems: the library
 Delassus solves the problems that constrained mechanics poses, such as those of joints and frictional
