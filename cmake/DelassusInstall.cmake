@@ -1,29 +1,46 @@
-# The installed package: find_package(delassus) gives delassus::delassus and the command; COMPONENTS SDK gives
-# delassus::sdk (headers and Eigen alone) and delassus_add_solver_plugin().
+# What is installed, and the target `product` that builds it. Each rule names its component, which is one Debian package
+# (DelassusPackages.cmake): library, plugins, command, development.
+# find_package(delassus) gives delassus::delassus and the command; COMPONENTS SDK gives delassus::sdk (headers and Eigen
+# alone) and delassus_add_solver_plugin().
 include(CMakePackageConfigHelpers)
 
-set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/delassus)
+get_property(modules GLOBAL PROPERTY DELASSUS_LOADED_MODULES)
+get_property(plugins GLOBAL PROPERTY DELASSUS_PLUGINS_BUILT)
+add_custom_target(product)
+add_dependencies(product delassus_command delassus_pages ${modules} ${plugins})
 
-install(TARGETS delassus_sdk EXPORT delassusSdkTargets)
-install(TARGETS delassus_command EXPORT delassusSdkTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY "${PROJECT_SOURCE_DIR}/core/include/delassus" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" "${PROJECT_SOURCE_DIR}/tools/generate/include/delassus/generate.hpp"
-        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus)
-install(EXPORT delassusSdkTargets NAMESPACE delassus:: DESTINATION ${package_directory})
-install(EXPORT delassusCoreTargets NAMESPACE delassus:: DESTINATION ${package_directory})
-install(FILES "${DELASSUS_PLUGIN_DIRECTORY}/not-built.list" DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/plugins)
+install(TARGETS delassus_command EXPORT delassusSdkTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 # The suites of `delassus bench`, with what they name; they are found beside libdelassus, in the build tree too.
 file(CREATE_LINK "${PROJECT_SOURCE_DIR}/examples" "${DELASSUS_MODULE_DIRECTORY}/examples" SYMBOLIC)
-install(DIRECTORY examples/suites examples/problems examples/scenes DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/examples COMPONENT command)
-install(FILES "${PROJECT_SOURCE_DIR}/docs/scene.schema.json" DESTINATION ${CMAKE_INSTALL_DATADIR}/delassus)
-install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY examples/suites examples/problems examples/scenes DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/examples
+        COMPONENT command)
+install(FILES docs/scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/delassus COMPONENT command)
+install(FILES "${DELASSUS_PLUGIN_DIRECTORY}/not-built.list" DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/plugins
+        COMPONENT plugins)
 
+install(TARGETS delassus_sdk EXPORT delassusSdkTargets)
+install(DIRECTORY core/include/delassus DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
+install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" tools/generate/include/delassus/generate.hpp
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus COMPONENT development)
+install(DIRECTORY examples/plugin examples/embed examples/system DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
+        COMPONENT development)
+install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development
+        FILES_MATCHING PATTERN "*.md" PATTERN "*.svg")
+
+set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/delassus)
+install(EXPORT delassusSdkTargets NAMESPACE delassus:: DESTINATION ${package_directory} COMPONENT development)
+install(EXPORT delassusCoreTargets NAMESPACE delassus:: DESTINATION ${package_directory} COMPONENT development)
 configure_package_config_file(cmake/delassusConfig.cmake.in delassusConfig.cmake
                               INSTALL_DESTINATION ${package_directory})
 write_basic_package_version_file(delassusConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/delassusConfig.cmake" "${PROJECT_BINARY_DIR}/delassusConfigVersion.cmake"
-              "${PROJECT_SOURCE_DIR}/cmake/DelassusPlugin.cmake" "${PROJECT_SOURCE_DIR}/cmake/delassus_plugin.map"
-        DESTINATION ${package_directory})
+              cmake/DelassusPlugin.cmake cmake/delassus_plugin.map
+        DESTINATION ${package_directory} COMPONENT development)
 
+# delassus.pc finds its folders from its own place, so that an install tree can be moved.
+set(pkgconfig_directory ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+file(RELATIVE_PATH pkgconfig_to_prefix "/prefix/${pkgconfig_directory}" /prefix)
+string(REGEX REPLACE "/$" "" pkgconfig_to_prefix "${pkgconfig_to_prefix}")
 configure_file(cmake/delassus.pc.in delassus.pc @ONLY)
-install(FILES "${PROJECT_BINARY_DIR}/delassus.pc" DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+install(FILES "${PROJECT_BINARY_DIR}/delassus.pc" DESTINATION ${pkgconfig_directory} COMPONENT development)

@@ -44,6 +44,12 @@ function(delassus_objects module)
   target_link_libraries(delassus_${module} PRIVATE ${module}_headers delassus_settings ${arg_LIBRARIES})
 endfunction()
 
+# delassus_install_library(<target>): a shared library; who links against it wants the package of development files too.
+function(delassus_install_library target)
+  install(TARGETS ${target} EXPORT delassusCoreTargets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
+endfunction()
+
 # delassus_library(<module> [OBJECTS module…] PUBLIC target… [PRIVATE target…] [SOURCES file…]): a module as
 # libdelassus_<module>, consumed as delassus::<module>. OBJECTS: modules whose objects go into it. SOURCES: beside those of its
 # folder.
@@ -59,7 +65,7 @@ function(delassus_library module)
     PRIVATE delassus_settings Eigen3::Eigen fmt::fmt ${arg_PRIVATE})
   set_target_properties(delassus_${module} PROPERTIES VERSION ${PROJECT_VERSION} EXPORT_NAME ${module}
     SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN")
-  install(TARGETS delassus_${module} EXPORT delassusCoreTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  delassus_install_library(delassus_${module})
 endfunction()
 
 # delassus_loaded_module(<name> SOURCES file… LIBRARIES target…): a part with a heavy dependency, which its loader opens at need.
@@ -69,7 +75,8 @@ function(delassus_loaded_module name)
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} delassus_settings fmt::fmt)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY "${DELASSUS_MODULE_DIRECTORY}"
     INSTALL_RPATH "$ORIGIN/..")
-  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus)
+  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus COMPONENT library)
+  set_property(GLOBAL APPEND PROPERTY DELASSUS_LOADED_MODULES ${name})
 endfunction()
 
 # delassus_write_modules(): modules.txt in the build folder, for scripts/check-layers. Fails for a public header of no module.

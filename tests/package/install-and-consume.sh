@@ -1,49 +1,9 @@
 #!/usr/bin/env bash
-# Installs the build into a scratch folder and uses it as strangers would: an out-of-tree plugin, an embedding program, and
-# pkg-config. usage: install-and-consume.sh BUILD SOURCE
+# Installs the build into a scratch folder and uses it as strangers would. usage: install-and-consume.sh BUILD SOURCE
 set -euo pipefail
 build=$(realpath "$1")
 source=$(realpath "$2")
 . "$(dirname "$0")/common.sh"
-prefix=$scratch/prefix
 
-cmake --install "$build" --prefix "$prefix" >/dev/null
-command=$prefix/bin/delassus
-"$command" plugins list | tee "$scratch/list"
-grep -q '^apgd' "$scratch/list"
-if "$command" plugins list | grep -A99 '^Rejected'; then echo "installed plugins were rejected" >&2; exit 1; fi
-
-"$command" bench list | tee "$scratch/suites"
-grep -q '^quick: ' "$scratch/suites"
-grep -q "$prefix.*quick.yaml" "$scratch/suites"
-
-# Only what is installed may be used from here on.
-cp -r "$source/examples/plugin" "$source/examples/embed" "$source/examples/system" "$source/examples/problems/box_stack" "$scratch"
-cmake -S "$scratch/plugin" -B "$scratch/plugin/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
-cmake --build "$scratch/plugin/build"
-test -s "$scratch/plugin/build/uzawa.json"
-test "$(nm -D --defined-only "$scratch/plugin/build/uzawa.so" | grep -vc ' A ')" = 1
-"$command" plugins check "$scratch/plugin/build/uzawa.so"
-"$command" solve "$scratch/box_stack" --solver "$scratch/plugin/build/uzawa.so" --tolerance 1e-4
-DELASSUS_PLUGIN_PATH=$scratch/plugin/build "$command" solve "$scratch/box_stack" --solver uzawa --tolerance 1e-4
-
-cmake -S "$scratch/embed" -B "$scratch/embed/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
-cmake --build "$scratch/embed/build"
-"$scratch/embed/build/embed"
-"$scratch/embed/build/embed" "solver: {name: pgs, options: {omega: 1.1}, tolerance: 1e-11}"
-if "$scratch/embed/build/embed" "solver: {name: nobody}"; then echo "an unknown solver was accepted" >&2; exit 1; fi
-
-cmake -S "$scratch/system" -B "$scratch/system/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
-cmake --build "$scratch/system/build"
-for timestepper in euler_implicit_linearized euler_implicit newmark hht generalized_alpha; do
-    for solver in cholmod minres; do "$scratch/system/build/system" "$timestepper" "$solver"; done
-done
-for timestepper in euler_explicit rk4 trapezoidal trapezoidal_linearized; do "$scratch/system/build/system" "$timestepper" free; done
-if "$scratch/system/build/system" rk4; then echo "rk4 took a constraint" >&2; exit 1; fi
-
-export PKG_CONFIG_PATH=$prefix/lib/pkgconfig:$prefix/lib/x86_64-linux-gnu/pkgconfig
-sed -i "s|^prefix=.*|prefix=$prefix|" "$(find "$prefix" -name delassus.pc)"
-g++ -std=c++20 $flags "$scratch/embed/embed.cpp" $(pkg-config --cflags --libs delassus) -Wl,-rpath,"$(pkg-config --variable=libdir delassus)" \
-    -o "$scratch/embed-pc"
-"$scratch/embed-pc"
-echo "install and consume: passed"
+cmake --install "$build" --prefix "$scratch/prefix" >/dev/null
+"$here/consume.sh" "$scratch/prefix" "$source"
