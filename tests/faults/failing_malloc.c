@@ -118,9 +118,9 @@ static int armed_main(int count, char** arguments, char** environment) {
 
 int __libc_start_main(int (*main)(int, char**, char**), int count, char** arguments, void (*init)(void),
                       void (*fini)(void), void (*rtld_fini)(void), void* stack_end) {
-    typedef int (*start)(int (*)(int, char**, char**), int, char**, void (*)(void), void (*)(void), void (*)(void),
-                         void*);
+    int (*start)(int (*)(int, char**, char**), int, char**, void (*)(void), void (*)(void), void (*)(void), void*);
+    void* symbol = dlsym(RTLD_NEXT, "__libc_start_main");
+    memcpy(&start, &symbol, sizeof start);
     real_main = main;
-    return ((start)dlsym(RTLD_NEXT, "__libc_start_main"))(armed_main, count, arguments, init, fini, rtld_fini,
-                                                          stack_end);
+    return start(armed_main, count, arguments, init, fini, rtld_fini, stack_end);
 }
