@@ -78,7 +78,8 @@ protected:
         if (code != 0) {
             ++failures_;
             // The last is how the dynamic loader says it.
-            const bool says = std::regex_search(told, std::regex("memory|alloc|shared object descriptor", std::regex::icase));
+            const bool says =
+                std::regex_search(told, std::regex("memory|alloc|shared object descriptor", std::regex::icase));
             EXPECT_TRUE(says) << told;
         }
         const auto now = snapshot(scratch_ / "out");

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
+#include "output/recorded.hpp"
 #include "output/run_folder.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
-#include "output/recorded.hpp"
 
 namespace delassus::tests::trajectory_test {
 namespace {

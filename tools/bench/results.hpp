@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "delassus/solver_config.hpp"
 #include "delassus/errors.hpp"
 #include "delassus/solver.hpp"
+#include "delassus/solver_config.hpp"
 
 namespace delassus::bench {
 

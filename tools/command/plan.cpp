@@ -5,8 +5,8 @@
 #include "command.hpp"
 #include "delassus/plan.hpp"
 #include "process/stdout_guard.hpp"
-#include "simulation/plan_json.hpp"
 #include "scene_arguments.hpp"
+#include "simulation/plan_json.hpp"
 
 namespace delassus::command {
 

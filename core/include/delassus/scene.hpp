@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "delassus/adaptive_stepping.hpp"
-#include "delassus/solver_config.hpp"
 #include "delassus/export.hpp"
 #include "delassus/multibody.hpp"
+#include "delassus/solver_config.hpp"
 
 namespace delassus {
 

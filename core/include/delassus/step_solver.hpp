@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
+#include "delassus/solver_config.hpp"
 
 namespace delassus {
 

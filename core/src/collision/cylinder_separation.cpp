@@ -5,8 +5,8 @@
 #include <limits>
 #include <numbers>
 
-#include "mechanics/contact_feature.hpp"
 #include "collision/separation.hpp"
+#include "mechanics/contact_feature.hpp"
 
 namespace delassus::collision {
 namespace {

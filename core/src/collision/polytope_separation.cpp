@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "mechanics/contact_feature.hpp"
 #include "collision/separation.hpp"
+#include "mechanics/contact_feature.hpp"
 
 namespace delassus::collision {
 namespace {

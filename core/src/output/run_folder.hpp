@@ -11,9 +11,9 @@
 
 #include "delassus/export.hpp"
 #include "delassus/simulation.hpp"
-#include "simulation/checkpoint.hpp"
-#include "output/vtk_series.hpp"
 #include "output/trajectory.hpp"
+#include "output/vtk_series.hpp"
+#include "simulation/checkpoint.hpp"
 
 namespace delassus {
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "scene/joint_kinds.hpp"
 #include "output/surfaces.hpp"
+#include "scene/joint_kinds.hpp"
 
 namespace delassus {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "support/module.hpp"
-#include "output/recorded.hpp"
 #include "output/trajectory.hpp"
+#include "output/recorded.hpp"
+#include "support/module.hpp"
 
 namespace delassus {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "trajectory/datasets.hpp"
 #include "output/trajectory_model.hpp"
+#include "trajectory/datasets.hpp"
 
 namespace delassus::trajectory {
 

@@ -7,8 +7,8 @@
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
 #include "hdf5/isolated.hpp"
-#include "trajectory/model_file.hpp"
 #include "output/recorded.hpp"
+#include "trajectory/model_file.hpp"
 
 namespace delassus::trajectory {
 namespace {

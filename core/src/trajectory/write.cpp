@@ -3,9 +3,9 @@
 
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
+#include "output/trajectory.hpp"
 #include "trajectory/datasets.hpp"
 #include "trajectory/model_file.hpp"
-#include "output/trajectory.hpp"
 
 namespace delassus::trajectory {
 namespace {
