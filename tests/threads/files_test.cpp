@@ -47,10 +47,14 @@ private:
     std::filesystem::path folder_;
 };
 
-TEST_F(Files, FoldersByTwoThreads) { write_and_read(""); }
+TEST_F(Files, FoldersByTwoThreads) {
+    write_and_read("");
+}
 
 #ifdef DELASSUS_HAS_HDF5
-TEST_F(Files, FclibByTwoThreads) { write_and_read(".hdf5"); }
+TEST_F(Files, FclibByTwoThreads) {
+    write_and_read(".hdf5");
+}
 #endif
 
 }  // namespace
