@@ -236,19 +236,6 @@ TEST_P(Gradient, DoesNotDependOnUnits) {
     }
 }
 
-TEST_P(Gradient, ThreadsDoNotChangeTheAnswer) {
-    SpherePileParameters parameters;
-    parameters.contacts = 1500;
-    for (const bool elastic : {false, true}) {
-        const Problem problem = elastic ? generate_elastic_block({}) : generate_sphere_pile(parameters);
-        const auto one = tests::solve_with(GetParam(), problem, to(1e-5), {{"threads", "1"}});
-        const auto two = tests::solve_with(GetParam(), problem, to(1e-5), {{"threads", "2"}});
-        EXPECT_EQ(one.report.status, Status::Solved);
-        EXPECT_EQ(one.solution.lambda, two.solution.lambda);
-        EXPECT_EQ(one.report.iterations, two.report.iterations);
-    }
-}
-
 TEST_P(Gradient, StopsAtOnceFromTheSolution) {
     const Problem problem = mixed(true);
     auto [solution, report] = solve(GetParam(), problem, to(1e-10));

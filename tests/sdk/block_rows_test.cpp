@@ -129,32 +129,5 @@ TEST_P(Runs, ReorderedRowsAreTheSameRows) {
 
 INSTANTIATE_TEST_SUITE_P(OfColumns, Runs, testing::Values(1, 3, 4, 6, 12));
 
-TEST(Team, EveryMemberPassesEveryBarrier) {
-    for (const int members : {1, 2, 4}) {
-        Team team(members);
-        std::vector<int> step(static_cast<std::size_t>(members), 0);
-        for (int turn = 0; turn < 50; ++turn)
-            team.run([&](int member) {
-                for (int k = 0; k < 20; ++k) {
-                    ++step[static_cast<std::size_t>(member)];
-                    team.barrier();
-                    for (const int other : step) EXPECT_EQ(other, 20 * turn + k + 1);
-                    team.barrier();
-                }
-            });
-    }
-}
-
-TEST(Team, SharesCoverEverythingOnce) {
-    Team team(3);
-    std::size_t next = 0;
-    for (int member = 0; member < 3; ++member) {
-        const auto [first, last] = team.share(10, member);
-        EXPECT_EQ(first, next);
-        next = last;
-    }
-    EXPECT_EQ(next, 10u);
-}
-
 }  // namespace
 }  // namespace delassus::sdk::block_rows_test

@@ -18,6 +18,7 @@ using Vector3 = std::array<double, 3>;
 /// Unit quaternion (w, x, y, z): the rotation from the body frame to the world frame.
 using Quaternion = std::array<double, 4>;
 
+/// A position (m) and a unit quaternion w x y z.
 struct Pose {
     Vector3 position{0.0, 0.0, 0.0};
     Quaternion orientation{1.0, 0.0, 0.0, 0.0};

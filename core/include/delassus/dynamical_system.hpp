@@ -25,6 +25,7 @@
 
 namespace delassus {
 
+/// Time, positions and velocities of a system, in its own units.
 struct State {
     double t = 0.0;
     std::vector<double> q;  ///< position_size()
@@ -60,6 +61,7 @@ public:
             return kind.is_cone && !kind.is_linear;
         }
     };
+    /// One row of a block.
     struct Row {
         double gap = 0.0;   ///< position-level value Φ of the row, 0 for tangential and box rows
         double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity
@@ -128,6 +130,7 @@ private:
     const double* velocity_ = nullptr;
 };
 
+/// What a timestepper asks of a system; derive from it for a system of your own.
 class DELASSUS_API DynamicalSystem {
 public:
     virtual ~DynamicalSystem();

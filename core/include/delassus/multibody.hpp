@@ -36,6 +36,7 @@ struct Inertia {
     DELASSUS_API static Inertia rod(double mass, double length);
 };
 
+/// A rigid body.
 struct BodyParameters {
     std::string name;
     double mass = 1.0;  ///< > 0
@@ -46,6 +47,7 @@ struct BodyParameters {
     bool fixed = false;
 };
 
+/// A point mass.
 struct NodeParameters {
     std::string name;
     double mass = 0.0;  ///< ≥ 0, in addition to what elements give it; together > 0
@@ -131,6 +133,7 @@ struct LoadParameters {
     Vector3 point{};               ///< world frame at t = 0; moves with the body
 };
 
+/// An isotropic elastic material.
 struct ElasticMaterial {
     double young = 1e6;         ///< Pa, > 0
     double poisson = 0.3;       ///< in (−1, ½)
@@ -175,6 +178,7 @@ struct ElasticMeshParameters {
     std::int32_t contact_material = -1;
 };
 
+/// An elastic cable between two nodes.
 struct CableParameters {
     std::string name;
     std::array<std::int32_t, 2> nodes{-1, -1};
@@ -223,6 +227,7 @@ struct ElasticBeamParameters {
     Vector3 angular_velocity{};                 ///< world frame, rad/s
 };
 
+/// How surfaces act in contact.
 struct ContactMaterial {
     double friction = 0.0;     ///< μ ≥ 0
     double restitution = 0.0;  ///< in [0, 1]

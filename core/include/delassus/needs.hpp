@@ -35,7 +35,8 @@ enum class Structure {
 class ErrorMeter;
 
 /// A validated problem with its structure, needs and identity, laid out for the plugin border. Owns everything that
-/// raw() points to; cheap to move, not to be copied by accident.
+/// raw() points to; cheap to move, not to be copied by accident. Used by one thread at a time, solves
+/// included: they measure errors in memory of the problem.
 class PreparedProblem {
 public:
     /// Throws InputError if the problem is not valid. Factors H once if it is neither diagonal nor block-diagonal, to

@@ -12,11 +12,13 @@
 
 namespace delassus {
 
+/// A thing that is kept or left out, and why.
 struct PlanLine {
     std::string what;
     std::string reason;
 };
 
+/// What is kept of a system and what is left out.
 struct SystemPlan {
     std::string name;
     std::int32_t velocities = 0;   ///< n

@@ -85,6 +85,7 @@ struct SceneSystem {
     bool surfaces_read = false, tetrahedra_read = false;  ///< from files: which modules the scene has loaded
 };
 
+/// A scene file as read.
 struct Scene {
     std::string title;  ///< may be empty
     std::vector<SceneSystem> systems;

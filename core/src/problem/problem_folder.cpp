@@ -39,7 +39,7 @@ std::vector<double> read_vector_or_zero(const fs::path& file, std::int32_t rows,
 }
 
 SparseMatrix read_matrix_or(const fs::path& file, std::int32_t rows, std::int32_t columns, SparseMatrix if_absent) {
-    return present(file) ? parse_matrix_market(read_file(file), file.string(), rows, columns) : if_absent;
+    return present(file) ? parse_matrix_market(read_file(file), file.string(), rows, columns) : std::move(if_absent);
 }
 
 bool needs_file(const std::vector<double>& vector) {

@@ -134,7 +134,7 @@ void append_to_file(const fs::path& path, std::string_view content) {
     if (failure != 0) refuse_write(path, failure);
 }
 
-AtomicFolder::AtomicFolder(fs::path target, std::span<const std::string_view> own_files)
+AtomicFolder::AtomicFolder(const fs::path& target, std::span<const std::string_view> own_files)
     : target_(without_trailing_slash(target)) {
     require_parent(target_);
     require_replaceable(target_, own_files);

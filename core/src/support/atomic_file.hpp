@@ -52,7 +52,7 @@ class DELASSUS_API AtomicFolder {
 public:
     /// own_files: the names that a folder of this kind may hold. A target that exists is replaced only if it holds
     /// nothing else; otherwise InputError names the file that would be lost.
-    AtomicFolder(std::filesystem::path target, std::span<const std::string_view> own_files);
+    AtomicFolder(const std::filesystem::path& target, std::span<const std::string_view> own_files);
     AtomicFolder(const AtomicFolder&) = delete;
     AtomicFolder& operator=(const AtomicFolder&) = delete;
     ~AtomicFolder();

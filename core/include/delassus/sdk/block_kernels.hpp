@@ -153,7 +153,7 @@ inline void transpose_multiply_chunk(const double* value, std::int32_t start, in
     }
 }
 
-/// Calls body.template operator()<Rows>() for a group's number of rows, 1 to largest_group.
+/// Calls `body.template operator()<Rows>()` for a group's number of rows, 1 to largest_group.
 template <class Body>
 inline void with_rows(int rows, Body&& body) {
     switch (rows) {
@@ -174,7 +174,7 @@ inline void with_rows(int rows, Body&& body) {
     }
 }
 
-/// Calls body.template operator()<Width>(), compiled for the best instructions of this machine.
+/// Calls `body.template operator()<Width>()`, compiled for the best instructions of this machine.
 template <class Body>
 inline void with_width(int width, Body&& body) {
     switch (width) {

@@ -36,6 +36,7 @@ inline std::vector<RowGroup> row_groups(const ConeRange& cones) {
 /// Vectors over the columns have chunk_padding entries beyond the last; those over the rows need none.
 class BlockRows {
 public:
+    /// A group of rows and the places of its values.
     struct Group {
         std::ptrdiff_t value = 0;  ///< first coefficient
         std::ptrdiff_t chunk = 0;  ///< first chunk

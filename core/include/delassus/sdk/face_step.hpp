@@ -28,6 +28,7 @@
 
 namespace delassus::sdk {
 
+/// A Newton step on the face of an iterate.
 class FaceStep {
 public:
     enum class Result {

@@ -167,6 +167,7 @@ public:
         natural_ = NaturalResidual(problem, diagonal_, r);
     }
 
+    /// Both errors of an iterate.
     struct Value {
         double natural = std::numeric_limits<double>::infinity();
         double balance = std::numeric_limits<double>::infinity();

@@ -26,6 +26,7 @@
 
 namespace delassus::sdk {
 
+/// The convex problem in scaled variables λ̂, cut into parts for threads.
 class ScaledProblem {
 public:
     /// A block that is projected as a whole (friction).

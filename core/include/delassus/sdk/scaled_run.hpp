@@ -11,6 +11,7 @@
 
 namespace delassus::sdk {
 
+/// One solve by a method that works on a ScaledProblem.
 class ScaledRun {
 public:
     /// scaled must be loaded with problem; all must outlive the run. stall_window: as of Monitor.

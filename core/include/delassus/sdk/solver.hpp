@@ -64,6 +64,7 @@ constexpr delassus_status status_of(delassus_answer answer) {
     return answer == DELASSUS_STOP_TIME ? DELASSUS_TIME_LIMIT : DELASSUS_CANCELLED;
 }
 
+/// The base class of a solver. The host makes one object for each solver, and uses it from one thread at a time.
 class Solver {
 public:
     virtual ~Solver() = default;
@@ -86,6 +87,7 @@ public:
     [[nodiscard]] virtual std::int64_t factorizations() const { return 0; }
 };
 
+/// What the descriptor says of a plugin.
 struct PluginInfo {
     const char* name;  ///< lower-case word
     const char* version;

@@ -35,6 +35,7 @@ inline int useful_threads(std::int64_t asked) {
     return static_cast<int>(std::clamp<std::int64_t>(asked, 1, usable_processors()));
 }
 
+/// Threads that run one task together; the calling thread is a member.
 class Team {
 public:
     /// size: members, the calling thread among them; ≥ 1. Throws std::system_error if a thread cannot be started.

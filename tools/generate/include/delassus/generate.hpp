@@ -26,6 +26,7 @@ namespace delassus {
 
 // ---- By name -------------------------------------------------------------------------------------------------------
 
+/// A parameter of a kind of problem.
 struct GeneratorParameter {
     std::string_view key;  ///< lower_snake_case, unique in the table
     double default_value = 0.0;
@@ -36,6 +37,7 @@ struct GeneratorParameter {
     std::string_view doc;   ///< one line
 };
 
+/// A kind of problem.
 struct Generator {
     std::string_view name;
     std::string_view doc;  ///< one line
