@@ -18,8 +18,8 @@ Cone ball(double radius, std::int32_t rows) {
     return {ConeKind{4}, rows, {radius}, {}, {}};
 }
 
-/// Two masses of 2 in the plane, each with a friction that holds up to an impulse of 2. The one is pushed by 5 and slides,
-/// the other by 1 and sticks. A third in space, of mass 1/2, is pushed by 6 against 3.
+/// Two masses of 2 in the plane, each with a friction that holds up to an impulse of 2. The one is pushed by 5 and
+/// slides, the other by 1 and sticks. A third in space, of mass 1/2, is pushed by 6 against 3.
 Problem three_pushes() {
     Problem problem;
     problem.H = diagonal_matrix({2, 2, 2, 2, 0.5, 0.5, 0.5});
@@ -40,7 +40,8 @@ TEST(Ball, GoesFromAFolderToTheReport) {
     ASSERT_EQ(solved.exit_code, 0) << solved.err;
     const auto report = nlohmann::json::parse(solved.out);
     EXPECT_EQ(report["status"], "solved");
-    for (const char* name : {"natural", "balance", "cone", "dual", "gap"}) EXPECT_LE(report["error"][name], 1e-9) << name;
+    for (const char* name : {"natural", "balance", "cone", "dual", "gap"})
+        EXPECT_LE(report["error"][name], 1e-9) << name;
     const Solution solution = read_solution(scratch / "s", 7, 7);
     for (std::size_t i = 0; i < 7; ++i) {
         EXPECT_NEAR(solution.x[i], x[i], 1e-9) << i;
@@ -65,8 +66,17 @@ TEST(Ball, AnErrorIsSeen) {
 // Rows on a common body, so that the scaled blocks are coupled and their radii stand in different units.
 TEST(Ball, SolvesACoupledProblem) {
     Problem problem = three_pushes();
-    problem.D = SparseMatrix::from_triplets(7, 7, {{0, 0, 1}, {0, 2, -1}, {1, 1, 1}, {1, 3, -1}, {2, 2, 3},
-                                                   {3, 3, 3}, {4, 4, 1}, {4, 0, 2}, {5, 5, 1}, {6, 6, 0.1}});
+    problem.D = SparseMatrix::from_triplets(7, 7,
+                                            {{0, 0, 1},
+                                             {0, 2, -1},
+                                             {1, 1, 1},
+                                             {1, 3, -1},
+                                             {2, 2, 3},
+                                             {3, 3, 3},
+                                             {4, 4, 1},
+                                             {4, 0, 2},
+                                             {5, 5, 1},
+                                             {6, 6, 0.1}});
     const auto solved = solve_with("apgd", problem, to(1e-10));
     EXPECT_EQ(solved.report.status, Status::Solved) << solved.report.message;
     EXPECT_LE(solved.report.error.natural, 1e-10);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the host makes of the table of cones, for every kind in it: files, checks, needs, and what the documentation says.
+// What the host makes of the table of cones, for every kind in it: files, checks, needs, and what the documentation
+// says.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -62,7 +63,8 @@ TEST_P(EachKind, SaysWhatIsWrongWithItsParametersAndRows) {
         expect_sentence(sentence_of<InputError>([&] { validate(problem_of({cone})); }), words);
     };
     for (std::size_t k = 0; k < kind.named_parameters().size(); ++k) {
-        for (const double value : {kind.parameters[k].least - 0.5, infinity, std::numeric_limits<double>::quiet_NaN()}) {
+        for (const double value :
+             {kind.parameters[k].least - 0.5, infinity, std::numeric_limits<double>::quiet_NaN()}) {
             Cone cone = example_of(kind, kind.usual_rows);
             cone.parameters[k] = value;
             refused(cone, fmt::format("{} {}", kind.parameters[k].name, value));
@@ -95,8 +97,8 @@ TEST_P(EachKind, IsNeededAndNamed) {
 #ifndef DELASSUS_TEST_CONE  // which is no user's
 TEST_P(EachKind, StandsInTheDocumentation) {
     const auto docs = std::filesystem::path(DELASSUS_SOURCE_DIR) / "docs";
-    const std::string row = fmt::format("| `{}` | {} | {} | {} | {} |\n", kind.name, kind.allowed_rows, kind.set,
-                                        kind.dual, kind.use);
+    const std::string row =
+        fmt::format("| `{}` | {} | {} | {} | {} |\n", kind.name, kind.allowed_rows, kind.set, kind.dual, kind.use);
     EXPECT_NE(text_of(docs / "problem.md").find(row), std::string::npos) << "docs/problem.md lacks\n" << row;
     std::string keys = kind.is_separable() ? "`rows`" : "`count`";
     for (const auto& parameter : kind.named_parameters()) keys += fmt::format(", `{}`", parameter.key);
@@ -108,7 +110,7 @@ TEST_P(EachKind, StandsInTheDocumentation) {
 #endif
 
 INSTANTIATE_TEST_SUITE_P(ConeKinds, EachKind, testing::Range<std::size_t>(0, sdk::cone_table.size()),
-                         [](const auto& info) { return std::string(sdk::cone_table[info.param].name); });
+                         [](const auto& chosen) { return std::string(sdk::cone_table[chosen.param].name); });
 
 }  // namespace
 }  // namespace delassus::tests

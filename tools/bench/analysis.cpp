@@ -49,8 +49,7 @@ std::string class_of(const Json& row, const std::map<std::string, const Json*>& 
             const auto* kind = find_cone_kind(name);
             linear = linear && kind && kind->is_linear;
         }
-        if (linear)
-            return structure == "unsymmetric" || structure == "indefinite" ? structure : "linear";
+        if (linear) return structure == "unsymmetric" || structure == "indefinite" ? structure : "linear";
     }
     return row.at("law");
 }

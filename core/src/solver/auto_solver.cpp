@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <map>
 
-#include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
+#include "delassus/solver_config.hpp"
 #include "delassus/version.hpp"
 #include "problem/need_of.hpp"
 #include "solver/finished_solver.hpp"

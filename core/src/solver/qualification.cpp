@@ -18,10 +18,10 @@
 #include <limits>
 #include <utility>
 
-#include "delassus/solver_config.hpp"
 #include "delassus/errors.hpp"
 #include "delassus/rank.hpp"
 #include "delassus/solver.hpp"
+#include "delassus/solver_config.hpp"
 #include "problem/cone_kinds.hpp"
 
 namespace delassus {
