@@ -110,7 +110,7 @@ TEST_P(EachKind, StandsInTheDocumentation) {
 #endif
 
 INSTANTIATE_TEST_SUITE_P(ConeKinds, EachKind, testing::Range<std::size_t>(0, sdk::cone_table.size()),
-                         [](const auto& info) { return std::string(sdk::cone_table[info.param].name); });
+                         [](const auto& chosen) { return std::string(sdk::cone_table[chosen.param].name); });
 
 }  // namespace
 }  // namespace delassus::tests
