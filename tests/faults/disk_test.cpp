@@ -229,8 +229,8 @@ TEST_F(StoppedRun, ANewOneIsRefused) {
 
 TEST_F(StoppedRun, ByALimitOfFileSizesGoesOn) {
     std::optional<FileSizeLimit> limit;
-    expect_it_goes_on(
-        scratch_ / "run", [&] { limit.emplace(2'600'000); }, [&] { limit.reset(); });
+    const auto stop = [&] { limit.emplace(fs::file_size(scratch_ / "run/trajectory.h5") + 100'000); };
+    expect_it_goes_on(scratch_ / "run", stop, [&] { limit.reset(); });
 }
 
 #endif
