@@ -12,10 +12,10 @@
 #include "bench/channel.hpp"
 #include "bench/json_text.hpp"
 #include "bench/scene_worker.hpp"
-#include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/solver_config.hpp"
 #include "problem/structure.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
@@ -151,7 +151,7 @@ void measure(const Channel& channel, const Json& request) {
                               {"solve", report.seconds_solve},
                               {"analyses", report.analyses},
                               {"factorizations", report.factorizations},
-                              {"error", json_of(report.error)},
+                              {"error", errors_json(report.error)},
                               {"velocity", json_number(velocity)},
                               {"speed", json_number(speed)},
                               {"stages", stages},

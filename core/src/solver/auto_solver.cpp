@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <map>
 
-#include "delassus/solver_config.hpp"
 #include "delassus/error.hpp"
+#include "delassus/solver_config.hpp"
 #include "delassus/version.hpp"
 #include "problem/need_of.hpp"
 #include "solver/finished_solver.hpp"
@@ -78,8 +78,8 @@ public:
                            problem.describe(needs));
     }
 
-    void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-             SolveReport& report) override {
+    std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                              SolveReport& report) override {
         const std::uint64_t needs = needs_of(problem, {});
         const RankingRule& rule = rule_of(problem, settings);
         StageRunner runner(problem, solution, settings, report);
@@ -102,6 +102,7 @@ public:
                 if (solver && runner.run(*solver, ranked.stage)) break;
             }
         report.message = fmt::format("{}: {}", rule.name, runner.sentence());
+        return runner.error();
     }
 
 private:
