@@ -15,9 +15,12 @@ class EulerExplicit : public Timestepper {
 public:
     explicit EulerExplicit(DynamicalSystem& system) : system_(system), accelerations_(system), n_(system.n()) {}
 
-    StepReport step(State& state, double h, StepSolver& solver) override {
+    void restart() override {}
+    [[nodiscard]] int order() const override { return 1; }
+
+private:
+    void take_step(State& state, double h, StepSolver& solver, StepReport& report) override {
         require_step(system_, state, h, "euler_explicit");
-        StepReport report;
         const Vector v_dot = accelerations_.at(state, solver, report).x;
         const Eigen::Map<Vector> v(state.v.data(), n_);
         const Vector delta = h * v;
@@ -28,13 +31,8 @@ public:
         end.t = state.t + h;
         require_finite(state, end, h, "euler_explicit");
         state = std::move(end);
-        return report;
     }
 
-    void restart() override {}
-    [[nodiscard]] int order() const override { return 1; }
-
-private:
     DynamicalSystem& system_;
     Accelerations accelerations_;
     std::int32_t n_;

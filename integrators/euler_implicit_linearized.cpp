@@ -51,54 +51,8 @@ public:
         delta_.resize(static_cast<std::size_t>(n_));
     }
 
-    StepReport step(State& state, double h, StepSolver& solver) override {
-        require_step(system_, state, h, "euler_implicit_linearized");
-        problem_.name = "step";
-        problem_.law = Law::Associated;
-        end_ = state;  // the old q and v at the new time
-        end_.t = state.t + h;
-        rows_.clear();
-        rows_.measure_speeds_at(state.v.data());
-        if (system_.has_unilateral()) system_.collect_unilateral(state, h, rows_);
-        assemble_balance(state, h);
-        assemble_constraints(state, h);
-        assemble_unilateral(h);
-
-        StepReport report;
-        report.newton_iterations = 1;
-        report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
-        solution_.x = state.v;
-        // H and a are needed again if the linearisation is judged; otherwise the solver takes the problem's arrays.
-        report.solved = linearization_.wanted() ? solver.solve(problem_, solution_, true)
-                                                : solver.solve(std::move(problem_), solution_, true);
-        if (!report.solved) report.message = solver.effort().unsolved;
-        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
-        system_.increment(state.q.data(), delta_.data(), end_.q.data());
-        end_.v = solution_.x;
-        require_finite(state, end_, h, "euler_implicit_linearized");
-        if (linearization_.wanted()) judge_linearization(state, h, report);
-        report_reactions(solution_.lambda, h, report);
-        state = end_;
-        keep(solution_.lambda, h);
-        return report;
-    }
-
     [[nodiscard]] int order() const override { return 1; }
     [[nodiscard]] bool damps_at_once() const override { return true; }
-    [[nodiscard]] bool pushed(std::uint64_t key) const override {
-        const auto found = first_kept(key);
-        return found != kept_.end() && found->key == key && impulses_[static_cast<std::size_t>(found->first)] > 0.0;
-    }
-
-    [[nodiscard]] std::array<double, 3> reaction(std::uint64_t key) const override {
-        std::array<double, 3> force{};
-        const auto found = first_kept(key);
-        if (found == kept_.end() || found->key != key) return force;
-        for (std::size_t i = 0; i < force.size() && static_cast<std::int32_t>(i) < found->rows; ++i)
-            force[i] = impulses_[static_cast<std::size_t>(found->first) + i] / last_h_;
-        return force;
-    }
-
     void restart() override {
         multipliers_.clear();
         kept_.clear();
@@ -142,6 +96,38 @@ public:
     }
 
 private:
+    void take_step(State& state, double h, StepSolver& solver, StepReport& report) override {
+        require_step(system_, state, h, "euler_implicit_linearized");
+        problem_.name = "step";
+        problem_.law = Law::Associated;
+        end_ = state;  // the old q and v at the new time
+        end_.t = state.t + h;
+        rows_.clear();
+        rows_.measure_speeds_at(state.v.data());
+        if (system_.has_unilateral()) system_.collect_unilateral(state, h, rows_);
+        assemble_balance(state, h);
+        assemble_constraints(state, h);
+        assemble_unilateral(h);
+
+        report.newton_iterations = 1;
+        report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
+        solution_.x = state.v;
+        // H and a are looked at once more where the linearisation is judged; else the problem changes hands.
+        report.solved = linearization_.wanted() ? solver.solve(problem_, solution_, true)
+                                                : solver.solve(std::move(problem_), solution_, true);
+        if (!report.solved) report.message = solver.effort().unsolved;
+        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
+        system_.increment(state.q.data(), delta_.data(), end_.q.data());
+        end_.v = solution_.x;
+        require_finite(state, end_, h, "euler_implicit_linearized");
+        if (linearization_.wanted()) judge_linearization(state, h, report);
+        report_reactions(solution_.lambda, h, report);
+        report.contacts.swap(rows_.contacts());
+        state = end_;
+        keep(solution_.lambda, h);
+        report.multipliers = multipliers_;
+    }
+
     /// Where the impulses of a unilateral block of the last step stand in impulses_.
     struct Kept {
         std::uint64_t key;
@@ -253,13 +239,18 @@ private:
         }
     }
 
-    // A contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed of Φ/h at
-    // least, also where its first speed was less. One that left and comes back within the step, as a ball that bounces
-    // low, does so about as fast. One that penetrates gives the energy λ_n (u_n + u_n⁺)/2 where it pushes apart.
+    // Of impacts: a contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed
+    // of Φ/h at least, also where its first speed was less. One that left and comes back within the step, as a ball
+    // that bounces low, does so about as fast. One that penetrates gives the energy λ_n (u_n + u_n⁺)/2 where it pushes
+    // apart.
     void report_reactions(const std::vector<double>& lambda, double h, StepReport& report) const {
         for (std::size_t k = 0; k < next_kept_.size(); ++k) {
-            const double reaction = lambda[m_ + next_kept_[k].first];
+            const auto& [key, first, rows] = next_kept_[k];
+            const double reaction = lambda[m_ + first];
             const auto& [gap, approach, along_normal, pushed_before] = approaches_[k];
+            BlockReaction& acted = report.reactions.emplace_back();
+            acted.key = key;
+            for (std::int32_t i = 0; i < std::min(rows, 3); ++i) acted.force[i] = lambda[m_ + first + i] / h;
             if (reaction != 0.0) ++report.active_blocks;
             if (!along_normal || !(reaction > 0.0)) continue;
             const double speed = std::max(std::abs(approach), gap / h);

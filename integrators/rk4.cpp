@@ -17,9 +17,12 @@ class RungeKutta4 : public Timestepper {
 public:
     explicit RungeKutta4(DynamicalSystem& system) : system_(system), accelerations_(system), n_(system.n()) {}
 
-    StepReport step(State& state, double h, StepSolver& solver) override {
+    void restart() override {}
+    [[nodiscard]] int order() const override { return 4; }
+
+private:
+    void take_step(State& state, double h, StepSolver& solver, StepReport& report) override {
         require_step(system_, state, h, "rk4");
-        StepReport report;
         const Eigen::Map<const Vector> v(state.v.data(), n_);
         const Slope k1 = slope(state, 0.0, Vector::Zero(n_), v, solver, report);
         const Slope k2 = slope(state, 0.5 * h, 0.5 * h * k1.u, v + 0.5 * h * k1.v, solver, report);
@@ -33,13 +36,8 @@ public:
         end.t = state.t + h;
         require_finite(state, end, h, "rk4");
         state = std::move(end);
-        return report;
     }
 
-    void restart() override {}
-    [[nodiscard]] int order() const override { return 4; }
-
-private:
     struct Slope {
         Vector u, v;
     };

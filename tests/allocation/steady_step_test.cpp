@@ -50,6 +50,8 @@ namespace {
 
 #if DELASSUS_COUNTS
 
+std::size_t contacts = 0;  // of the last step
+
 /// Steps often enough for every array to have its size, then counts over some steps.
 long steady_allocations(MultibodySystem& system, const std::string& method, bool within_the_solver) {
     system.finish();
@@ -60,14 +62,19 @@ long steady_allocations(MultibodySystem& system, const std::string& method, bool
     StepSolver solver(registry, config);
     const auto stepper = make_timestepper(method, system);
     State state = system.initial_state();
-    for (int step = 0; step < 20; ++step) EXPECT_TRUE(stepper->step(state, 1e-3, solver).solved) << method;
+    StepReport report;
+    for (int step = 0; step < 20; ++step) {
+        stepper->step(state, 1e-3, solver, report);
+        EXPECT_TRUE(report.solved) << method;
+    }
     if (within_the_solver) solver.on_problem = [](const Problem&) { counting = true; };
     allocations = 0;
     for (int step = 0; step < 5; ++step) {
         counting = !within_the_solver;
-        stepper->step(state, 1e-3, solver);
+        stepper->step(state, 1e-3, solver, report);
         counting = false;
     }
+    contacts = report.contacts.size();
     return allocations;
 }
 
@@ -128,7 +135,7 @@ TEST(SteadySteps, OfRestingBodiesAllocateNothingInTheSolversPart) {
     }
     system.set_envelope(0.05);
     EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", true), 0);
-    EXPECT_EQ(system.contacts().size(), 2U);
+    EXPECT_EQ(contacts, 2U);
 }
 
 // The count works: an allocation is seen.

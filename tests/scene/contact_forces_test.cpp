@@ -20,9 +20,10 @@ constexpr double g = 9.81;
 Vector3 force_between(const Running& run, const std::string& first, const std::string& second) {
     const BodyIndex a = run.system().find_body(first), b = run.system().find_body(second);
     Vector3 sum{};
-    for (const auto& [bodies, force] : run.simulation.contact_forces()) {
+    for (const ContactRecord& contact : run.simulation.contacts()) {
+        const auto& bodies = contact.bodies;
         const double sign = bodies[0] == a && bodies[1] == b ? 1.0 : bodies[0] == b && bodies[1] == a ? -1.0 : 0.0;
-        for (std::size_t i = 0; i < 3; ++i) sum[i] += sign * force[i];
+        for (std::size_t i = 0; i < 3; ++i) sum[i] += sign * contact.force[i];
     }
     return sum;
 }
@@ -42,12 +43,12 @@ bodies:
 }
 
 void expect_weights(const Running& run) {
-    const auto forces = run.simulation.contact_forces();
-    EXPECT_EQ(forces.size(), run.system().contacts().size());
-    EXPECT_GE(forces.size(), 8u);
+    const StepReport& report = run.simulation.report();
+    EXPECT_GE(report.contacts.size(), 8u);
+    EXPECT_EQ(report.reactions.size(), report.contacts.size());
     std::set<std::uint64_t> keys;
-    for (const auto& contact : run.system().contacts()) keys.insert(MultibodySystem::contact_key(contact));
-    EXPECT_EQ(keys.size(), forces.size());
+    for (const auto& reaction : report.reactions) keys.insert(reaction.key);
+    EXPECT_EQ(keys.size(), report.contacts.size());
     const Vector3 below = force_between(run, "ground", "box_0"), between = force_between(run, "box_0", "box_1");
     for (std::size_t i = 0; i < 2; ++i) {
         EXPECT_NEAR(below[i], 0.0, 1e-6);
@@ -59,8 +60,35 @@ void expect_weights(const Running& run) {
 
 TEST(ContactForces, UnderAStackSumToItsWeight) {
     Running run(parse_scene(stack(""), "test"));
-    EXPECT_TRUE(run.simulation.contact_forces().empty());  // none is known before the first step
+    EXPECT_TRUE(run.simulation.contacts().empty());  // none is known before the first step
     for (int i = 0; i < 100; ++i) run.simulation.step();
+    expect_weights(run);
+}
+
+// With chosen steps too, contacts and forces are those of one step of the method: its second half.
+TEST(ContactForces, OfChosenStepsBelongToTheirContacts) {
+    Running run(parse_scene(R"(
+tolerance: 1.0e-5
+end: 1
+solver: {tolerance: 1.0e-10}
+materials: {stone: {friction: 0.6}}
+bodies:
+  - {name: ground, fixed: true, shapes: [{plane: {}, material: stone}]}
+  - {name: box_0, mass: 1, position: [0, 0, 0.05], shapes: [{box: {size: [0.1, 0.1, 0.1]}, material: stone}]}
+)",
+                            "test"));
+    run.finish();
+    const StepReport& report = run.simulation.report();
+    EXPECT_EQ(report.contacts.size(), 4u);
+    EXPECT_EQ(report.reactions.size(), 4u);
+    EXPECT_NEAR(force_between(run, "ground", "box_0")[2], g, 1e-6 * g);
+}
+
+TEST(ContactForces, StayWhenAStepFails) {
+    Running run(parse_scene(stack(""), "test"));
+    for (int i = 0; i < 100; ++i) run.simulation.step();
+    run.simulation.solver().cancelled = [] { return true; };
+    EXPECT_THROW(run.simulation.step(), StepInterrupted);
     expect_weights(run);
 }
 
@@ -90,7 +118,7 @@ bodies:
     EXPECT_NEAR(force[0], -mass * g * std::sin(angle), 1e-6 * mass * g);
     EXPECT_NEAR(force[1], 0.0, 1e-6 * mass * g);
     EXPECT_NEAR(force[2], mass * g * std::cos(angle), 1e-6 * mass * g);
-    for (const auto& contact : run.simulation.contact_forces()) EXPECT_GE(contact.force[2], -1e-9);
+    for (const auto& contact : run.simulation.contacts()) EXPECT_GE(contact.force[2], -1e-9);
 }
 
 TEST(ContactForces, OfElasticNodesCarryTheBlock) {
@@ -108,10 +136,10 @@ elastic_blocks:
                             "test"));
     run.finish();
     double sum = 0.0;
-    for (const auto& [bodies, force] : run.simulation.contact_forces()) {
-        EXPECT_EQ(bodies[0], 0);  // the ground
-        EXPECT_GE(bodies[1], 1);  // nodes are counted on after the one body
-        sum += force[2];
+    for (const ContactRecord& contact : run.simulation.contacts()) {
+        EXPECT_EQ(contact.bodies[0], 0);  // the ground
+        EXPECT_GE(contact.bodies[1], 1);  // nodes are counted on after the one body
+        sum += contact.force[2];
     }
     EXPECT_NEAR(sum, g, 1e-3 * g);
 }

@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <variant>
 
 #include "delassus/error.hpp"
 #include "simulation/checkpoint.hpp"
+#include "simulation/step_columns.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
@@ -86,10 +90,77 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
               "the checkpoint cannot be used: it is not a checkpoint of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 1}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 2, \"scene\": \"\", \"contact_forces\": false, "
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 4}"),
+              "the checkpoint cannot be used: it was written by another version of Delassus");
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 3, \"scene\": \"\", \"contact_forces\": false, "
                    "\"systems\": [{\"name\": "
                    "\"a\", \"step\": 1, \"t\": \"3ff\"}]}"),
               "the checkpoint cannot be used: a number is damaged");
+}
+
+/// A checkpoint of totals that all differ, as JSON.
+struct WithTotals {
+    WithTotals() {
+        double number = 0.125;
+        for (const TotalColumn& column : total_columns)
+            std::visit([&](auto member) { set(totals.*member, number += 1.0); }, column.value);
+        totals.first_unsolved = "step 7: \"so\"";
+        SimulationState state;
+        state.totals = totals;
+        write_checkpoint({"scene", {{"main", state, {}}}}, file);
+        std::ifstream(file) >> json;
+    }
+    static void set(double& total, double number) { total = number; }
+    static void set(std::int64_t& total, double number) { total = static_cast<std::int64_t>(number); }
+    static void set(std::string&, double) {}
+
+    [[nodiscard]] nlohmann::json& written() { return json["systems"][0]["totals"]; }
+    [[nodiscard]] SimulationTotals read() const {
+        std::ofstream(file) << json;
+        return read_checkpoint(file).systems.at(0).simulation.totals;
+    }
+    void expect_all_of(const SimulationTotals& got) const {
+        for (const TotalColumn& column : total_columns)
+            std::visit([&](auto member) { EXPECT_EQ(got.*member, totals.*member) << column.name; }, column.value);
+    }
+
+    ScratchFolder scratch;
+    std::filesystem::path file = scratch / "checkpoint.json";
+    SimulationTotals totals;
+    nlohmann::json json;
+};
+
+TEST(Checkpoint, NamesItsTotals) {
+    WithTotals checkpoint;
+    checkpoint.expect_all_of(checkpoint.read());
+    EXPECT_EQ(checkpoint.written().size(), total_columns.size());
+    EXPECT_TRUE(checkpoint.written().contains("growth_share"));
+    checkpoint.written().erase("growth_share");
+    try {
+        static_cast<void>(checkpoint.read());
+        ADD_FAILURE() << "an incomplete checkpoint was taken";
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("its totals lack \"growth_share\""), std::string::npos)
+            << error.what();
+    }
+}
+
+// Version 2 had the real numbers in one list.
+TEST(Checkpoint, OfVersion2IsRead) {
+    WithTotals checkpoint;
+    std::string reals;
+    for (const char* name : {"start_energy", "energy", "worst_drift", "worst_penetration", "worst_natural", "seconds",
+                             "solver_seconds", "smallest_step", "largest_step", "start_kinetic", "potential_drop",
+                             "recovered", "growth", "growth_share", "worst_linearization"}) {
+        reals += checkpoint.written().at(name).get<std::string>();
+        checkpoint.written().erase(name);
+    }
+    checkpoint.json["version"] = 2;
+    EXPECT_THROW(static_cast<void>(checkpoint.read()), InputError);
+    checkpoint.written()["reals"] = reals.substr(16);
+    EXPECT_THROW(static_cast<void>(checkpoint.read()), InputError);
+    checkpoint.written()["reals"] = reals;
+    checkpoint.expect_all_of(checkpoint.read());
 }
 
 TEST(Checkpoint, OfAnotherSystemIsRefused) {

@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <set>
+#include <sstream>
+#include <string>
 #include <utility>
 
 #include "delassus/error.hpp"
@@ -25,6 +28,25 @@ void expect_zero(const Errors& errors, double tolerance) {
     EXPECT_LE(errors.cone, tolerance);
     EXPECT_LE(errors.dual, tolerance);
     EXPECT_LE(errors.gap, tolerance);
+}
+
+// docs/errors.md lists the measures of the table, row by row.
+TEST(Errors, AreDocumentedAsTheirTableSays) {
+    std::ifstream file(DELASSUS_SOURCE_DIR "/docs/errors.md");
+    std::stringstream text;
+    text << file.rdbuf();
+    std::set<std::string_view> names;
+    for (const ErrorMeasure& measure : error_measures) {
+        EXPECT_TRUE(names.insert(measure.name).second) << measure.name;
+        const std::string formula(measure.formula);
+        std::string cell;  // within a table, | is escaped
+        for (const char c : formula) cell += c == '|' ? "\\|" : std::string(1, c);
+        const std::string row = "\n| `" + std::string(measure.name) + "` | " + cell + " | " +
+                                std::string(measure.note) + (measure.note.empty() ? "|\n" : " |\n");
+        const std::string wanted = measure.is_error ? row : "`" + std::string(measure.name) + "` stands beside them";
+        EXPECT_NE(text.str().find(wanted), std::string::npos) << wanted;
+        EXPECT_TRUE(measure.is_error || text.str().find(formula) != std::string::npos) << formula;
+    }
 }
 
 TEST(Errors, VanishForASlidingPointUnderExactCoulomb) {

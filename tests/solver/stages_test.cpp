@@ -120,6 +120,32 @@ std::string ranking(const ScratchFolder& scratch, const std::string& rules) {
     return file.string();
 }
 
+// The errors of an answer are measured once, whoever asks: of a solver's, of each stage's, and of a start that a stage
+// may spoil.
+TEST(Stages, MeasureEachAnswerOnce) {
+    const auto measurements = [](const char* solver, bool warm = false) {
+        const PreparedProblem problem(read_problem(example("box_stack")));
+        Solution solution;
+        SolveSettings settings;
+        settings.warm_start = warm;
+        solution.x.assign(static_cast<std::size_t>(problem.problem().n()), 0.0);
+        solution.lambda.assign(static_cast<std::size_t>(problem.problem().m()), 0.0);
+        const auto report = solve(parse_solver(solver), problem, solution, settings);
+        EXPECT_EQ(report.status, Status::Solved) << report.message;
+        const Errors again = ErrorMeter(problem).measure(solution.x, solution.lambda);
+        for (const ErrorMeasure& measure : error_measures)
+            EXPECT_EQ(report.error.*measure.value, again.*measure.value) << solver << ' ' << measure.name;
+        return std::pair(problem.meter().measurements(), static_cast<std::int64_t>(report.stages.size()));
+    };
+    EXPECT_EQ(measurements("apgd"), std::pair(std::int64_t{1}, std::int64_t{0}));
+    EXPECT_EQ(measurements("spg(finish=apgd,finish_at=1e-2)"), std::pair(std::int64_t{2}, std::int64_t{2}));
+    const auto [count, stages] = measurements("auto");
+    EXPECT_GE(stages, 1);
+    EXPECT_EQ(count, stages);
+    const auto [warm_count, warm_stages] = measurements("auto", true);
+    EXPECT_EQ(warm_count, warm_stages + 1);
+}
+
 TEST(Auto, RunsTheStagesOfItsRule) {
     const ScratchFolder scratch;
     const auto file = ranking(scratch, R"([

@@ -80,8 +80,7 @@ inline Motion run(DynamicalSystem& system, const std::string& method, const Opti
     Motion result{system.initial_state(), {}};
     VectorXd before, last;
     const auto advance = [&](State& state) {
-        stepper->step(state, t_end / steps, solver);
-        const auto& lambda = stepper->multipliers();
+        const std::vector<double> lambda = stepper->step(state, t_end / steps, solver).multipliers;
         before = std::move(last);
         last = Eigen::Map<const VectorXd>(lambda.data(), static_cast<Eigen::Index>(lambda.size()));
     };

@@ -3,6 +3,7 @@
 
 #include "bench/bench_writers.hpp"
 #include "bench/csv_text.hpp"
+#include "bench/measures.hpp"
 
 namespace delassus::bench {
 
@@ -26,9 +27,10 @@ std::string name_in(const std::vector<Json>& rows, const char* key, const Json& 
 }  // namespace
 
 std::string solves_csv(const ResultSet& results) {
-    std::string text =
-        "problem,hash,n,m,law,solver,tolerance,status,cause,iterations,setup_s,solve_s,slowest_solve_s,natural,balance,"
-        "velocity,peak_memory_bytes,message\r\n";
+    std::string text = "problem,hash,n,m,law,solver,tolerance,status,cause,iterations,setup_s,solve_s,slowest_solve_s";
+    for (const AnswerMeasure& measure : answer_measures())
+        if (measure.brief) (text += ',') += measure.name;
+    text += ",peak_memory_bytes,message\r\n";
     for (const Json& row : results.solves) {
         std::string n, m;
         for (const Json& problem : results.problems)
@@ -39,16 +41,19 @@ std::string solves_csv(const ResultSet& results) {
         const Json& seconds = row.at("seconds");
         double slowest = number_of(seconds.at("solve"));
         for (const Json& repeat : seconds.at("repeats")) slowest = std::max(slowest, number_of(repeat.at(1)));
-        const auto error = [&](const char* key) {
-            return row.at("error").is_null() ? std::string() : csv_number(number_of(row.at("error").at(key)));
-        };
-        text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\r\n",
+        text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}",
                             name_in(results.problems, "problem", row.at("problem")), text_in(row, "problem"), n, m,
                             text_in(row, "law"), text_in(row, "label"), csv_number(number_of(row.at("tolerance"))),
                             text_in(row, "status"), text_in(row, "cause"), integer_in(row, "iterations"),
                             csv_number(number_of(seconds.at("setup"))), csv_number(number_of(seconds.at("solve"))),
-                            csv_number(slowest), error("natural"), error("balance"), error("velocity"),
-                            integer_in(row, "peak_memory"), text_in(row, "message"));
+                            csv_number(slowest));
+        const Json& error = row.at("error");
+        for (const AnswerMeasure& measure : answer_measures()) {
+            if (!measure.brief) continue;
+            text += ',';
+            if (!error.is_null()) text += csv_number(number_of(error.at(std::string(measure.name))));
+        }
+        text += fmt::format(",{},{}\r\n", integer_in(row, "peak_memory"), text_in(row, "message"));
     }
     return text;
 }

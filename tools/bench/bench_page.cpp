@@ -3,6 +3,7 @@
 #include <map>
 
 #include "bench/bench_writers.hpp"
+#include "bench/measures.hpp"
 #include "support/html_page.hpp"
 
 namespace delassus::bench {
@@ -48,6 +49,7 @@ std::string bench_page(const ResultSet& results, const Json& analysis) {
     Json session = results.session;
     session.erase("keys");
     const Json page = {{"session", session},
+                       {"measures", answer_measures_json()},
                        {"problems", results.problems},
                        {"references", results.references},
                        {"libraries", results.libraries},

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "delassus/errors.hpp"
 #include "support/json_number.hpp"
 
 namespace delassus::bench {
@@ -21,19 +20,6 @@ inline double number_of(const Json& json) {
 /// Bytes that are no UTF-8 (a plugin's message may hold any) are replaced.
 inline std::string text_of(const Json& json, int indent = -1) {
     return json.dump(indent, ' ', false, Json::error_handler_t::replace);
-}
-
-inline Json json_of(const Errors& error) {
-    return {{"natural", json_number(error.natural)},  {"siconos", json_number(error.siconos)},
-            {"balance", json_number(error.balance)},  {"cone", json_number(error.cone)},
-            {"dual", json_number(error.dual)},        {"gap", json_number(error.gap)},
-            {"rounding", json_number(error.rounding)}};
-}
-
-inline Errors errors_of(const Json& json) {
-    return {number_of(json.at("natural")), number_of(json.at("siconos")), number_of(json.at("balance")),
-            number_of(json.at("cone")),    number_of(json.at("dual")),    number_of(json.at("gap")),
-            number_of(json.at("rounding"))};
 }
 
 }  // namespace delassus::bench

@@ -97,7 +97,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
             row.stages = line.at("stages").get<std::vector<std::string>>();
             row.velocity = number_of(line.at("velocity"));
             row.speed = number_of(line.at("speed"));
-            row.error = errors_of(line.at("error"));
+            row.error = errors_in(line.at("error"));
             const Json& last = line.at("last");
             row.curve.push_back({last[0].get<std::int64_t>(), number_of(last[1]), number_of(last[2])});
         } else if (event == "repeat") {

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bench/measures.hpp"
+
 namespace delassus::bench {
 
 namespace {
@@ -15,10 +17,10 @@ std::string spoken(std::string name) {
     return name;
 }
 
-const char* unit_of(const std::string& measure) {
+std::string unit_of(const std::string& measure) {
     for (const auto& one : measures())
         if (one.name == measure) return one.unit;
-    return "";
+    return {};
 }
 
 /// Sets the figures of a claimed result against the bounds.
@@ -46,8 +48,9 @@ void compare(Judgement& judgement, const std::vector<Bound>& bounds) {
         }
         if (!(figure <= bound.limit)) {
             judgement.outcome = "inaccurate";
-            beyond += fmt::format("{}{} {:.2e}{}{}, bound {:.2e}", beyond.empty() ? "" : "; ", spoken(bound.measure),
-                                  figure, *unit_of(bound.measure) ? " " : "", unit_of(bound.measure), bound.limit);
+            beyond +=
+                fmt::format("{}{} {:.2e}{}{}, bound {:.2e}", beyond.empty() ? "" : "; ", spoken(bound.measure), figure,
+                            unit_of(bound.measure).empty() ? "" : " ", unit_of(bound.measure), bound.limit);
         }
         if (ratio > worst) {
             worst = ratio;
@@ -83,9 +86,9 @@ void explain(Judgement& judgement, const std::string& status, const std::string&
 Judgement judge(const Measurement& run, const std::vector<Bound>& bounds) {
     Judgement judgement;
     if (run.error) {
-        judgement.measures = {{"natural", json_number(run.error->natural)},
-                              {"velocity", json_number(run.velocity)},
-                              {"speed", json_number(run.speed)}};
+        for (const AnswerMeasure& measure : answer_measures())
+            judgement.measures[std::string(measure.name)] = json_number(value_of(run, measure));
+        judgement.measures["speed"] = json_number(run.speed);
     }
     if (run.status == "solved") {
         compare(judgement, bounds);

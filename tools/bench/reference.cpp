@@ -128,8 +128,8 @@ Reference find_reference(const WorkerSettings& worker, const SuiteReferences& re
     row["found"] = true;
     row["solver"] = first->label;
     row["stages"] = first->result.stages;
-    row["natural"] = json_number(first->result.error->natural);
-    row["balance"] = json_number(first->result.error->balance);
+    for (const ErrorMeasure& measure : error_measures)
+        if (measure.brief) row[std::string(measure.name)] = json_number((*first->result.error).*measure.value);
     const auto second = search.second(*first);
     if (worker.cancelled && worker.cancelled()) return {};
     if (second) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "bench/measures.hpp"
 #include "bench/rows.hpp"
 #include "bench/writers.hpp"
+#include "problem/errors_json.hpp"
 
 namespace delassus::bench {
 
@@ -9,7 +11,7 @@ Json json_of(const Measurement& row) {
     for (const Repeat& repeat : row.repeats) repeats.push_back({json_number(repeat.setup), json_number(repeat.solve)});
     Json error = nullptr;
     if (row.error) {
-        error = bench::json_of(*row.error);
+        error = errors_json(*row.error);
         error["velocity"] = json_number(row.velocity);
     }
     Json curve = Json::array();
@@ -83,6 +85,7 @@ std::string json_text(const Comparison& comparison) {
                          {"repeats", settings.repeats},
                          {"law", settings.law.empty() ? Json(nullptr) : Json(settings.law)}}},
                        {"interrupted", comparison.interrupted},
+                       {"measures", answer_measures_json()},
                        {"problems", problems}};
     return text_of(json, 1) + "\n";
 }

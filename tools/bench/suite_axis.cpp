@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "bench/formula.hpp"
+#include "bench/measures.hpp"
 #include "bench/suite.hpp"
 #include "bench/suite_sections.hpp"
 #include "config/sections.hpp"
@@ -103,18 +104,24 @@ std::vector<std::string> list_of_texts(const Source& source, const YAML::Node& n
 }  // namespace
 
 const std::vector<Measure>& measures() {
-    static const std::vector<Measure> table = {{"natural", "", true, true},
-                                               {"velocity", "", true, false},
-                                               {"speed", "m/s, rad/s", true, true},
-                                               {"end_speed", "m/s, rad/s", false, true},
-                                               {"position", "m", false, true},
-                                               {"energy_growth", "J", false, true},
-                                               {"energy_loss", "J", false, true},
-                                               {"momentum", "kg m/s", false, true},
-                                               {"angular_momentum", "kg m²/s", false, true},
-                                               {"drift", "m, rad", false, true},
-                                               {"penetration", "m", false, true},
-                                               {"reversal", "m, rad", false, true}};
+    static const std::vector<Measure> table = [] {
+        std::vector<Measure> rows;
+        // Of a scene's steps, the natural error alone is kept.
+        for (const AnswerMeasure& measure : answer_measures())
+            rows.push_back({std::string(measure.name), measure.unit == "1" ? "" : std::string(measure.unit), true,
+                            measure.error == &Errors::natural});
+        rows.insert(rows.end(), {{"speed", "m/s, rad/s", true, true},
+                                 {"end_speed", "m/s, rad/s", false, true},
+                                 {"position", "m", false, true},
+                                 {"energy_growth", "J", false, true},
+                                 {"energy_loss", "J", false, true},
+                                 {"momentum", "kg m/s", false, true},
+                                 {"angular_momentum", "kg m²/s", false, true},
+                                 {"drift", "m, rad", false, true},
+                                 {"penetration", "m", false, true},
+                                 {"reversal", "m, rad", false, true}});
+        return rows;
+    }();
     return table;
 }
 

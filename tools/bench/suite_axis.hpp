@@ -46,8 +46,8 @@ struct SuiteAxis {
 
 /// One measure of the table of what can be bounded.
 struct Measure {
-    const char* name;
-    const char* unit;
+    std::string name;
+    std::string unit;  ///< empty: dimensionless
     bool of_problems, of_scenes;
 };
 [[nodiscard]] const std::vector<Measure>& measures();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bench/measures.hpp"
 #include "bench/writers.hpp"
 
 namespace delassus::bench {
@@ -33,15 +34,18 @@ std::string table_text(const ProblemResults& problem) {
     std::size_t width = 6;
     for (const auto& row : problem.results) width = std::max(width, row.label.size());
     std::string text = heading(problem.facts);
-    text += fmt::format("  {:<{}}  {:<17} {:>10} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8}\n", "solver", width, "status",
-                        "iterations", "setup s", "solve s", "natural", "balance", "velocity", "MiB");
+    text += fmt::format("  {:<{}}  {:<17} {:>10} {:>9} {:>9}", "solver", width, "status", "iterations", "setup s",
+                        "solve s");
+    for (const AnswerMeasure& measure : answer_measures())
+        if (measure.brief) text += fmt::format(" {:>8}", measure.name);
+    text += fmt::format(" {:>8}\n", "MiB");
     for (const auto& row : problem.results) {
-        text +=
-            fmt::format("  {:<{}}  {:<17} {:>10} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8.1f}\n", row.label, width,
-                        row.status, row.iterations ? std::to_string(*row.iterations) : "—", plain_seconds(row.setup),
-                        plain_seconds(row.solve), plain_error(row.error ? row.error->natural : unknown),
-                        plain_error(row.error ? row.error->balance : unknown), plain_error(row.velocity),
-                        static_cast<double>(row.peak_memory) / (1024.0 * 1024.0));
+        text += fmt::format("  {:<{}}  {:<17} {:>10} {:>9} {:>9}", row.label, width, row.status,
+                            row.iterations ? std::to_string(*row.iterations) : "—", plain_seconds(row.setup),
+                            plain_seconds(row.solve));
+        for (const AnswerMeasure& measure : answer_measures())
+            if (measure.brief) text += fmt::format(" {:>8}", plain_error(value_of(row, measure)));
+        text += fmt::format(" {:>8.1f}\n", static_cast<double>(row.peak_memory) / (1024.0 * 1024.0));
     }
     for (const auto& row : problem.results)
         if (!row.message.empty())

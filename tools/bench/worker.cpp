@@ -152,7 +152,7 @@ void measure(const Channel& channel, const Json& request) {
                               {"solve", report.seconds_solve},
                               {"analyses", report.analyses},
                               {"factorizations", report.factorizations},
-                              {"error", json_of(report.error)},
+                              {"error", errors_json(report.error)},
                               {"velocity", json_number(velocity)},
                               {"speed", json_number(speed)},
                               {"stages", stages},

@@ -59,9 +59,10 @@ void print_report(const SolveReport& report) {
     fmt::print(" after {} iterations, {:.3g} s setup + {:.3g} s solve\n", report.iterations, report.seconds_setup,
                report.seconds_solve);
     if (!report.message.empty()) fmt::print("  {}\n", report.message);
-    const auto& error = report.error;
-    fmt::print("  error  natural {:.2e}  balance {:.2e}  cone {:.2e}  dual {:.2e}  gap {:.2e}  siconos {:.2e}\n",
-               error.natural, error.balance, error.cone, error.dual, error.gap, error.siconos);
+    fmt::print("  error");
+    for (const ErrorMeasure& measure : error_measures)
+        if (measure.is_error) fmt::print("  {} {:.2e}", measure.name, report.error.*measure.value);
+    fmt::print("\n");
 }
 
 int solve(const SolveArguments& arguments) {

@@ -5,14 +5,7 @@
 // Along the solve, the curve of the run to the tightest tolerance; at the end, a point for each tolerance.
 const views = [
   { label: "natural error along the solve", measure: "natural", curve: true },
-  ...[
-    ["natural", "natural error"],
-    ["velocity", "velocity error, in the norm of the kinetic energy,"],
-    ["dual", "penetration and sliding against the cones (dual)"],
-    ["cone", "reactions beyond the friction cones (cone)"],
-    ["gap", "energy that contacts give or take (gap)"],
-    ["balance", "momentum balance"],
-  ].map(([measure, label]) => ({ label: `${label} at the end`, measure, curve: false })),
+  ...results.measures.map(({ name, title }) => ({ label: `${name}: ${title} (at the end)`, measure: name, curve: false })),
 ];
 
 function curveOf(row) {
@@ -69,7 +62,8 @@ function problemOption(rows, title, view, logarithmic) {
 }
 
 function runsTable(rows) {
-  return table(["solver", "ended", "asked for", "iterations", "setup s", "solve s", "natural", "balance", "velocity", "MiB"],
+  const brief = results.measures.filter((measure) => measure.brief).map((measure) => measure.name);
+  return table(["solver", "ended", "asked for", "iterations", "setup s", "solve s", ...brief, "MiB"],
     rows.map((row) => {
       const slowest = Math.max(...row.seconds.repeats.map((repeat) => repeat[1]));
       return {
@@ -77,7 +71,7 @@ function runsTable(rows) {
         cells: [
           [swatch(row.label), row.label], statusMark(row), short(row.tolerance), whole(row.iterations), seconds(row.seconds.setup),
           [seconds(row.seconds.solve), ...(row.seconds.repeats.length > 1 ? [element("small", { textContent: ` – ${seconds(slowest)}` })] : [])],
-          error(row.error && row.error.natural), error(row.error && row.error.balance), error(row.error && row.error.velocity), mebibytes(row.peak_memory),
+          ...brief.map((measure) => error(row.error && row.error[measure])), mebibytes(row.peak_memory),
         ],
       };
     }), 2);

@@ -44,7 +44,8 @@
     const total = (row) => row.seconds.setup + row.seconds.solve;
     const solved = problem.results.filter((row) => row.status === "solved");
     const fastest = solved.length > 1 ? solved.reduce((a, b) => (total(b) < total(a) ? b : a)) : null;
-    const head = ["solver", "status", "iterations", "setup s", "solve s", "natural", "balance", "cone", "dual", "gap", "siconos", "velocity", "MiB"];
+    const measures = results.measures.map((measure) => measure.name);
+    const head = ["solver", "status", "iterations", "setup s", "solve s", ...measures, "MiB"];
     const body = problem.results.map((row) => {
       const slowest = Math.max(...row.seconds.repeats.map((repeat) => repeat[1]));
       const solve = element("td", { textContent: seconds(row.seconds.solve), className: row === fastest ? "best" : "" });
@@ -55,7 +56,7 @@
         element("td", { textContent: whole(row.iterations) }),
         element("td", { textContent: seconds(row.seconds.setup) }),
         solve,
-        ...["natural", "balance", "cone", "dual", "gap", "siconos", "velocity"].map((key) =>
+        ...measures.map((key) =>
           element("td", { textContent: error(row.error && row.error[key]) })),
         element("td", { textContent: mebibytes(row.peak_memory) }),
       ];

@@ -21,7 +21,8 @@ struct StepControl {
 
 /// What a step with a chosen size did.
 struct AdaptiveStepReport {
-    StepReport step;            ///< of the result; its iterations are those of all trials
+    /// Of the result; its iterations are those of all trials, its reactions and contacts those of its second half.
+    StepReport step;
     double h = 0.0;             ///< the size taken
     double error = 0.0;         ///< estimate over tolerance; ≤ 1, but for impacts
     std::int32_t rejected = 0;  ///< trials that were thrown away
@@ -57,8 +58,8 @@ private:
     [[nodiscard]] Trial take(const State& begin, double h, StepSolver& solver);
     /// When the first impact comes, after the beginning of a trial of size h; infinity if none does.
     [[nodiscard]] double impact_in(const Trial& trial, double h);
-    /// How long after a state, at its speeds, the first open contact closes; negative: since when one is closed.
-    [[nodiscard]] double time_to_closing(const State& state);
+    /// How long after a trial's end, at its speeds, the first open contact closes; negative: since when one is closed.
+    [[nodiscard]] double time_to_closing(const Trial& trial);
     /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
     [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
     [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h) const;
@@ -82,6 +83,7 @@ private:
     std::vector<double> memory_;
     AdaptiveStepReport report_;
     UnilateralRows rows_;
+    std::vector<std::uint64_t> pushed_;
 };
 
 }  // namespace delassus

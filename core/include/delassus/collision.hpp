@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
+#include "delassus/contact_point.hpp"
 #include "delassus/export.hpp"
 
 namespace delassus {
 
-using Vector3 = std::array<double, 3>;
 /// Unit quaternion (w, x, y, z): the rotation from the body frame to the world frame.
 using Quaternion = std::array<double, 4>;
 
@@ -48,15 +48,6 @@ struct Shape {
     std::int32_t body = -1;            ///< index of its body, −1 for the world
     double margin = 0.0;  ///< m, the sphere-swept margin ε_m of seed section 5: the solid is the shape shrunk by
                           ///< it and swept by a sphere of this radius, so that gaps are smooth near edges
-};
-
-/// A point where two shapes are nearer than the envelope.
-struct ContactPoint {
-    std::int32_t shape_a = 0, shape_b = 0;  ///< shape_a < shape_b
-    Vector3 point_a{}, point_b{};           ///< on the surfaces, world frame
-    Vector3 normal{};                       ///< unit, from a to b
-    double gap = 0.0;                       ///< normal · (point_b − point_a); negative in penetration, m
-    std::uint32_t feature = 0;              ///< tells apart several points of a pair; stable while they slide little
 };
 
 /// Finds contacts among a fixed set of shapes that move with their bodies.

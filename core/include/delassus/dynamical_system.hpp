@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "delassus/contact_point.hpp"
 #include "delassus/export.hpp"
 #include "delassus/matrix_assembler.hpp"
 #include "delassus/problem.hpp"
@@ -96,11 +97,16 @@ public:
     /// rows() + 1 positions in column() and value().
     [[nodiscard]] const std::vector<std::int32_t>& row_start() const { return row_start_; }
 
+    /// Where contacts touch: one for each of the last blocks, in their order. A system that knows it fills it in; the
+    /// stepper hands it on (StepReport).
+    [[nodiscard]] std::vector<ContactPoint>& contacts() { return contacts_; }
+    [[nodiscard]] const std::vector<ContactPoint>& contacts() const { return contacts_; }
+
     /// D_A v + rate of a row; v: of the system's n.
     [[nodiscard]] DELASSUS_API double speed(std::size_t row, const double* v) const;
 
     /// Appends the rows to D, which has as many columns. If D has no rows, nothing is copied: the arrays are swapped,
-    /// and D's serve the next rows. Only blocks() and rows() may be used from then until clear().
+    /// and D's serve the next rows. Only blocks(), rows() and contacts() may be used from then until clear().
     DELASSUS_API void move_into(SparseMatrix& D);
 
 private:
@@ -125,6 +131,7 @@ private:
     std::vector<std::int32_t> column_;
     std::vector<double> value_;
     std::vector<std::int32_t> row_start_ = {0};
+    std::vector<ContactPoint> contacts_;
     std::size_t block_count_ = 0, used_ = 0, rows_in_blocks_ = 0;
     bool ascending_ = true;  // the columns of the row that is being filled
     const double* velocity_ = nullptr;

@@ -3,8 +3,11 @@
 // (x, λ) alone.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <span>
+#include <string_view>
 
 #include "delassus/export.hpp"
 #include "delassus/needs.hpp"
@@ -23,6 +26,35 @@ struct Errors {
     /// ε ‖S (|D||x| + |E||λ| + |b|) + S⁻¹|λ|‖ / ‖S r‖ with the unit roundoff ε = 1.1e-16
     double rounding = 0.0;
 };
+
+/// A row of the table of what Errors holds. Reports, files, terminal and pages follow it, and docs/errors.md is tested
+/// against it: a new measure is a member, its computation in ErrorMeter, and a row.
+struct ErrorMeasure {
+    std::string_view name;     ///< the key in reports and files
+    std::string_view unit;     ///< "1": dimensionless
+    std::string_view title;    ///< what it says, in a few words
+    std::string_view formula;  ///< in the symbols of docs/errors.md
+    std::string_view note;     ///< one line for docs/errors.md; may be empty
+    double Errors::*value;
+    bool is_error = true;  ///< false for what stands beside the errors
+    bool brief = false;    ///< shown where there is room for few
+};
+
+inline constexpr std::array<ErrorMeasure, 7> error_measures = {{
+    {"natural", "1", "natural error", "‖S⁻¹(λ − P_Υ(λ − S²u))‖ / ‖S r‖",
+     "the measure that `tolerance` means; absolute if r = 0", &Errors::natural, true, true},
+    {"balance", "1", "momentum balance", "‖Hx − Dᵀλ − a‖ / max(‖Hx‖, ‖Dᵀλ‖, ‖a‖)", "", &Errors::balance, true, true},
+    {"cone", "1", "reactions beyond the friction cones", "‖S⁻¹(λ − P_Υ λ)‖ / ‖S r‖", "distance of λ to Υ",
+     &Errors::cone},
+    {"dual", "1", "penetration and sliding against the cones", "‖S(u − P_Υ* u)‖ / ‖S r‖",
+     "distance of u to Υ*; for a box, to the dual of its recession cone", &Errors::dual},
+    {"gap", "1", "energy that contacts give or take", "|⟨λ, u⟩| / ‖S r‖²",
+     "for a box, the gap of its variational inequality", &Errors::gap},
+    {"siconos", "1", "the measure of Siconos", "‖λ − P_Υ(λ − u)‖ / max(‖r‖, ‖λ‖, ‖u‖)",
+     "depends on units: for comparison with published tables only", &Errors::siconos},
+    {"rounding", "1", "what rounding leaves of the natural error", "ε ‖S (|D||x| + |E||λ| + |b|) + S⁻¹|λ|‖ / ‖S r‖", "",
+     &Errors::rounding, false},
+}};
 
 /// Measures solutions of one problem, which must outlive it (moves of the problem are fine as long as the meter is
 /// not used meanwhile). One thread at a time.
@@ -49,6 +81,9 @@ public:
 
     /// x ← H⁻¹(a + Dᵀλ), n; throws InputError where H is not definite.
     DELASSUS_API void velocity_of(std::span<const double> lambda, std::vector<double>& x) const;
+
+    /// How often measure() was called.
+    [[nodiscard]] DELASSUS_API std::int64_t measurements() const;
 
 private:
     friend class PreparedProblem;

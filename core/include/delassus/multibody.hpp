@@ -302,11 +302,8 @@ public:
     /// Rows of joint `index` within C and λ: first row and count.
     [[nodiscard]] std::array<std::int32_t, 2> joint_rows(std::int32_t index) const;
     /// The spheres of nodes have the numbers from shapes().size() on, in the order of add_node_contact().
-    /// Contacts of the last collect_unilateral(), in the order of its blocks after those of limits and motors.
-    [[nodiscard]] const std::vector<ContactPoint>& contacts() const;
-    /// The key of a contact's block in the rows of collect_unilateral().
-    [[nodiscard]] static std::uint64_t contact_key(const ContactPoint& contact);
-    /// The bodies of its first and its second shape, or body_count() + number of a node; world_body for the world.
+    /// The bodies of a contact's first and its second shape, or body_count() + number of a node; world_body for the
+    /// world.
     [[nodiscard]] std::array<std::int32_t, 2> contact_bodies(const ContactPoint& contact) const;
     [[nodiscard]] double kinetic_energy(const State& state) const;
     /// Linear momentum (kg m/s), and angular momentum about the origin (kg m²/s), world frame.

@@ -42,10 +42,13 @@ struct StepRecord {
     double linearization = 0.0;  ///< error of the forces of a linearised method (StepReport)
 };
 
-/// The force in a contact, as a mean over the last step.
-struct ContactForce {
+/// A contact of the last step, found where the step began; with chosen steps, where its second half began.
+struct ContactRecord {
     std::array<std::int32_t, 2> bodies{};  ///< as MultibodySystem::contact_bodies()
-    Vector3 force{};                       ///< on the second, world frame, N; on the first the opposite
+    Vector3 point{};                       ///< midway between the two surfaces, world frame, m
+    Vector3 normal{};                      ///< unit, from the first surface to the second
+    double gap = 0.0;                      ///< m; negative in penetration
+    Vector3 force{};                       ///< mean on the second, world frame, N; on the first the opposite
 };
 
 /// Sums and extremes since the start.
@@ -101,8 +104,10 @@ public:
     [[nodiscard]] const State& state() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
-    /// Of each of MultibodySystem::contacts(), in their order; 0 for those that the last step did not know.
-    [[nodiscard]] DELASSUS_API std::vector<ContactForce> contact_forces() const;
+    /// What the last step reported; empty before the first, and where a run goes on.
+    [[nodiscard]] const StepReport& report() const { return report_.step; }
+    /// The contacts in report(), in their order.
+    [[nodiscard]] DELASSUS_API std::vector<ContactRecord> contacts() const;
     [[nodiscard]] StepSolver& solver() { return *solver_; }
 
     /// What a user should know about a run that has not failed so far, one sentence each.
@@ -117,7 +122,7 @@ private:
     void measure(const State& state, std::int64_t step);
     /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
-    AdaptiveStepReport advance(State& state);
+    void advance(State& state, AdaptiveStepReport& report);
 
     SceneSystem* system_;
     std::unique_ptr<StepSolver> solver_;
@@ -126,6 +131,7 @@ private:
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     SimulationState now_;
     StepRecord record_;
+    AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next
     std::vector<double> constraint_;
     std::unique_ptr<EnergyGuard> guard_;
 };

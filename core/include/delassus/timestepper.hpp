@@ -17,7 +17,13 @@
 
 namespace delassus {
 
-/// What a step did.
+/// What acted in a unilateral block of a step's problem.
+struct BlockReaction {
+    std::uint64_t key = 0;          ///< of the block
+    std::array<double, 3> force{};  ///< in its first rows, the mean over the step; 0 beyond its rows
+};
+
+/// What a step did, and what acted in it.
 struct StepReport {
     std::int32_t newton_iterations = 0;  ///< linear or cone problems solved
     std::int32_t unilateral_blocks = 0;  ///< contacts and other unilateral blocks that were in the problem
@@ -30,7 +36,13 @@ struct StepReport {
     /// The error of a linearised method's forces at the end of the step, as a share of the velocities
     /// (docs/integrators.md); 0 where forces are linear, or where it is not measured.
     double linearization = 0.0;
-    double recovered = 0.0;  ///< energy that contacts gave by pushing apart what penetrated, J; ≥ 0
+    double recovered = 0.0;                ///< energy that contacts gave by pushing apart what penetrated, J; ≥ 0
+    std::vector<BlockReaction> reactions;  ///< one for each unilateral block of the problem, in its order
+    std::vector<ContactPoint> contacts;    ///< UnilateralRows::contacts(): the last of these blocks are theirs
+    std::vector<double> multipliers;       ///< λ of the bilateral constraints at the end of the step, forces; m
+
+    /// Back to the beginning; the memory stays.
+    DELASSUS_API void clear();
 };
 
 /// A step that cannot be taken: Newton's method does not converge, a state is not finite. The state is as before it.
@@ -46,7 +58,9 @@ public:
 
     /// Advances state (in the system's sizes) from t to t + h, h > 0. Throws StepFailure, or Unsupported if the solver
     /// cannot take the step's problems.
-    virtual StepReport step(State& state, double h, StepSolver& solver) = 0;
+    StepReport step(State& state, double h, StepSolver& solver);
+    /// The same in a report whose memory serves again. After an exception it says nothing.
+    void step(State& state, double h, StepSolver& solver, StepReport& report);
 
     /// Forgets what was kept from step to step: call it when the state was changed from outside.
     virtual void restart() = 0;
@@ -56,22 +70,16 @@ public:
     /// Whether a motion of infinite frequency is gone after a step: then results of different steps may be
     /// extrapolated.
     [[nodiscard]] virtual bool damps_at_once() const { return false; }
-    /// Whether the unilateral block with this key pushed in the last step.
-    [[nodiscard]] virtual bool pushed(std::uint64_t) const { return false; }
-
-    /// The mean forces of the last step in the rows, at most three, of the unilateral block with this key; 0 where
-    /// there was none.
-    [[nodiscard]] virtual std::array<double, 3> reaction(std::uint64_t) const { return {}; }
-
-    /// Reaction forces λ of the bilateral constraints at the end of the last step; m. Empty before the first step.
-    [[nodiscard]] const std::vector<double>& multipliers() const { return multipliers_; }
 
     /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
     [[nodiscard]] virtual std::vector<double> save() const;
     virtual void load(const std::vector<double>& memory);
 
 protected:
-    std::vector<double> multipliers_;
+    /// What step() does, with an empty report.
+    virtual void take_step(State& state, double h, StepSolver& solver, StepReport& report) = 0;
+
+    std::vector<double> multipliers_;  ///< λ of the bilateral constraints at the end of the last step, or empty
 };
 
 /// A row of the table of methods.

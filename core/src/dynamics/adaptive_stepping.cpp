@@ -118,12 +118,17 @@ double AdaptiveStepping::impact_step() const {
     return std::min(control_.smallest * std::pow(2.0, std::max(0.0, impacts_ - patience)), control_.largest);
 }
 
-double AdaptiveStepping::time_to_closing(const State& state) {
+double AdaptiveStepping::time_to_closing(const Trial& trial) {
+    const State& state = trial.end;
     double soonest = std::numeric_limits<double>::infinity();
+    pushed_.clear();
+    for (const auto& [key, force] : trial.second.reactions)
+        if (force[0] > 0.0) pushed_.push_back(key);
+    std::sort(pushed_.begin(), pushed_.end());
     system_.collect_unilateral(state, control_.smallest, rows_);
     std::size_t row = 0;
     for (const auto& block : rows_.blocks()) {
-        if (block.along_normal() && !stepper_.pushed(block.key)) {
+        if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) {
             const double speed = -rows_.speed(row, state.v.data());
             if (speed > control_.absolute) soonest = std::min(soonest, rows_.rows()[row].gap / speed);
         }
@@ -138,7 +143,7 @@ double AdaptiveStepping::impact_in(const Trial& trial, double h) {
     if (trial.second.impact_speed > control_.absolute) return 0.5 * h + trial.second.impact_time;
     if (trial.whole.impact_speed > control_.absolute) return trial.whole.impact_time;
     // A contact that no step knew: it was too far to be found where the last step began.
-    const double after = time_to_closing(trial.end);
+    const double after = time_to_closing(trial);
     return after < 0.0 ? std::max(h + after, 0.0) : std::numeric_limits<double>::infinity();
 }
 
@@ -162,7 +167,7 @@ AdaptiveStepping::Trial AdaptiveStepping::until_impact(const State& begin, doubl
         }
         open = guess;
         best = std::move(trial);
-        const double rest = time_to_closing(best.end);
+        const double rest = time_to_closing(best);
         if (rest <= close) break;
         guess = open + rest - 0.5 * close;
     }
@@ -180,7 +185,7 @@ AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double end, StepS
     report_.step.newton_iterations += iterations;
     impacts_ += 1.0;
     if (report_.h == remaining) state.t = end;
-    return report_;
+    return std::move(report_);
 }
 
 // ---- The choice ----
@@ -244,10 +249,13 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         report_.step.unilateral_blocks = std::max(trial.first.unilateral_blocks, trial.second.unilateral_blocks);
         report_.step.linearization = std::max(trial.first.linearization, trial.second.linearization);
         report_.step.recovered = trial.first.recovered + trial.second.recovered;
+        report_.step.reactions = std::move(trial.second.reactions);
+        report_.step.contacts = std::move(trial.second.contacts);
+        report_.step.multipliers = std::move(trial.second.multipliers);
         report_.h = h;
         state = std::move(trial.end);
         if (h == remaining) state.t = end;
-        return report_;
+        return std::move(report_);
     }
 }
 

@@ -15,6 +15,7 @@ namespace delassus {
 
 void UnilateralRows::clear() {
     rows_.clear();
+    contacts_.clear();
     row_start_.assign(1, 0);
     block_count_ = used_ = rows_in_blocks_ = 0;
     ascending_ = true;

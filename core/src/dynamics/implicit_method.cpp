@@ -52,9 +52,8 @@ StepPoint ImplicitMethod::resting(const State& begin, double h, StepSlopes slope
     return point;
 }
 
-StepReport ImplicitMethod::step(State& state, double h, StepSolver& solver) {
+void ImplicitMethod::take_step(State& state, double h, StepSolver& solver, StepReport& report) {
     require_step(system_, state, h, method_);
-    StepReport report;
     Vector lambda = Vector::Zero(m_);
     if (!multipliers_.empty()) lambda = Eigen::Map<const Vector>(multipliers_.data(), m_);
     if (!started_ && c_.remembers()) {
@@ -79,9 +78,9 @@ StepReport ImplicitMethod::step(State& state, double h, StepSolver& solver) {
     a_ = ((1.0 - c_.alpha_f) * point.acceleration + c_.alpha_f * v_dot_ - c_.alpha_m * a_) / (1.0 - c_.alpha_m);
     v_dot_ = point.acceleration;
     multipliers_.assign(point.lambda.begin(), point.lambda.end());
+    report.multipliers = multipliers_;
     started_ = true;
     state = std::move(point.state);
-    return report;
 }
 
 std::vector<double> ImplicitMethod::save() const {

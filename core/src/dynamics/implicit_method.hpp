@@ -44,7 +44,6 @@ public:
     /// system outlives it.
     ImplicitMethod(DynamicalSystem& system, ImplicitCoefficients coefficients, NewtonSettings settings);
 
-    StepReport step(State& state, double h, StepSolver& solver) override;
     void restart() override;
     [[nodiscard]] int order() const override { return c_.order(); }
     /// Of these methods, only implicit Euler remembers nothing.
@@ -53,6 +52,7 @@ public:
     void load(const std::vector<double>& memory) override;
 
 private:
+    void take_step(State& state, double h, StepSolver& solver, StepReport& report) override;
     [[nodiscard]] StepPoint steady(const State& begin, double h, const Vector& lambda) const;
     [[nodiscard]] StepPoint resting(const State& begin, double h, StepSlopes slopes, const Vector& lambda) const;
 

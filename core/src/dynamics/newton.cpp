@@ -181,137 +181,212 @@ double Newton::merit(const StepResidual& residual, double s) const {
 namespace {
 
 constexpr int most_symmetric_iterations = 10;
+/// Of an increment, where the residual would not fall otherwise.
+constexpr double shortest_part = 1.0 / 64.0;
 
 }  // namespace
 
+/// One step's iteration, from a guess of its end.
+class Newton::Iteration {
+public:
+    Iteration(Newton& newton, const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
+              StepSolver& solver, StepReport& report)
+        : newton_(newton),
+          settings_(newton.settings_),
+          begin_(begin),
+          h_(h),
+          slopes_(slopes),
+          s_(1.0 / slopes.beta),
+          point_(point),
+          residual_(residual),
+          solver_(solver),
+          report_(report),
+          solved_before_(report.solved),
+          message_before_(report.message),
+          trial_(point) {}
+
+    void run() {
+        const Kept& kept = newton_.kept_;
+        renew_ = !(kept.valid && settings_.reuse == Reuse::Adaptive && kept.slopes.beta == slopes_.beta &&
+                   kept.slopes.gamma == slopes_.gamma);
+        if (!renew_) newton_.scale();
+        newton_.exact_ = settings_.exact;
+        may_become_exact_ = !newton_.exact_ && !settings_.linearized;
+        for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
+            if (may_become_exact_ && iteration >= most_symmetric_iterations) become_exact();
+            prepare();
+            if (!find_increment()) continue;
+            move(1.0);
+            set_threshold();
+            if (settings_.linearized) return finish_linearized();
+            if (!search()) continue;
+            if (advance()) return finish();
+        }
+        fail(fmt::format(
+            "after {} iterations of Newton's method the scaled residual is {:.1e}, where {:.1e} is asked for; "
+            "a smaller step{} may help",
+            settings_.max_iterations, rho_, threshold_, newton_.exact_ ? "" : " or jacobian: exact"));
+    }
+
+private:
+    [[noreturn]] void fail(const std::string& why) {
+        newton_.kept_.valid = false;
+        throw StepFailure(fmt::format("{} cannot take the step from t = {:.9g} with h = {:.9g}: {}", settings_.method,
+                                      begin_.t, h_, why));
+    }
+
+    void become_exact() {
+        newton_.exact_ = true;
+        may_become_exact_ = false;
+        renew_ = true;
+    }
+
+    /// The matrices at the point, anew where asked for, and the size of its residual.
+    void prepare() {
+        if (renew_) newton_.assemble(point_, slopes_);
+        fresh_ = renew_;
+        rho_ = newton_.merit(residual_, s_);
+        if (!std::isfinite(rho_) || !finite(newton_.kept_.H) || !finite(newton_.kept_.D))
+            fail("the residual or its Jacobian is not finite");
+    }
+
+    /// Solves for the increment and its direction in Δ. False where no solver takes the whole matrix, if it was not
+    /// asked for: the next iteration is back to the symmetric one.
+    bool find_increment() {
+        Problem problem;
+        problem.H = newton_.kept_.H;
+        problem.D = newton_.kept_.D;
+        problem.a.resize(static_cast<std::size_t>(newton_.n_));
+        Eigen::Map<Vector>(problem.a.data(), newton_.n_) = -s_ * residual_.balance;
+        problem.b.assign(residual_.constraint.begin(), residual_.constraint.end());
+        problem.cones = newton_.cones_;
+        try {
+            increment_ = solve_linear(std::move(problem), solver_, report_);
+        } catch (const Unsupported&) {
+            if (newton_.exact_ == settings_.exact) throw;
+            newton_.exact_ = settings_.exact;
+            renew_ = true;
+            return false;
+        }
+        if (!increment_.x.allFinite() || !increment_.lambda.allFinite()) fail("the increment is not finite");
+        newton_.system_.inverse_tangent(point_.delta.data(), newton_.blocks_);
+        direction_ = multiply_blocks(newton_.blocks_, increment_.x);
+        return true;
+    }
+
+    /// The trial ← the point and a part of the increment, with its residual.
+    void move(double part) {
+        part_ = part;
+        trial_.delta = point_.delta + part * direction_;
+        trial_.acceleration = point_.acceleration + part * slopes_.beta * direction_;
+        Eigen::Map<Vector>(trial_.state.v.data(), newton_.n_) =
+            Eigen::Map<const Vector>(point_.state.v.data(), newton_.n_) + part * slopes_.gamma * direction_;
+        trial_.lambda = point_.lambda + part / s_ * increment_.lambda;
+        trial_rho_ = newton_.evaluate(begin_, trial_, trial_residual_) ? newton_.merit(trial_residual_, s_)
+                                                                       : std::numeric_limits<double>::infinity();
+    }
+
+    [[nodiscard]] double size(const Vector& motion) const { return motion.cwiseProduct(newton_.root_).norm(); }
+    [[nodiscard]] double force_size(const Vector& force) const {
+        return s_ * force.cwiseQuotient(newton_.root_).norm();
+    }
+
+    void set_threshold() {
+        const Eigen::Map<const Vector> q(trial_.state.q.data(), static_cast<Eigen::Index>(trial_.state.q.size()));
+        const double sigma =
+            std::max({size(trial_.delta), h_ * size(Eigen::Map<const Vector>(begin_.v.data(), newton_.n_)),
+                      force_size(trial_residual_.inertia), force_size(trial_residual_.force),
+                      force_size(trial_residual_.reaction)});
+        const double digits = newton_.n_ > 0 ? 10.0 * std::numeric_limits<double>::epsilon() *
+                                                   q.lpNorm<Eigen::Infinity>() * newton_.root_.norm()
+                                             : 0.0;
+        threshold_ = settings_.tolerance * sigma + digits;
+    }
+
+    /// One iteration is all: its error is measured instead.
+    void finish_linearized() {
+        if (!std::isfinite(trial_rho_)) fail("the end of the step is not finite");
+        Linearization& linearization = newton_.linearization_;
+        if (linearization.wanted()) {
+            const Vector force = h_ * trial_residual_.force,
+                         linear = h_ * (trial_residual_.inertia - trial_residual_.reaction);
+            const auto n = static_cast<std::size_t>(newton_.n_);
+            report_.linearization =
+                linearization.error(begin_, trial_.state, h_, {force.data(), n}, {linear.data(), n}, newton_.kept_.H);
+            linearization.judge(report_.linearization, begin_, h_, settings_.method);
+        }
+        newton_.judge_turns(begin_, h_, trial_.delta);
+        point_ = trial_;
+    }
+
+    [[nodiscard]] bool falls() const { return trial_rho_ <= threshold_ || trial_rho_ <= (1.0 - 1e-4 * part_) * rho_; }
+
+    /// The full step as a rule; halved while the residual would not fall. A direction from an old or a symmetric matrix
+    /// need not be one of descent: then false, and the next iteration has a new or the whole one. Else the whole way is
+    /// gone, as Newton's method without a search would.
+    bool search() {
+        while (!falls() && part_ > shortest_part) move(0.5 * part_);
+        if (falls()) return true;
+        if (!fresh_) {
+            renew_ = true;
+            return false;
+        }
+        if (may_become_exact_) {
+            become_exact();
+            return false;
+        }
+        move(1.0);
+        if (!std::isfinite(trial_rho_)) fail("no part of Newton's increment leads to a finite residual");
+        return true;
+    }
+
+    /// The point ← the trial. Whether that is the solution; else renew_ says whether the matrices served.
+    bool advance() {
+        std::swap(point_, trial_);
+        std::swap(residual_, trial_residual_);
+        const double theta = trial_rho_ / rho_;
+        const double rest = (theta < 0.5 ? theta / (1.0 - theta) : 1.0) * part_ * size(increment_.x);
+        rho_ = trial_rho_;
+        renew_ = settings_.reuse == Reuse::Full || newton_.exact_ != settings_.exact ||
+                 theta > (settings_.reuse == Reuse::Modified ? 0.5 : 0.1);
+        return rho_ <= threshold_ && rest <= threshold_;
+    }
+
+    /// What a solver says of an increment is settled by Newton's own convergence. Constraints that repeat each other,
+    /// for one, contradict each other in an increment by terms of second order, which a solver calls infeasible.
+    void finish() {
+        newton_.judge_turns(begin_, h_, point_.delta);
+        report_.solved = solved_before_;
+        report_.message = message_before_;
+    }
+
+    Newton& newton_;
+    const NewtonSettings& settings_;
+    const State& begin_;
+    const double h_;
+    const StepSlopes slopes_;
+    const double s_;
+    StepPoint& point_;
+    StepResidual& residual_;
+    StepSolver& solver_;
+    StepReport& report_;
+    const bool solved_before_;
+    const std::string message_before_;
+
+    bool renew_ = true;              // the matrices, before the next increment
+    bool fresh_ = true;              // they belong to the point
+    bool may_become_exact_ = false;  // from the symmetric part
+    LinearSolution increment_;       // x and s δλ
+    Vector direction_;               // T⁻¹ x
+    StepPoint trial_;
+    StepResidual trial_residual_;
+    double part_ = 1.0;  // of the increment in the trial
+    double rho_ = 0.0, trial_rho_ = 0.0, threshold_ = 0.0;
+};
+
 void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
                    StepSolver& solver, StepReport& report) {
-    const double s = 1.0 / slopes.beta;
-    const auto fail = [&](const std::string& why) {
-        kept_.valid = false;
-        throw StepFailure(fmt::format("{} cannot take the step from t = {:.9g} with h = {:.9g}: {}", settings_.method,
-                                      begin.t, h, why));
-    };
-    bool renew = !(kept_.valid && settings_.reuse == Reuse::Adaptive && kept_.slopes.beta == slopes.beta &&
-                   kept_.slopes.gamma == slopes.gamma);
-    if (!renew) scale();
-    exact_ = settings_.exact;
-    bool may_become_exact = !exact_ && !settings_.linearized;
-    const auto become_exact = [&] {
-        exact_ = true;
-        may_become_exact = false;
-        renew = true;
-    };
-    // What a solver says of an increment is settled by Newton's own convergence. Constraints that repeat each other,
-    // for one, contradict each other in an increment by terms of second order, which a solver calls infeasible.
-    const bool solved_before = report.solved;
-    const std::string message_before = report.message;
-    StepPoint trial = point;
-    StepResidual trial_residual;
-    double rho = 0.0, threshold = 0.0;
-    for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
-        if (may_become_exact && iteration >= most_symmetric_iterations) become_exact();
-        if (renew) assemble(point, slopes);
-        const bool fresh = renew;
-        rho = merit(residual, s);
-        if (!std::isfinite(rho) || !finite(kept_.H) || !finite(kept_.D))
-            fail("the residual or its Jacobian is not finite");
-
-        Problem problem;
-        problem.H = kept_.H;
-        problem.D = kept_.D;
-        problem.a.resize(static_cast<std::size_t>(n_));
-        Eigen::Map<Vector>(problem.a.data(), n_) = -s * residual.balance;
-        problem.b.assign(residual.constraint.begin(), residual.constraint.end());
-        problem.cones = cones_;
-        LinearSolution increment;
-        try {
-            increment = solve_linear(std::move(problem), solver, report);
-        } catch (const Unsupported&) {
-            if (exact_ == settings_.exact) throw;
-            exact_ = settings_.exact;
-            renew = true;
-            continue;
-        }
-        const Vector &x = increment.x, &lambda = increment.lambda;
-        if (!x.allFinite() || !lambda.allFinite()) fail("the increment is not finite");
-        system_.inverse_tangent(point.delta.data(), blocks_);
-        const Vector direction = multiply_blocks(blocks_, x);
-
-        // The full step as a rule; halved while the residual would not fall.
-        double part = 1.0, trial_rho = 0.0;
-        const auto move = [&] {
-            trial.delta = point.delta + part * direction;
-            trial.acceleration = point.acceleration + part * slopes.beta * direction;
-            Eigen::Map<Vector>(trial.state.v.data(), n_) =
-                Eigen::Map<const Vector>(point.state.v.data(), n_) + part * slopes.gamma * direction;
-            trial.lambda = point.lambda + part / s * lambda;
-            trial_rho = evaluate(begin, trial, trial_residual) ? merit(trial_residual, s)
-                                                               : std::numeric_limits<double>::infinity();
-        };
-        move();
-        const auto size = [&](const Vector& motion) { return motion.cwiseProduct(root_).norm(); };
-        const auto force_size = [&](const Vector& force) { return s * force.cwiseQuotient(root_).norm(); };
-        const Eigen::Map<const Vector> q(trial.state.q.data(), static_cast<Eigen::Index>(trial.state.q.size()));
-        const double sigma = std::max({size(trial.delta), h * size(Eigen::Map<const Vector>(begin.v.data(), n_)),
-                                       force_size(trial_residual.inertia), force_size(trial_residual.force),
-                                       force_size(trial_residual.reaction)});
-        const double digits =
-            n_ > 0 ? 10.0 * std::numeric_limits<double>::epsilon() * q.lpNorm<Eigen::Infinity>() * root_.norm() : 0.0;
-        threshold = settings_.tolerance * sigma + digits;
-        if (settings_.linearized) {
-            if (!std::isfinite(trial_rho)) fail("the end of the step is not finite");
-            if (linearization_.wanted()) {
-                const Vector force = h * trial_residual.force,
-                             linear = h * (trial_residual.inertia - trial_residual.reaction);
-                report.linearization =
-                    linearization_.error(begin, trial.state, h, {force.data(), static_cast<std::size_t>(n_)},
-                                         {linear.data(), static_cast<std::size_t>(n_)}, kept_.H);
-                linearization_.judge(report.linearization, begin, h, settings_.method);
-            }
-            judge_turns(begin, h, trial.delta);
-            point = trial;
-            return;
-        }
-        constexpr double shortest = 1.0 / 64.0;
-        const auto falls = [&] { return trial_rho <= threshold || trial_rho <= (1.0 - 1e-4 * part) * rho; };
-        while (!falls() && part > shortest) {
-            part *= 0.5;
-            move();
-        }
-        if (!falls()) {
-            // A direction from an old or a symmetric matrix need not be one of descent. With an old one try again with
-            // a new one; else go the whole way, as Newton's method without a search would.
-            if (!fresh) {
-                renew = true;
-                continue;
-            }
-            if (may_become_exact) {
-                become_exact();
-                continue;
-            }
-            part = 1.0;
-            move();
-            if (!std::isfinite(trial_rho)) fail("no part of Newton's increment leads to a finite residual");
-        }
-        std::swap(point, trial);
-        std::swap(residual, trial_residual);
-        const double theta = trial_rho / rho;
-        const double rest = (theta < 0.5 ? theta / (1.0 - theta) : 1.0) * part * size(x);
-        rho = trial_rho;
-        if (rho <= threshold && rest <= threshold) {
-            judge_turns(begin, h, point.delta);
-            report.solved = solved_before;
-            report.message = message_before;
-            return;
-        }
-        renew = settings_.reuse == Reuse::Full || exact_ != settings_.exact ||
-                theta > (settings_.reuse == Reuse::Modified ? 0.5 : 0.1);
-    }
-    fail(
-        fmt::format("after {} iterations of Newton's method the scaled residual is {:.1e}, where {:.1e} is asked for; "
-                    "a smaller step{} may help",
-                    settings_.max_iterations, rho, threshold, exact_ ? "" : " or jacobian: exact"));
+    Iteration(*this, begin, h, slopes, point, residual, solver, report).run();
 }
 
 // exp is one to one for turns by less than 2π only, where T is singular: a body that turns further in a step comes to

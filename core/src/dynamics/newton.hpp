@@ -78,6 +78,7 @@ public:
     const double* load(const double* memory, const double* end);
 
 private:
+    class Iteration;
     struct Kept {
         bool valid = false;
         StepSlopes slopes;

@@ -28,6 +28,28 @@ std::vector<std::string> names_where(bool (*condition)(const TimestepperInfo&)) 
 
 Timestepper::~Timestepper() = default;
 
+void StepReport::clear() {
+    StepReport empty;
+    empty.reactions.swap(reactions);
+    empty.contacts.swap(contacts);
+    empty.multipliers.swap(multipliers);
+    empty.reactions.clear();
+    empty.contacts.clear();
+    empty.multipliers.clear();
+    *this = std::move(empty);
+}
+
+StepReport Timestepper::step(State& state, double h, StepSolver& solver) {
+    StepReport report;
+    take_step(state, h, solver, report);
+    return report;
+}
+
+void Timestepper::step(State& state, double h, StepSolver& solver, StepReport& report) {
+    report.clear();
+    take_step(state, h, solver, report);
+}
+
 std::vector<double> Timestepper::save() const {
     return multipliers_;
 }

@@ -392,9 +392,6 @@ std::array<std::int32_t, 2> MultibodySystem::joint_rows(std::int32_t index) cons
     const auto& joint = self.joints[static_cast<std::size_t>(index)];
     return {joint.first_row, joint.row_count()};
 }
-const std::vector<ContactPoint>& MultibodySystem::contacts() const {
-    return implementation_->contacts;
-}
 
 std::int32_t MultibodySystem::n() const {
     implementation_->must_be_finished();

@@ -47,7 +47,6 @@ struct MultibodySystem::Implementation {
     mutable mechanics::Placements at;
     mutable mechanics::RowVector gradient;
     mutable mechanics::RowMatrix hessian;
-    std::vector<ContactPoint> contacts;
     std::vector<Pose> poses;  // of the detector's bodies; those of fixed ones stay
 
     void must_be_finished() const;

@@ -32,6 +32,11 @@ std::uint64_t short_feature(std::uint32_t feature) {
     return kind << 10 | (edges ? (of_a & 0x1f) << 5 | (of_b & 0x1f) : (of_a | of_b) & 0x3ff);
 }
 
+std::uint64_t key_of(const ContactPoint& contact) {
+    const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
+    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), short_feature(contact.feature));
+}
+
 }  // namespace
 
 bool MultibodySystem::has_unilateral() const {
@@ -57,7 +62,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     for (std::size_t k = 0; k < self.nodes.size(); ++k)
         self.poses[self.bodies.size() + k].position =
             mechanics::array(self.node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
-    self.detector->detect(self.poses, self.envelope, self.contacts);
+    self.detector->detect(self.poses, self.envelope, rows.contacts());
     self.collect_contacts(rows);
 }
 
@@ -162,11 +167,6 @@ ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t f
     return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
 }
 
-std::uint64_t MultibodySystem::contact_key(const ContactPoint& contact) {
-    const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
-    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), short_feature(contact.feature));
-}
-
 std::array<std::int32_t, 2> MultibodySystem::contact_bodies(const ContactPoint& contact) const {
     return {implementation_->owner_of(contact.shape_a), implementation_->owner_of(contact.shape_b)};
 }
@@ -174,7 +174,7 @@ std::array<std::int32_t, 2> MultibodySystem::contact_bodies(const ContactPoint& 
 void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
     std::int32_t last_a = -1, last_b = -1;  // neighbouring contacts are of the same materials as a rule
     ContactMaterial material;
-    for (const auto& contact : contacts) {
+    for (const auto& contact : rows.contacts()) {
         const auto material_a = shape_material[static_cast<std::size_t>(contact.shape_a)];
         const auto material_b = shape_material[static_cast<std::size_t>(contact.shape_b)];
         if (material_a != last_a || material_b != last_b) material = material_between(material_a, material_b);
@@ -187,7 +187,7 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
         };
-        const auto key = contact_key(contact);
+        const auto key = key_of(contact);
         put_row(normal);
         rows.end_row(contact.gap);
         if (material.friction == 0.0 && leaves_out) {

@@ -123,11 +123,11 @@ void RunFolder::add_frame(std::size_t system) {
     std::vector<Pose> poses;
     for (BodyIndex body = 0; body < mechanics.body_count(); ++body)
         poses.push_back(mechanics.pose(simulation.state(), body));
-    const auto forces = contact_forces_ ? simulation.contact_forces() : std::vector<ContactForce>{};
-    trajectory_->add_frame(system, simulation.state(), poses, mechanics.contacts(), forces);
+    const auto contacts = simulation.contacts();
+    trajectory_->add_frame(system, simulation.state(), poses, contacts);
     const auto number = static_cast<std::int64_t>(frame_times_[system].size());
     series_[system].write(number, simulation.state());
-    if (contact_forces_) series_[system].write_contacts(number, simulation.state().t, mechanics.contacts(), forces);
+    if (contact_forces_) series_[system].write_contacts(number, simulation.state().t, contacts);
     frame_times_[system].push_back(simulation.state().t);
 }
 

@@ -30,9 +30,9 @@ public:
     virtual ~TrajectoryWriter() = default;
     /// system: its place in the list that the writer was made with.
     virtual void add_step(std::size_t system, const StepRecord& record) = 0;
-    /// poses: of all bodies. contacts: of the step that led here. forces: in them, if the system has contact_forces.
+    /// poses: of all bodies. contacts: of the step that led here.
     virtual void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
-                           const std::vector<ContactPoint>& contacts, const std::vector<ContactForce>& forces) = 0;
+                           const std::vector<ContactRecord>& contacts) = 0;
     /// Puts everything on disk. Throws InputError if that fails, e.g. on a full disk.
     virtual void flush() = 0;
 };

@@ -151,19 +151,18 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
     write_file_atomically(folder_ / file_name(number), polydata(state.t, head, xml, data));
 }
 
-void VtkSeries::write_contacts(std::int64_t number, double t, const std::vector<ContactPoint>& contacts,
-                               const std::vector<ContactForce>& forces) const {
+void VtkSeries::write_contacts(std::int64_t number, double t, const std::vector<ContactRecord>& contacts) const {
     std::vector<float> points, force, gap;
     std::vector<std::int32_t> first, second, vertices, ends;
     for (std::size_t i = 0; i < contacts.size(); ++i) {
-        const ContactPoint& contact = contacts[i];
+        const ContactRecord& contact = contacts[i];
         for (std::size_t k = 0; k < 3; ++k) {
-            points.push_back(static_cast<float>(0.5 * (contact.point_a[k] + contact.point_b[k])));
-            force.push_back(static_cast<float>(forces[i].force[k]));
+            points.push_back(static_cast<float>(contact.point[k]));
+            force.push_back(static_cast<float>(contact.force[k]));
         }
         gap.push_back(static_cast<float>(contact.gap));
-        first.push_back(forces[i].bodies[0]);
-        second.push_back(forces[i].bodies[1]);
+        first.push_back(contact.bodies[0]);
+        second.push_back(contact.bodies[1]);
         vertices.push_back(static_cast<std::int32_t>(i));
         ends.push_back(static_cast<std::int32_t>(i + 1));
     }

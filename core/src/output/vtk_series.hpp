@@ -24,9 +24,8 @@ public:
     void write(std::int64_t number, const State& state) const;
 
     /// Writes the contacts of frame `number` at the time t (s) as vertices, midway between the surfaces. Point data:
-    /// force (N), gap (m), first and second (bodies, as in ContactForce). forces: one for each contact.
-    void write_contacts(std::int64_t number, double t, const std::vector<ContactPoint>& contacts,
-                        const std::vector<ContactForce>& forces) const;
+    /// force (N), gap (m), first and second (bodies, as in ContactRecord).
+    void write_contacts(std::int64_t number, double t, const std::vector<ContactRecord>& contacts) const;
 
     [[nodiscard]] std::string file_name(std::int64_t number) const;
     [[nodiscard]] std::string contacts_file_name(std::int64_t number) const;

@@ -21,6 +21,8 @@ namespace delassus {
 using sdk::Vector;
 using sdk::VectorView;
 
+static_assert(sizeof(Errors) == error_measures.size() * sizeof(double), "every measure has a row");
+
 namespace {
 
 /// The diagonal of N and r = D H⁻¹ a + b.
@@ -255,6 +257,7 @@ struct ErrorMeter::Implementation {
     Reference reference;
     sdk::NaturalResidual residual;
     double r_norm = 0.0;
+    mutable std::int64_t measurements = 0;
     // Kept so that measuring again allocates nothing.
     mutable Vector plain_u, work, momentum, impulse;
 };
@@ -278,6 +281,7 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
                                      x_values.size(), lambda_values.size(), problem.n, problem.m));
     const VectorView x(x_values.data(), problem.n);
     const VectorView lambda(lambda_values.data(), problem.m);
+    ++self.measurements;
     Errors errors;
     const auto sums = self.sums_over_cones(x.data(), lambda.data());
     const double reference = self.residual.reference();
@@ -294,6 +298,10 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
     errors.gap = std::abs(sums.gap) / (reference * reference);
     errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), std::sqrt(sums.velocity)}));
     return errors;
+}
+
+std::int64_t ErrorMeter::measurements() const {
+    return implementation_->measurements;
 }
 
 double ErrorMeter::natural(const double* x, const double* lambda_values) const {

@@ -3,11 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <bit>
 #include <charconv>
 #include <nlohmann/json.hpp>
+#include <type_traits>
+#include <variant>
 
 #include "delassus/error.hpp"
+#include "simulation/step_columns.hpp"
 #include "support/atomic_file.hpp"
 #include "support/text_file.hpp"
 
@@ -17,7 +21,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 2;
+constexpr int version = 3;
 constexpr std::size_t digits = 16;
 
 // Numbers are their 64 bits in hexadecimal, one after the other: no digit is lost, and zeros keep their signs.
@@ -43,50 +47,53 @@ std::vector<double> numbers(const Json& json) {
     return values;
 }
 
+/// By names; real numbers as bits.
 Json json_of(const SimulationTotals& totals) {
-    return {{"reals", bits({totals.start_energy, totals.energy, totals.worst_drift, totals.worst_penetration,
-                            totals.worst_natural, totals.seconds, totals.solver_seconds, totals.smallest_step,
-                            totals.largest_step, totals.start_kinetic, totals.potential_drop, totals.recovered,
-                            totals.growth, totals.growth_share, totals.worst_linearization})},
-            {"rejected", totals.rejected},
-            {"impacts", totals.impacts},
-            {"most_contacts", totals.most_contacts},
-            {"newton_iterations", totals.newton_iterations},
-            {"solver_iterations", totals.solver_iterations},
-            {"plugin_solves", totals.plugin_solves},
-            {"resting_parts", totals.resting_parts},
-            {"unsolved_steps", totals.unsolved_steps},
-            {"first_unsolved", totals.first_unsolved}};
+    Json json = Json::object();
+    const auto put = [&](const char* name, auto member) {
+        if constexpr (std::is_same_v<decltype(member), double SimulationTotals::*>) {
+            json[name] = bits({totals.*member});
+        } else {
+            json[name] = totals.*member;
+        }
+    };
+    for (const TotalColumn& column : total_columns)
+        std::visit([&](auto member) { put(column.name, member); }, column.value);
+    return json;
+}
+
+double number(const Json& json) {
+    const auto values = numbers(json);
+    if (values.size() != 1) throw InputError("a number is damaged");
+    return values[0];
+}
+
+/// Version 2 had the real numbers of the totals in one list, in this order.
+constexpr std::array reals_of_version_2 = {"start_energy",  "energy",        "worst_drift",        "worst_penetration",
+                                           "worst_natural", "seconds",       "solver_seconds",     "smallest_step",
+                                           "largest_step",  "start_kinetic", "potential_drop",     "recovered",
+                                           "growth",        "growth_share",  "worst_linearization"};
+
+Json totals_with_names(Json json) {
+    const auto reals = numbers(json.at("reals"));
+    if (reals.size() != reals_of_version_2.size()) throw InputError("the totals are not complete");
+    for (std::size_t i = 0; i < reals.size(); ++i) json[reals_of_version_2[i]] = bits({reals[i]});
+    return json;
 }
 
 SimulationTotals totals_of(const Json& json) {
     SimulationTotals totals;
-    const auto reals = numbers(json.at("reals"));
-    if (reals.size() != 15) throw InputError("the totals are not complete");
-    totals.start_energy = reals[0];
-    totals.energy = reals[1];
-    totals.worst_drift = reals[2];
-    totals.worst_penetration = reals[3];
-    totals.worst_natural = reals[4];
-    totals.seconds = reals[5];
-    totals.solver_seconds = reals[6];
-    totals.smallest_step = reals[7];
-    totals.largest_step = reals[8];
-    totals.start_kinetic = reals[9];
-    totals.potential_drop = reals[10];
-    totals.recovered = reals[11];
-    totals.growth = reals[12];
-    totals.growth_share = reals[13];
-    totals.worst_linearization = reals[14];
-    json.at("rejected").get_to(totals.rejected);
-    json.at("impacts").get_to(totals.impacts);
-    json.at("most_contacts").get_to(totals.most_contacts);
-    json.at("newton_iterations").get_to(totals.newton_iterations);
-    json.at("solver_iterations").get_to(totals.solver_iterations);
-    json.at("plugin_solves").get_to(totals.plugin_solves);
-    json.at("resting_parts").get_to(totals.resting_parts);
-    json.at("unsolved_steps").get_to(totals.unsolved_steps);
-    json.at("first_unsolved").get_to(totals.first_unsolved);
+    const auto take = [&](const Json& value, auto member) {
+        if constexpr (std::is_same_v<decltype(member), double SimulationTotals::*>) {
+            totals.*member = number(value);
+        } else {
+            value.get_to(totals.*member);
+        }
+    };
+    for (const TotalColumn& column : total_columns) {
+        if (!json.contains(column.name)) throw InputError(fmt::format("its totals lack \"{}\"", column.name));
+        std::visit([&](auto member) { take(json.at(column.name), member); }, column.value);
+    }
     return totals;
 }
 
@@ -120,7 +127,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
     try {
         const Json json = Json::parse(text);
         if (json.at("format") != format) throw InputError("it is not a checkpoint of Delassus");
-        if (json.at("version") != version) throw InputError("it was written by another version of Delassus");
+        const int written = json.at("version");
+        if (written != version && written != 2) throw InputError("it was written by another version of Delassus");
         Checkpoint checkpoint;
         json.at("scene").get_to(checkpoint.scene);
         json.at("contact_forces").get_to(checkpoint.contact_forces);
@@ -128,13 +136,11 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             CheckpointedSystem system;
             one.at("name").get_to(system.name);
             one.at("step").get_to(system.simulation.step);
-            const auto t = numbers(one.at("t"));
-            if (t.size() != 1) throw InputError("it holds no time");
-            system.simulation.state = {t[0], numbers(one.at("q")), numbers(one.at("v"))};
+            system.simulation.state = {number(one.at("t")), numbers(one.at("q")), numbers(one.at("v"))};
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
             system.simulation.sleeping = numbers(one.at("sleeping"));
-            system.simulation.totals = totals_of(one.at("totals"));
+            system.simulation.totals = totals_of(written == 2 ? totals_with_names(one.at("totals")) : one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             checkpoint.systems.push_back(std::move(system));
         }

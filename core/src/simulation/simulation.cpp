@@ -10,6 +10,7 @@
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
 #include "simulation/sleeping.hpp"
+#include "simulation/step_columns.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
 #include "support/frames.hpp"
@@ -75,16 +76,17 @@ bool Simulation::finished() const {
     return system_->end - now_.state.t <= (control_ ? 0.0 : rounding_of_step * system_->step);
 }
 
-AdaptiveStepReport Simulation::advance(State& state) {
-    if (control_) return control_->step(state, system_->end, *solver_);
+void Simulation::advance(State& state, AdaptiveStepReport& report) {
+    if (control_) {
+        report = control_->step(state, system_->end, *solver_);
+        return;
+    }
     // A whole step unless the end comes sooner: a run that is ended here or goes on later takes the same steps.
     const double remaining = system_->end - state.t;
-    AdaptiveStepReport report;
     report.h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
     if (sleeping_) sleeping_->begin_step(report.h);
-    report.step = timestepper_->step(state, report.h, *solver_);
+    timestepper_->step(state, report.h, *solver_, report.step);
     if (sleeping_) sleeping_->end_step(now_.state, state);
-    return report;
 }
 
 void Simulation::measure(const State& state, std::int64_t step) {
@@ -133,7 +135,7 @@ const StepRecord& Simulation::step() {
     State next = now_.state;
     const std::vector<double> memory = timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
-    AdaptiveStepReport taken;
+    AdaptiveStepReport& taken = next_report_;
     SimulationTotals judged = now_.totals;
     const StepRecord last = record_;
     solver_->reset_effort();
@@ -144,7 +146,7 @@ const StepRecord& Simulation::step() {
         if (sleeping_) sleeping_->load(sleeping);
     };
     try {
-        taken = advance(next);
+        advance(next, taken);
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
         measure(next, now_.step + 1);
@@ -170,8 +172,7 @@ const StepRecord& Simulation::step() {
 
     record_.contacts = report.unilateral_blocks;
     record_.penetration = 0.0;
-    for (const auto& contact : system_->system->contacts())
-        record_.penetration = std::max(record_.penetration, -contact.gap);
+    for (const auto& contact : report.contacts) record_.penetration = std::max(record_.penetration, -contact.gap);
     const SolverEffort& effort = solver_->effort();
     record_.newton_iterations = report.newton_iterations;
     record_.solver_iterations = effort.iterations;
@@ -184,42 +185,39 @@ const StepRecord& Simulation::step() {
     record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
     auto& totals = now_.totals;
-    totals.energy = record_.energy;
-    totals.worst_drift = std::max(totals.worst_drift, record_.drift);
-    totals.worst_penetration = std::max(totals.worst_penetration, record_.penetration);
-    totals.worst_natural = std::max(totals.worst_natural, record_.natural);
-    totals.worst_linearization = std::max(totals.worst_linearization, record_.linearization);
+    add_step(record_, totals);
     if (!taken.impact) {
         totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
         totals.largest_step = std::max(totals.largest_step, taken.h);
     }
-    totals.rejected += taken.rejected;
-    totals.impacts += taken.impact ? 1 : 0;
-    totals.most_contacts = std::max(totals.most_contacts, record_.contacts);
-    totals.newton_iterations += record_.newton_iterations;
-    totals.solver_iterations += record_.solver_iterations;
     totals.plugin_solves += effort.plugin_solves;
     totals.resting_parts += effort.resting_parts;
     totals.solver_seconds += effort.seconds;
-    totals.seconds += record_.seconds;
     if (!report.solved) {
         ++totals.unsolved_steps;
         if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
     }
+    std::swap(report_, next_report_);
     return record_;
 }
 
-std::vector<ContactForce> Simulation::contact_forces() const {
-    const MultibodySystem& mechanics = *system_->system;
-    std::vector<ContactForce> forces;
-    for (const ContactPoint& contact : mechanics.contacts()) {
+std::vector<ContactRecord> Simulation::contacts() const {
+    std::vector<ContactRecord> contacts;
+    contacts.reserve(report().contacts.size());
+    auto reaction = report().reactions.end() - static_cast<std::ptrdiff_t>(report().contacts.size());
+    for (const ContactPoint& contact : report().contacts) {
         Eigen::Vector3d normal(contact.normal.data()), first, second;
         tangents(normal, first, second);  // the directions of the contact's rows
-        const auto [n, t, s] = timestepper_->reaction(MultibodySystem::contact_key(contact));
+        const auto [n, t, s] = (reaction++)->force;
         const Eigen::Vector3d force = n * normal + t * first + s * second;
-        forces.push_back({mechanics.contact_bodies(contact), {force[0], force[1], force[2]}});
+        ContactRecord& record = contacts.emplace_back();
+        record.bodies = system_->system->contact_bodies(contact);
+        for (std::size_t k = 0; k < 3; ++k) record.point[k] = 0.5 * (contact.point_a[k] + contact.point_b[k]);
+        record.normal = contact.normal;
+        record.gap = contact.gap;
+        record.force = {force[0], force[1], force[2]};
     }
-    return forces;
+    return contacts;
 }
 
 std::vector<std::string> Simulation::warnings() const {
@@ -257,6 +255,7 @@ void Simulation::load(SimulationState state) {
     now_.control.clear();
     now_.sleeping.clear();
     record_ = {};
+    report_ = {};
     measure(now_.state, now_.step);
 }
 

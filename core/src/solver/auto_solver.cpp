@@ -79,8 +79,8 @@ public:
                            problem.describe(needs));
     }
 
-    void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-             SolveReport& report) override {
+    std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                              SolveReport& report) override {
         const std::uint64_t needs = needs_of(problem, {});
         const RankingRule& rule = rule_of(problem, settings);
         StageRunner runner(problem, solution, settings, report);
@@ -104,6 +104,7 @@ public:
                 if (solver && runner.run(*solver, ranked.stage)) break;
             }
         report.message = fmt::format("{}: {}", rule.name, runner.sentence());
+        return runner.error();
     }
 
 private:

@@ -34,13 +34,14 @@ public:
         return finish_.refusal(problem, warm);
     }
 
-    void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-             SolveReport& report) override {
+    std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                              SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);
         const bool done = runner.run(main_, {.reason = "the solver that was asked for", .tolerance = finish_at_}) ||
                           runner.run(finish_, {.reason = "its finish"});
         if (!done) runner.run(main_, {.reason = "the finish did not reach the tolerance"});
         report.message = runner.sentence();
+        return runner.error();
     }
 
 private:

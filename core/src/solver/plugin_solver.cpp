@@ -163,8 +163,8 @@ public:
                                            : "it gave no reason");
     }
 
-    void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-             SolveReport& report) override;
+    std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                              SolveReport& report) override;
 
 private:
     [[nodiscard]] const delassus_plugin_descriptor& border() const { return plugin->descriptor(); }
@@ -216,8 +216,8 @@ private:
     std::string thrown;
 };
 
-void PluginSolver::run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-                       SolveReport& report) {
+std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution& solution,
+                                        const SolveSettings& settings, SolveReport& report) {
     Stopwatch setup, watch;
     setup.start();
     std::int32_t raw_status = set_up(problem);
@@ -256,6 +256,7 @@ void PluginSolver::run(const PreparedProblem& problem, Solution& solution, const
         report.message = fmt::format("{}: {}", info().name, last_error(solver));
     if (settings.record_curve)
         report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
+    return std::nullopt;
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delassus/solver.hpp"
-#include "support/json_number.hpp"
+#include "problem/errors_json.hpp"
 
 namespace delassus {
 
@@ -26,14 +26,7 @@ std::string to_json(const SolveReport& report) {
                  {"analyses", report.analyses},
                  {"factorizations", report.factorizations},
                  {"claimed_residual", json_number(report.claimed_residual)},
-                 {"error",
-                  {{"natural", json_number(report.error.natural)},
-                   {"siconos", json_number(report.error.siconos)},
-                   {"balance", json_number(report.error.balance)},
-                   {"cone", json_number(report.error.cone)},
-                   {"dual", json_number(report.error.dual)},
-                   {"gap", json_number(report.error.gap)},
-                   {"rounding", json_number(report.error.rounding)}}}};
+                 {"error", errors_json(report.error)}};
     if (!report.stages.empty()) {
         Json stages = Json::array();
         for (const auto& stage : report.stages)

@@ -165,16 +165,16 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
     report.options = implementation_->options();
     report.law = problem.problem().law;
     report.tolerance = settings.tolerance;
-    implementation_->run(problem, solution, settings, report);
+    const std::optional<Errors> measured = implementation_->run(problem, solution, settings, report);
 
-    if (!all_finite(solution.x) || !all_finite(solution.lambda)) {
+    if (!measured && (!all_finite(solution.x) || !all_finite(solution.lambda))) {
         report.status = Status::NumericalFailure;
         report.message =
             fmt::format("{} returned values that are not finite; they were replaced by zeros", info().name);
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
     }
-    report.error = problem.meter().measure(solution.x, solution.lambda);
+    report.error = measured ? *measured : problem.meter().measure(solution.x, solution.lambda);
     const double claimed = claim_slack * settings.tolerance;
     const double natural_bound = std::max(claimed, std::min(rounding_slack * report.error.rounding, rounding_limit));
     const double balance_bound = std::max(claimed, balance_floor);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "delassus/solver.hpp"
 
 namespace delassus {
@@ -19,9 +21,10 @@ public:
     [[nodiscard]] virtual const OptionTexts& options() const = 0;
     /// See Solver::refusal.
     [[nodiscard]] virtual std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) = 0;
-    /// Solves; fills the report's status, message, counts, times, curve and stages.
-    virtual void run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-                     SolveReport& report) = 0;
+    /// Solves; fills the report's status, message, counts, times, curve and stages. Returns the errors of the result
+    /// if they have been measured, which then is finite.
+    virtual std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+                                      SolveReport& report) = 0;
 };
 
 /// "\"pile\"", or "the problem" if it has no name.

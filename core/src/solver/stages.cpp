@@ -50,7 +50,7 @@ double worst_of(const Errors& error) {
 StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                          SolveReport& report)
     : problem_(problem), best_(solution), settings_(settings), report_(report), started_(settings.warm_start) {
-    if (started_) worst_ = worst_of(problem_.meter().measure(best_.x, best_.lambda));
+    if (started_) error_ = problem_.meter().measure(best_.x, best_.lambda);
 }
 
 const PreparedProblem& StageRunner::problem_of(const Stage& stage) {
@@ -72,9 +72,9 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
 
     const Errors error = other ? problem_.meter().measure(solution.x, solution.lambda) : result.error;
     // A stage with the other law is there for its end point, whatever that is worth under the problem's own.
-    if (!started_ || worst_of(error) < worst_ || other) {
+    if (!started_ || worst_of(error) < worst_of(error_) || other) {
         best_ = std::move(solution);
-        worst_ = worst_of(error);
+        error_ = error;
         started_ = true;
     }
     add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, result.status, result.message,

@@ -61,6 +61,9 @@ public:
     /// solve reached.
     bool run(Solver& solver, const Stage& stage);
 
+    /// Of the solution, by the meter of the problem; none where nothing was run and there was no start.
+    [[nodiscard]] std::optional<Errors> error() const { return started_ ? std::optional(error_) : std::nullopt; }
+
     /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".
     [[nodiscard]] std::string sentence() const;
 
@@ -74,7 +77,7 @@ private:
     Solution& best_;
     const SolveSettings& settings_;
     SolveReport& report_;
-    double worst_ = std::numeric_limits<double>::infinity();  // of the best so far, its natural and its balance error
+    Errors error_;  // of the best so far, where there is one
     bool started_ = false;
 };
 

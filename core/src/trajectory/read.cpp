@@ -8,6 +8,7 @@
 #include "delassus/export.hpp"
 #include "hdf5/isolated.hpp"
 #include "output/recorded.hpp"
+#include "simulation/step_columns.hpp"
 #include "trajectory/model_file.hpp"
 
 namespace delassus::trajectory {
@@ -16,13 +17,6 @@ namespace {
 using hdf5::Group;
 using hdf5::Handle;
 
-/// The datasets of steps that are read.
-constexpr std::array<Column, 5> series_columns = {{{"energy", "J", "energy"},
-                                                   {"drift", "m, rad", "constraint drift"},
-                                                   {"penetration", "m", "penetration"},
-                                                   {"contacts", "1", "contacts", true},
-                                                   {"solver_iterations", "1", "solver iterations", true}}};
-
 std::int64_t row_count(const Group& group, const char* name) {
     const auto shape = group.shape(name);
     if (shape.empty()) group.refuse(fmt::format("/{} must have rows", name));
@@ -30,9 +24,9 @@ std::int64_t row_count(const Group& group, const char* name) {
 }
 
 /// The least and the greatest value of each of `most`/2 stretches, in the order of time.
-RecordedSeries thinned(const Column& column, const std::vector<double>& t, const std::vector<double>& values,
+RecordedSeries thinned(const StepColumn& column, const std::vector<double>& t, const std::vector<double>& values,
                        std::int64_t most) {
-    RecordedSeries series{column.name, column.unit, column.description, {}, {}};
+    RecordedSeries series{column.name, column.unit, column.plot, {}, {}};
     const auto count = static_cast<std::int64_t>(values.size());
     if (count <= most) {
         series.t = t;
@@ -54,12 +48,14 @@ RecordedSeries thinned(const Column& column, const std::vector<double>& t, const
 
 void read_steps(const Group& steps, std::int64_t points, RecordedSystem& system) {
     std::int64_t count = row_count(steps, "t");
-    for (const auto& column : series_columns) count = std::min(count, row_count(steps, column.name));
+    for (const StepColumn& column : step_columns)
+        if (column.plot) count = std::min(count, row_count(steps, column.name));
     system.steps = std::max<std::int64_t>(0, count - 1);
     const auto t = steps.first_numbers("t", count);
-    for (const auto& column : series_columns) {
+    for (const StepColumn& column : step_columns) {
+        if (!column.plot) continue;
         std::vector<double> values;
-        if (column.integer) {
+        if (column.integer()) {
             const auto integers = steps.integers(column.name, count);
             values.assign(integers.begin(), integers.end());
         } else {

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <type_traits>
+#include <variant>
+
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
 #include "output/trajectory.hpp"
+#include "simulation/step_columns.hpp"
 #include "trajectory/datasets.hpp"
 #include "trajectory/model_file.hpp"
 
@@ -11,8 +15,6 @@ namespace delassus::trajectory {
 namespace {
 
 using hdf5::Handle;
-
-constexpr std::size_t step_columns = 13;
 
 class SystemFile {
 public:
@@ -31,21 +33,11 @@ public:
         const auto step = [&](const Column& column, std::vector<hsize_t> shape = {}) {
             steps_.emplace_back(steps.get(), column, std::move(shape), resume, system.steps, file);
         };
-        steps_.reserve(step_columns);
-        step({"t", "s", "time at the end of the step; the first row is the initial state"});
-        step({"energy", "J", "kinetic and potential energy"});
-        step({"momentum", "kg m/s", "linear momentum, world frame"}, {3});
-        step({"angular_momentum", "kg m^2/s", "angular momentum about the origin, world frame"}, {3});
-        step({"drift", "m, rad", "largest violation of a bilateral constraint"});
-        step({"penetration", "m", "depth of the deepest contact where the step began"});
-        step({"contacts", "1", "contacts and other unilateral blocks in the step's problem", true});
-        step({"sleeping", "1", "bodies and nodes that sleep", true});
-        step({"newton_iterations", "1", "linear or cone problems solved", true});
-        step({"solver_iterations", "1", "iterations of the solver plugin", true});
-        step({"natural", "1", "largest natural error of the step's solves"});
-        step({"seconds", "s", "wall time of the step"});
-        step({"solved", "1", "1 if every solve reached its tolerance", true});
-        step({"linearization", "1", "error of the forces of a linearised method, as a share of the velocities"});
+        steps_.reserve(step_columns.size());
+        for (const StepColumn& column : step_columns)
+            if (column.stored)
+                step({column.name, column.unit, column.description, column.integer()},
+                     column.width() == 1 ? std::vector<hsize_t>{} : std::vector<hsize_t>{column.width()});
         const Handle frames = group_in(group.get(), "frames", resume, file);
         const auto frame = [&](const Column& column, std::vector<hsize_t> shape = {}) {
             frames_.emplace_back(frames.get(), column, std::move(shape), resume, system.frames, file);
@@ -79,26 +71,23 @@ public:
     }
 
     void add_step(const StepRecord& record) {
-        std::size_t i = 0;
-        steps_[i++].add(record.t);
-        steps_[i++].add(record.energy);
-        steps_[i++].add(record.momentum.data(), 3);
-        steps_[i++].add(record.angular_momentum.data(), 3);
-        steps_[i++].add(record.drift);
-        steps_[i++].add(record.penetration);
-        steps_[i++].add(static_cast<double>(record.contacts));
-        steps_[i++].add(static_cast<double>(record.sleeping));
-        steps_[i++].add(static_cast<double>(record.newton_iterations));
-        steps_[i++].add(static_cast<double>(record.solver_iterations));
-        steps_[i++].add(record.natural);
-        steps_[i++].add(record.seconds);
-        steps_[i++].add(record.solved ? 1.0 : 0.0);
-        steps_[i++].add(record.linearization);
+        auto series = steps_.begin();
+        const auto add = [&](auto member) {
+            if constexpr (std::is_same_v<decltype(member), Vector3 StepRecord::*>) {
+                series->add((record.*member).data(), 3);
+            } else {
+                series->add(static_cast<double>(record.*member));
+            }
+        };
+        for (const StepColumn& column : step_columns) {
+            if (!column.stored) continue;
+            std::visit(add, column.value);
+            ++series;
+        }
         if (++waiting_ >= 1000) write();
     }
 
-    void add_frame(const State& state, const std::vector<Pose>& poses, const std::vector<ContactPoint>& contacts,
-                   const std::vector<ContactForce>& forces) {
+    void add_frame(const State& state, const std::vector<Pose>& poses, const std::vector<ContactRecord>& contacts) {
         std::size_t i = 0;
         frames_[i++].add(state.t);
         if (!state.q.empty()) {
@@ -109,14 +98,14 @@ public:
             frames_[i].add(pose.position.data(), 3);
             frames_[i].add(pose.orientation.data(), 4);
         }
+        const bool with_forces = contacts_.size() > 3;
         for (const auto& contact : contacts) {
-            for (std::size_t k = 0; k < 3; ++k) contacts_[0].add(0.5 * (contact.point_a[k] + contact.point_b[k]));
+            contacts_[0].add(contact.point.data(), 3);
             contacts_[1].add(contact.normal.data(), 3);
             contacts_[2].add(contact.gap);
-        }
-        for (const auto& force : forces) {
-            for (const auto body : force.bodies) contacts_[3].add(static_cast<double>(body));
-            contacts_[4].add(force.force.data(), 3);
+            if (!with_forces) continue;
+            for (const auto body : contact.bodies) contacts_[3].add(static_cast<double>(body));
+            contacts_[4].add(contact.force.data(), 3);
         }
         contacts_before_ += static_cast<std::int64_t>(contacts.size());
         frames_.back().add(static_cast<double>(contacts_before_));
@@ -169,8 +158,8 @@ public:
 
     void add_step(std::size_t system, const StepRecord& record) override { systems_[system].add_step(record); }
     void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
-                   const std::vector<ContactPoint>& contacts, const std::vector<ContactForce>& forces) override {
-        systems_[system].add_frame(state, poses, contacts, forces);
+                   const std::vector<ContactRecord>& contacts) override {
+        systems_[system].add_frame(state, poses, contacts);
     }
     void flush() override {
         for (auto& system : systems_) system.write();
