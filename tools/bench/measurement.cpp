@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "bench/ask.hpp"
+#include "problem/errors_json.hpp"
 
 namespace delassus::bench {
 

@@ -17,6 +17,7 @@
 #include "delassus/problem_files.hpp"
 #include "delassus/solver_config.hpp"
 #include "problem/cone_kinds.hpp"
+#include "problem/errors_json.hpp"
 #include "problem/structure.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
