@@ -67,6 +67,7 @@ double ratio(double numerator, double denominator) {
 struct AnyCone {
     const sdk::ConeOperations& operations;
     [[nodiscard]] static std::int32_t rows(const delassus_cone& cone) { return cone.rows; }
+    [[nodiscard]] bool is_linear() const { return operations.is_linear; }
     void project(const delassus_cone& cone, double* lambda) const { operations.project(cone, lambda); }
     void project_dual(const delassus_cone& cone, double* u) const { operations.project_dual(cone, u); }
     [[nodiscard]] double gap(const delassus_cone& cone, const double* lambda, const double* u) const {
@@ -76,7 +77,11 @@ struct AnyCone {
 /// Three rows, in the operations of sdk::FrictionCone but without its branches: near a solution of a pile, which of
 /// them a contact takes is a matter of chance, and a guess that fails costs more than the whole projection.
 struct SpatialFriction : sdk::FrictionCone {
+    explicit SpatialFriction(const delassus_cone& cone) : mu(sdk::friction_coefficient(cone)) {}
+    const double mu;  // a copy: projections write numbers, which might be the cone's for all that the compiler knows
+
     [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
+    [[nodiscard]] static constexpr bool is_linear() { return false; }
 
     static void project_with_slope(double slope, double* v) {
         const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
@@ -88,11 +93,9 @@ struct SpatialFriction : sdk::FrictionCone {
         v[1] *= kept;
         v[2] *= kept;
     }
-    static void project(const delassus_cone& cone, double* lambda) {
-        project_with_slope(sdk::friction_coefficient(cone), lambda);
-    }
-    static void project_dual(const delassus_cone& cone, double* u) {
-        if (const double mu = sdk::friction_coefficient(cone); mu > 0.0) {
+    void project(const delassus_cone&, double* lambda) const { project_with_slope(mu, lambda); }
+    void project_dual(const delassus_cone&, double* u) const {
+        if (mu > 0.0) {
             project_with_slope(1.0 / mu, u);
         } else {
             u[0] = std::max(0.0, u[0]);
@@ -198,7 +201,7 @@ struct ErrorMeter::Implementation {
         double squared_velocity = 0.0;
         for (std::int32_t i = 0; i < rows; ++i) squared_velocity += u[i] * u[i];
         sums.velocity += squared_velocity;
-        if (sdk::operations_of(cone).is_linear) {  // λ cancels; it must not leave its rounding
+        if (on.is_linear()) {  // λ cancels; it must not leave its rounding
             sums.natural += square * squared_velocity;
         } else {
             for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - square * u[i];
@@ -238,7 +241,7 @@ struct ErrorMeter::Implementation {
             if (view.coulomb) u[0] += sdk::de_saxce(cone, u);
             if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
                 std::array<double, 3> of_three;
-                add_cone(SpatialFriction{}, c, lambda_c, u, of_three.data(), sums);
+                add_cone(SpatialFriction(cone), c, lambda_c, u, of_three.data(), sums);
             } else {
                 add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, trial, sums);
             }
