@@ -104,7 +104,7 @@ TEST_F(Axes, MistakesAreNamedWithTheirPlace) {
         {scene + "bounds: {drift: 1}, timesteppers: [hhtt]}\n",
          "line 2: there is no timestepper \"hhtt\"; did you mean \"hht\"?"},
         {scene + "bounds: {drift: 1}, tolerance: 1}\n",
-         "line 2: \"solvers\", \"law\" and \"tolerance\" are of problems"},
+         "line 2: \"solvers\", \"law\" and \"tolerance\" are keys of problems"},
         {head + "values: [1], bounds: {speed: 1}}\n  - {name: a, scene: fall.yaml, values: [0], bounds: {drift: 1}}\n",
          "line 3: the axis \"a\" is listed twice"}};
     for (const auto& [text, sentence] : cases) {

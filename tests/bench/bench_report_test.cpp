@@ -76,7 +76,7 @@ TEST_F(BenchReport, IsDrawnAndFollowsItsSwitches) {
         "box.selectedIndex = [...box.options].findIndex((one) => one.textContent.startsWith(begin));"
         "box.dispatchEvent(new Event('change'));"
         "return document.querySelector('#problem-2 .chart').chart.chart.getOption().yAxis[0].name; };"
-        "root.dataset.axis = axis('velocity'); root.dataset.dual = axis('penetration');");
+        "root.dataset.axis = axis('velocity'); root.dataset.dual = axis('dual');");
     ASSERT_FALSE(run.timed_out);
     const std::string head = run.dom.substr(0, 600);
     for (const char* fact : {"data-before=\"1\"", "data-after=\"0\"", "data-pressed=\"false\"", "data-again=\"1\"",

@@ -33,7 +33,7 @@ std::string refusal_of(const std::string& name) {
 
 TEST(Load, RefusesBrokenHandshakesWithASentence) {
     const std::pair<const char*, std::vector<const char*>> cases[] = {
-        {"wrong_abi", {"99.0", "this is version 1.1"}},
+        {"wrong_abi", {"99.1", "this is version 1.1"}},
         {"wrong_magic", {"magic number"}},
         {"small_descriptor", {"24 bytes"}},
         {"bad_name", {"../Bad Name", "not a word"}},
