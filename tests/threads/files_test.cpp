@@ -29,7 +29,8 @@ protected:
             hosts.emplace_back([this, k, &ending, &good = equal[k]] {
                 SpherePileParameters parameters;
                 parameters.contacts = 40 + k;
-                const Problem problem = generate_sphere_pile(parameters);
+                Problem problem = generate_sphere_pile(parameters);
+                problem.law = Law::Coulomb;  // the law of FCLib files
                 good = true;
                 for (int repeat = 0; repeat < 5; ++repeat) {
                     const auto file = folder_ / (std::to_string(k) + "-" + std::to_string(repeat) + ending);

@@ -118,7 +118,9 @@ TEST(Identities, OfProblemsMadeInTwoThreadsDiffer) {
         hosts.emplace_back([&own] {
             PreparedProblem problem(pile(20));
             for (int k = 0; k < 100; ++k) {
-                problem.renew(pile(20));
+                Problem next = pile(20);
+                for (double& entry : next.H.value) entry *= 2.0 + k;  // new values, hence a new identity
+                problem.renew(std::move(next));
                 own.push_back(problem.raw().values_id);
             }
         });

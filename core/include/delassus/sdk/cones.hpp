@@ -30,13 +30,15 @@ struct ConeOperations : ConeDescription {
     Interval (*interval)(const delassus_cone&, std::int32_t row);
     /// What the exact Coulomb law adds to the first row of u; null where no friction law applies.
     double (*de_saxce)(const delassus_cone&, const double* u);
+    // Whether there are the two above: under sanitizers g++ 12 takes no comparison of their addresses for a constant.
+    bool has_interval, has_de_saxce;
 
     /// The DELASSUS_CAN_* bit that a solver needs for it.
     [[nodiscard]] constexpr std::uint64_t capability() const { return DELASSUS_CAN_CONE(kind); }
     /// Whether a change of one row leaves the others' sets alone, so that rows may be scaled and stepped one by one.
-    [[nodiscard]] constexpr bool is_separable() const { return interval != nullptr; }
+    [[nodiscard]] constexpr bool is_separable() const { return has_interval; }
     /// Whether a friction law changes what its blocks ask for.
-    [[nodiscard]] constexpr bool has_law() const { return de_saxce != nullptr; }
+    [[nodiscard]] constexpr bool has_law() const { return has_de_saxce; }
     /// Its parameters, as far as there are any.
     [[nodiscard]] constexpr std::span<const ConeParameter> named_parameters() const {
         return {parameters, static_cast<std::size_t>(parameter_count)};
@@ -45,9 +47,16 @@ struct ConeOperations : ConeDescription {
 
 template <class Cone>
 constexpr ConeOperations cone_operations() {
-    ConeOperations row{Cone::description, &Cone::project, &Cone::project_dual, &Cone::gap, nullptr, nullptr};
-    if constexpr (requires { &Cone::interval; }) row.interval = &Cone::interval;
-    if constexpr (requires { &Cone::de_saxce; }) row.de_saxce = &Cone::de_saxce;
+    ConeOperations row{
+        Cone::description, &Cone::project, &Cone::project_dual, &Cone::gap, nullptr, nullptr, false, false};
+    if constexpr (requires { &Cone::interval; }) {
+        row.interval = &Cone::interval;
+        row.has_interval = true;
+    }
+    if constexpr (requires { &Cone::de_saxce; }) {
+        row.de_saxce = &Cone::de_saxce;
+        row.has_de_saxce = true;
+    }
     return row;
 }
 
