@@ -215,21 +215,22 @@ private:
     void go_back(const std::vector<State>& start) {
         run_.watch.reversal = 0.0;
         for (std::size_t i = 0; i < simulations_.size(); ++i) {
-            Simulation back(scene_.systems[i], registry_);
-            SimulationState turned = back.save();
+            std::vector<Simulation> back;
+            back.emplace_back(scene_.systems[i], registry_);
+            SimulationState turned = back[0].save();
             turned.state.q = simulations_[i].state().q;
             turned.state.v = simulations_[i].state().v;
             for (double& entry : turned.state.v) entry = -entry;
-            back.load(std::move(turned));
-            try {
-                while (!back.finished()) back.step();
-            } catch (const StepFailure& failure) {
+            back[0].load(std::move(turned));
+            const RunResult result = run_to_end(back, {});
+            if (result.status == RunStatus::Unsupported) throw Unsupported(result.message);
+            if (result.status == RunStatus::Failed) {
                 run_.status = "failed";
-                run_.message = std::string("on the way back, ") + failure.what();
+                run_.message = "on the way back, " + result.message;
                 return;
             }
             std::vector<double> delta(start[i].v.size());
-            scene_.systems[i].system->difference(start[i].q.data(), back.state().q.data(), delta.data());
+            scene_.systems[i].system->difference(start[i].q.data(), back[0].state().q.data(), delta.data());
             for (const double entry : delta) Watch::raise(run_.watch.reversal, std::abs(entry));
         }
     }
