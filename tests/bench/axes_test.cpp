@@ -94,7 +94,7 @@ TEST_F(Axes, MistakesAreNamedWithTheirPlace) {
         {head + "value: [1], bounds: {speed: 1}}\n",
          "line 2: an axis of the suite has no key \"value\"; did you mean \"values\"?"},
         {head + "values: [1], bounds: {speed: 1}, timesteppers: [hht]}\n",
-         "line 2: \"timesteppers\" and \"step_solvers\" are of scenes"},
+         "line 2: \"timesteppers\" and \"step_solvers\" are keys of scenes"},
         {"axes:\n  - {name: a, generate: box_stack, values: [1, 2], bounds: {speed: 1}}\n",
          "line 2: nothing in \"set\" depends on the value"},
         {scene + "bounds: {velocity: 1}}\n", "line 2: scenes have no measure \"velocity\""},
