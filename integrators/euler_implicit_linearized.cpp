@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "delassus/timestepper.hpp"
+#include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
 #include "problem/copy_cone.hpp"
@@ -25,20 +26,30 @@ namespace {
 // of G is taken that a step cannot bear explicitly and that keeps H definite for every solver; the rest is of the order
 // of the method's own error.
 //
+// The gyroscopic torque is not taken from f: a body that spins by itself is turned by the midpoint rule, which keeps
+// its energy and its momentum (DynamicalSystem::free_spins), and its impulse J (ω⁺ − ω) stands on the right-hand side.
+// A body that nothing touches in the step also turns by the rule's angle, θ + h (v⁺ − ω⁺) in place of h v⁺.
+//
 // Constraints at the end of the step, again to first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows
-// with b = C(q, t⁺)/h. The part C(q, t)/h of it is error of earlier steps; it is recovered with at most the speed η_s
-// (seed footnote 5). A gap Φ ≥ 0 likewise:
+// with b = C(q, t⁺)/h. A gap Φ ≥ 0 likewise:
 //
-//     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most η_s
+//     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most the speed η_s (seed footnote 5)
 //
-// Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻.
+// A joint's C/h needs no such bound: it pulls both ways, and gains nothing.
+//
+// Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻. The associated
+// law asks for u_n + b ≥ μ |u_t| where Coulomb's has u_n + b ≥ 0: a contact would act, and slow the approach, before it
+// closes; it would push apart what leaves; and a body that slides after the impact would leave faster than e u_n⁻. So
+// contacts with e > 0 take De Saxcé's term s = μ |u_t| into b, by which both laws agree: with the speed before the step
+// where they approach or leave, and where they close with the speed after it, by the iteration s ← μ |u_t⁺(s)|, until s
+// moves by less than 10⁻⁴ of the speed of the approach. Contacts that rest on each other keep the associated law.
 //
 // How far f(q⁺, v⁺, t⁺) is from the linear model is measured after the step (dynamics/linearization.hpp).
 class EulerImplicitLinearized : public Timestepper {
 public:
     EulerImplicitLinearized(DynamicalSystem& system, const std::vector<OptionValue>& values)
         : system_(system),
-          recovery_speed_(values[0].real),
+          recovery_speed_(values[0].real < 0.0 ? system.recovery_speed() : values[0].real),
           restitution_speed_(values[1].real),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
@@ -46,7 +57,6 @@ public:
           blocks_(system.constraint_blocks()),
           n_(system.n()),
           m_(system.m()) {
-        before_.resize(static_cast<std::size_t>(m_));
         after_.resize(static_cast<std::size_t>(m_));
         delta_.resize(static_cast<std::size_t>(n_));
     }
@@ -56,43 +66,23 @@ public:
     void restart() override {
         multipliers_.clear();
         kept_.clear();
-        impulses_.clear();
         last_h_ = 0.0;
     }
 
-    // h, whether there are multipliers, these, and for each unilateral block its key in two halves, which a double
-    // holds exactly, its number of rows and its impulses.
+    // h, whether there are multipliers, these, and the impulses of unilateral blocks.
     std::vector<double> save() const override {
         std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0};
         memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
-        for (const auto& [key, first, rows] : kept_) {
-            memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),
-                                         static_cast<double>(rows)});
-            memory.insert(memory.end(), impulses_.begin() + first, impulses_.begin() + first + rows);
-        }
+        kept_.append_to(memory);
         return memory;
     }
     void load(const std::vector<double>& memory) override {
         restart();
-        auto next = memory.begin();
-        const auto take = [&](std::ptrdiff_t count) {
-            if (count < 0 || memory.end() - next < count)
-                throw InputError("the memory of euler_implicit_linearized is too short");
-            next += count;
-            return next - count;
-        };
-        const auto head = take(2);
-        const auto multipliers = take(head[1] == 0.0 ? 0 : m_);
-        multipliers_.assign(multipliers, next);
-        last_h_ = head[0];
-        while (next != memory.end()) {
-            const auto block = take(3);
-            const auto key = (static_cast<std::uint64_t>(block[0]) << 32U) | static_cast<std::uint64_t>(block[1]);
-            const auto impulse = take(static_cast<std::ptrdiff_t>(block[2]));
-            kept_.push_back({key, static_cast<std::int32_t>(impulses_.size()), static_cast<std::int32_t>(block[2])});
-            impulses_.insert(impulses_.end(), impulse, next);
-        }
-        sort_kept();
+        const auto multipliers = static_cast<std::size_t>(memory.size() > 1 && memory[1] != 0.0 ? m_ : 0);
+        if (memory.size() < 2 + multipliers) throw InputError("the memory of euler_implicit_linearized is too short");
+        last_h_ = memory[0];
+        multipliers_.assign(memory.begin() + 2, memory.begin() + 2 + static_cast<std::ptrdiff_t>(multipliers));
+        kept_.load(std::span(memory).subspan(2 + multipliers));
     }
 
 private:
@@ -106,33 +96,87 @@ private:
         rows_.measure_speeds_at(state.v.data());
         if (system_.has_unilateral()) system_.collect_unilateral(state, h, rows_);
         assemble_balance(state, h);
-        assemble_constraints(state, h);
-        assemble_unilateral(h);
+        assemble_constraints(h);
+        coulomb_ = solver.law() == Law::Coulomb;
+        assemble_unilateral(state, h);
 
-        report.newton_iterations = 1;
+        find_untouched();
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
-        // H and a are looked at once more where the linearisation is judged; else the problem changes hands.
-        report.solved = linearization_.wanted() ? solver.solve(problem_, solution_, true)
-                                                : solver.solve(std::move(problem_), solution_, true);
-        if (!report.solved) report.message = solver.effort().unsolved;
+        solve(solver, report);
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
+        for (const FreeSpin* spin : untouched_)
+            for (std::int32_t i = 0; i < 3; ++i) delta_[spin->column + i] += spin->turn[i] - h * spin->speed[i];
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
         if (linearization_.wanted()) judge_linearization(state, h, report);
         report_reactions(solution_.lambda, h, report);
+        keep(solution_.lambda, h);
         report.contacts.swap(rows_.contacts());
         state = end_;
-        keep(solution_.lambda, h);
         report.multipliers = multipliers_;
     }
 
-    /// Where the impulses of a unilateral block of the last step stand in impulses_.
-    struct Kept {
-        std::uint64_t key;
-        std::int32_t first, rows;
+    // H and a are looked at once more where the linearisation is judged or an impact slides; else the problem changes
+    // hands.
+    void solve(StepSolver& solver, StepReport& report) {
+        const bool again = linearization_.wanted() || !sliding_impacts_.empty();
+        const auto once = [&] {
+            ++report.newton_iterations;
+            const bool solved =
+                again ? solver.solve(problem_, solution_, true) : solver.solve(std::move(problem_), solution_, true);
+            if (solved) return true;
+            report.solved = false;
+            report.message = solver.effort().unsolved;
+            return false;
+        };
+        if (!once()) return;
+        for (int i = 0; !settled(i); ++i) {
+            if (i == most_iterations) {
+                report.solved = false;
+                report.message = "contacts that slide while they bounce did not settle on a speed";
+                return;
+            }
+            if (!once()) return;
+        }
+    }
+
+    /// The sliding speed in the rows of an impact, at the velocities v.
+    [[nodiscard]] double sliding_speed(std::size_t first_row, const std::vector<double>& v) const {
+        double squares = 0.0;
+        for (std::size_t row = first_row + 1; row < first_row + 3; ++row) {
+            double speed = rows_.rows()[row - static_cast<std::size_t>(m_)].rate;
+            for (auto e = problem_.D.row_start[row]; e < problem_.D.row_start[row + 1]; ++e)
+                speed += problem_.D.value[e] * v[problem_.D.column[e]];
+            squares += speed * speed;
+        }
+        return std::sqrt(squares);
+    }
+
+    /// Brings De Saxcé's terms of the impacts to the speeds of the solution; whether they stood there already.
+    bool settled(int iteration) {
+        bool all = true;
+        for (SlidingImpact& impact : sliding_impacts_) {
+            const double wanted = impact.friction * sliding_speed(impact.row, solution_.x);
+            const double change = wanted - impact.term;
+            if (std::abs(change) <= 1e-4 * impact.approach) continue;
+            all = false;
+            impact.term += iteration < 5 ? change : 0.5 * change;
+            problem_.b[impact.row] = impact.offset + impact.term;
+        }
+        return all;
+    }
+
+    /// A contact with friction that closes in this step, and bounces.
+    struct SlidingImpact {
+        std::size_t row;  ///< its normal row in the problem
+        double friction, approach;
+        double offset;  ///< b without De Saxcé's term
+        double term;    ///< which is this
     };
+    static constexpr int most_iterations = 50;
+
     /// What decides whether a unilateral block had an impact in this step.
     struct Approach {
         double gap, speed;  ///< gap ≥ 0; the speed of closing
@@ -143,6 +187,7 @@ private:
     struct Penetrating {
         std::size_t block;  ///< its number
         double rate;        ///< of the row
+        double recovery;    ///< the speed with which it is pushed apart
         std::size_t end;    ///< of its entries, which begin where those of the one before end
     };
 
@@ -153,6 +198,9 @@ private:
         problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
         system_.multiply_mass(state, 1.0, state.v.data(), problem_.a.data());
         system_.add_force(end_, h, problem_.a.data());
+        system_.free_spins(end_, h, spins_);
+        for (const FreeSpin& spin : spins_)
+            for (std::int32_t i = 0; i < 3; ++i) problem_.a[spin.column + i] += spin.impulse[i] - h * spin.torque[i];
         if (system_.has_stiffness()) {
             R_.begin(n_, n_);
             system_.add_damping(end_, h, tangent, R_);
@@ -178,78 +226,100 @@ private:
         system_.multiply_mass(begin, 1.0, delta_.data(), impulse_.data());
         force_.assign(static_cast<std::size_t>(n_), 0.0);
         system_.add_force(end_, h, force_.data());
+        if (!spins_.empty()) {  // their torques count for nothing here: they are not part of the linear model
+            system_.free_spins(end_, h, end_spins_);
+            for (std::size_t k = 0; k < spins_.size(); ++k)
+                for (std::int32_t i = 0; i < 3; ++i)
+                    force_[spins_[k].column + i] += spins_[k].impulse[i] - h * end_spins_[k].torque[i];
+        }
         report.linearization = linearization_.error(begin, end_, h, force_, impulse_, problem_.H);
         linearization_.judge(report.linearization, begin, h, "euler_implicit_linearized");
     }
 
     // D takes its arrays from the unilateral rows where there are no others.
-    void assemble_constraints(const State& state, double h) {
+    void assemble_constraints(double h) {
         problem_.D.rows = 0;
         problem_.D.columns = n_;
         problem_.b.resize(static_cast<std::size_t>(m_) + rows_.rows().size());
         if (m_ == 0) return;
         D_.begin(m_, n_);
         system_.add_constraint_jacobian(end_, 0, D_);
-        system_.constraint(state, before_.data());
         system_.constraint(end_, after_.data());
         for (std::int32_t i = 0; i < m_; ++i) {
-            const double drift = std::clamp(before_[i] / h, -recovery_speed_, recovery_speed_);
-            problem_.b[i] = drift + (after_[i] - before_[i]) / h;
+            problem_.b[i] = after_[i] / h;
         }
         D_.finish_into(problem_.D);
     }
 
     // One walk over the blocks collects their cones, b, their impulses of the last step as a start, and what is needed
-    // of them after the solve. Blocks usually come by ascending keys, the order in which impulses are kept: then each
-    // search for the last impulses begins where the one before ended.
-    void assemble_unilateral(double h) {
+    // of them after the solve.
+    void assemble_unilateral(const State& state, double h) {
         rows_.move_into(problem_.D);
         problem_.cones.resize(blocks_.size() + rows_.blocks().size());
         for (std::size_t k = 0; k < blocks_.size(); ++k) copy_cone(Cone::free(blocks_[k]), problem_.cones[k]);
         auto& lambda = solution_.lambda;
         lambda.resize(problem_.b.size());
         for (std::int32_t i = 0; i < m_; ++i) lambda[i] = multipliers_.empty() ? 0.0 : last_h_ * multipliers_[i];
-        next_kept_.clear();
+        first_row_.clear();
         approaches_.clear();
         penetrating_.clear();
         penetrating_column_.clear();
         penetrating_value_.clear();
+        sliding_impacts_.clear();
         std::int32_t row = 0;
         Cone* cone = problem_.cones.data() + blocks_.size();
-        auto last = kept_.cbegin();
-        for (const auto& block : rows_.blocks()) {
-            const std::int32_t rows = block.cone.rows;
+        kept_.begin_walk();
+        const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
+        for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
+            const auto& block = rows_.blocks()[k];
+            const auto rows = static_cast<std::size_t>(block.cone.rows);
             copy_cone(block.cone, *cone);
             for (auto* bounds : {&cone->lo, &cone->hi})
                 for (double& bound : *bounds) bound *= h;
             ++cone;
-            if (last == kept_.end() || last->key > block.key) last = first_kept(block.key);
-            while (last != kept_.end() && last->key < block.key) ++last;
-            const bool known = last != kept_.end() && last->key == block.key;
-            const bool fits = known && last->rows == rows;
-            for (std::int32_t i = 0; i < rows; ++i) {
-                problem_.b[m_ + row + i] = offset(block, i, row + i, h);
-                lambda[m_ + row + i] = fits ? impulses_[last->first + i] : 0.0;
+            const ContactPoint* contact = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
+            const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
+            for (std::int32_t i = 0; i < block.cone.rows; ++i) {
+                const auto& [gap, rate] = rows_.rows()[row + i];
+                problem_.b[m_ + row + i] = rate + std::max(gap / h, -recovery_speed_);
             }
-            if (block.along_normal() && rows_.rows()[row].gap < 0.0) keep_penetrating(next_kept_.size(), row);
-            next_kept_.push_back({block.key, row, rows});
-            approaches_.push_back({std::max(rows_.rows()[row].gap, 0.0), -block.speed, block.along_normal(),
-                                   known && impulses_[last->first] > 0.0});
-            row += rows;
+            if (block.along_normal()) {
+                if (block.restitution > 0.0) bounce(block, row, pushed, state, h);
+                if (const double gap = rows_.rows()[row].gap; gap < 0.0)
+                    keep_penetrating(k, row, std::min(-gap / h, recovery_speed_));
+            }
+            first_row_.push_back(row);
+            approaches_.push_back({std::max(rows_.rows()[row].gap, 0.0), -block.speed, block.along_normal(), pushed});
+            row += block.cone.rows;
         }
+    }
+
+    /// The first b of a contact with e > 0, whose first row of D_A is `row`.
+    void bounce(const UnilateralRows::Block& block, std::int32_t row, bool pushed, const State& state, double h) {
+        const auto& [gap, rate] = rows_.rows()[row];
+        double& b = problem_.b[m_ + row];
+        const bool closes = block.speed < -restitution_speed_ && gap + h * block.speed <= 0.0;
+        if (closes) b = rate + block.restitution * block.speed;
+        const double friction = block.cone.parameters[0];
+        if (coulomb_ || friction == 0.0 || block.cone.rows != 3 || (pushed && !closes)) return;
+        const auto normal_row = static_cast<std::size_t>(m_ + row);
+        if (closes)
+            sliding_impacts_.push_back({normal_row, friction, -block.speed, b, 0.0});
+        else
+            b += friction * sliding_speed(normal_row, state.v);
     }
 
     // Of impacts: a contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed
     // of Φ/h at least, also where its first speed was less. One that left and comes back within the step, as a ball
-    // that bounces low, does so about as fast. One that penetrates gives the energy λ_n (u_n + u_n⁺)/2 where it pushes
-    // apart.
+    // that bounces low, does so about as fast. One that penetrates gives at most the energy λ_n u where it pushes apart
+    // with the speed u, and the recovery explains no speed beyond its own.
     void report_reactions(const std::vector<double>& lambda, double h, StepReport& report) const {
-        for (std::size_t k = 0; k < next_kept_.size(); ++k) {
-            const auto& [key, first, rows] = next_kept_[k];
+        for (std::size_t k = 0; k < first_row_.size(); ++k) {
+            const std::int32_t first = first_row_[k], rows = rows_.blocks()[k].cone.rows;
             const double reaction = lambda[m_ + first];
             const auto& [gap, approach, along_normal, pushed_before] = approaches_[k];
             BlockReaction& acted = report.reactions.emplace_back();
-            acted.key = key;
+            acted.key = rows_.blocks()[k].key;
             for (std::int32_t i = 0; i < std::min(rows, 3); ++i) acted.force[i] = lambda[m_ + first + i] / h;
             if (reaction != 0.0) ++report.active_blocks;
             if (!along_normal || !(reaction > 0.0)) continue;
@@ -260,51 +330,41 @@ private:
             }
         }
         std::size_t entry = 0;
-        for (const auto& [block, rate, end] : penetrating_) {
+        for (const auto& [block, rate, recovery, end] : penetrating_) {
             double speed = rate;
             for (; entry < end; ++entry) speed += penetrating_value_[entry] * end_.v[penetrating_column_[entry]];
-            const double reaction = lambda[m_ + next_kept_[block].first];
-            report.recovered += std::max(0.5 * reaction * (speed - approaches_[block].speed), 0.0);
+            const double reaction = lambda[m_ + first_row_[block]];
+            const double before = -approaches_[block].speed;
+            report.recovered += reaction * std::clamp(std::max(speed, 0.5 * (speed + before)), 0.0, recovery);
         }
     }
 
     /// Of the normal row of a block that penetrates, which is a row of D as long as that is not solved for.
-    void keep_penetrating(std::size_t block, std::size_t row) {
+    void keep_penetrating(std::size_t block, std::size_t row, double recovery) {
         const auto& [rows, columns, row_start, column, value] = problem_.D;
         const auto first = row_start[m_ + row], last = row_start[m_ + row + 1];
         penetrating_column_.insert(penetrating_column_.end(), column.begin() + first, column.begin() + last);
         penetrating_value_.insert(penetrating_value_.end(), value.begin() + first, value.begin() + last);
-        penetrating_.push_back({block, rows_.rows()[row].rate, penetrating_value_.size()});
+        penetrating_.push_back({block, rows_.rows()[row].rate, recovery, penetrating_value_.size()});
     }
 
-    /// b of row number `row`, the i-th of its block.
-    [[nodiscard]] double offset(const UnilateralRows::Block& block, std::int32_t i, std::int32_t row, double h) const {
-        const auto& [gap, rate] = rows_.rows()[row];
-        if (i == 0 && block.along_normal() && block.restitution > 0.0 && block.speed < -restitution_speed_ &&
-            gap + h * block.speed <= 0.0)
-            return rate + block.restitution * block.speed;
-        return rate + std::max(gap / h, -recovery_speed_);
-    }
-
-    /// The first with a key not less.
-    [[nodiscard]] std::vector<Kept>::const_iterator first_kept(std::uint64_t key) const {
-        return std::lower_bound(kept_.begin(), kept_.end(), key,
-                                [](const Kept& kept, std::uint64_t wanted) { return kept.key < wanted; });
+    /// Of spins_, those whose body no force but weight and no row of D acts on.
+    void find_untouched() {
+        untouched_.clear();
+        if (spins_.empty()) return;
+        held_.assign(static_cast<std::size_t>(n_), false);
+        for (const std::int32_t column : problem_.D.column) held_[column] = true;
+        for (const FreeSpin& spin : spins_) {
+            const auto first = held_.begin() + spin.column;
+            if (spin.alone && std::find(first, first + 3, true) == first + 3) untouched_.push_back(&spin);
+        }
     }
 
     void keep(const std::vector<double>& lambda, double h) {
         last_h_ = h;
         multipliers_.resize(static_cast<std::size_t>(m_));
         for (std::int32_t i = 0; i < m_; ++i) multipliers_[i] = lambda[i] / h;
-        impulses_.assign(lambda.begin() + m_, lambda.end());
-        kept_.swap(next_kept_);
-        sort_kept();
-    }
-    void sort_kept() {
-        const auto before = [](const Kept& a, const Kept& b) {
-            return a.key != b.key ? a.key < b.key : a.first < b.first;
-        };
-        if (!std::is_sorted(kept_.begin(), kept_.end(), before)) std::sort(kept_.begin(), kept_.end(), before);
+        kept_.keep(rows_.blocks(), rows_.contacts(), std::span(lambda).subspan(static_cast<std::size_t>(m_)));
     }
 
     DynamicalSystem& system_;
@@ -316,12 +376,16 @@ private:
     std::int32_t n_, m_;
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
-    std::vector<double> before_, after_, delta_, impulse_, force_;
+    std::vector<double> after_, delta_, impulse_, force_;
     double last_h_ = 0.0;
-    std::vector<Kept> kept_;  // by ascending keys
-    std::vector<double> impulses_;
-    std::vector<Kept> next_kept_;       // of the blocks of rows_, in their order
-    std::vector<Approach> approaches_;  // likewise
+    KeptImpulses kept_;
+    bool coulomb_ = false;                 // the law that the solver was told
+    std::vector<std::int32_t> first_row_;  // of the blocks of rows_, in their order
+    std::vector<Approach> approaches_;     // likewise
+    std::vector<SlidingImpact> sliding_impacts_;
+    std::vector<FreeSpin> spins_, end_spins_;
+    std::vector<const FreeSpin*> untouched_;
+    std::vector<bool> held_;  // columns that D touches
     std::vector<Penetrating> penetrating_;
     std::vector<std::int32_t> penetrating_column_;
     std::vector<double> penetrating_value_;
@@ -336,11 +400,12 @@ const RegisterTimestepper euler_implicit_linearized_row{
      .description = "linearised implicit Euler for contacts, impacts and constraints; one problem a step",
      .options = {{.key = "recovery_speed",
                   .type = DELASSUS_OPTION_REAL,
-                  .default_value = "inf",
-                  .minimum = 0.0,
+                  .default_value = "-1",
+                  .minimum = -1.0,
                   .maximum = HUGE_VAL,
                   .unit = "m/s",
-                  .doc = "largest speed with which errors of position are corrected"},
+                  .doc = "largest speed with which penetration is corrected; negative: a hundredth of the speed that "
+                         "a fall through the size of the shapes gives"},
                  {.key = "restitution_speed",
                   .type = DELASSUS_OPTION_REAL,
                   .default_value = "0",

@@ -75,8 +75,11 @@ inline void expect_derivatives(const DynamicalSystem& system, const State& state
         down.v[static_cast<std::size_t>(j)] -= step;
         R_expected.col(j) = -(force(up) - force(down)) / (2.0 * step);
     }
-    expect_near(matrix(n, [&](auto& H) { system.add_damping(state, 1.0, Tangent::Exact, H); }), R_expected, tolerance,
-                "R");
+    const MatrixXd R = matrix(n, [&](auto& H) {
+        system.add_damping(state, 1.0, Tangent::Exact, H);
+        system.add_gyroscopic_damping(state, 1.0, Tangent::Exact, H);
+    });
+    expect_near(R, R_expected, tolerance, "R");
     const MatrixXd M = matrix(n, [&](auto& H) { system.add_mass(state, 1.0, H); });
     VectorXd Mx = VectorXd::Zero(n);
     const VectorXd x = VectorXd::LinSpaced(n, -1.0, 2.0);

@@ -135,6 +135,9 @@ void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outco
                        fmt::join(simulation.solver().loaded(), ", "), totals.plugin_solves, totals.solver_iterations,
                        totals.solver_seconds, totals.worst_natural);
         }
+        if (totals.repeated_solves > 0)
+            fmt::print("  {} solves missed the tolerance with {} and were repeated with auto\n", totals.repeated_solves,
+                       system.solver.name);
     }
     if (outcome.status != "finished") fmt::print("{}\n", outcome.status);
 }

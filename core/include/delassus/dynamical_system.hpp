@@ -45,6 +45,16 @@ struct DiagonalBlock3 {
     double value[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};  ///< row-major
 };
 
+/// How a body turns in a step of size h where no torque acts on it.
+struct FreeSpin {
+    std::int32_t column = 0;          ///< the first of the three of its angular velocity ω
+    bool alone = false;               ///< no constraint holds it and no force but weight acts on it; contacts apart
+    std::array<double, 3> torque{};   ///< the part of add_force() that turns ω, now
+    std::array<double, 3> impulse{};  ///< what it gives in the step, J (ω⁺ − ω)
+    std::array<double, 3> speed{};    ///< ω⁺
+    std::array<double, 3> turn{};     ///< θ: the orientation becomes that of now ∘ exp(θ)
+};
+
 /// Unilateral rows and rows with bounded forces, collected block by block. A row is one of D_A with
 ///     u = D_A v + rate (+ gap/h in a step of size h)
 class UnilateralRows {
@@ -171,12 +181,17 @@ public:
     virtual void add_force(const State& state, double factor, double* result) const = 0;
     /// H += factor · K, K = −∂f/∂q along increments. Default: nothing (f does not depend on q).
     virtual void add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
-    /// H += factor · R, R = −∂f/∂v. Default: nothing.
+    /// H += factor · R, R = −∂f/∂v without the gyroscopic part. Default: nothing.
     virtual void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
+    /// H += factor · R of the gyroscopic forces that free_spins() knows. Default: nothing.
+    virtual void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
+    /// Of each body with a gyroscopic torque, its spin in a step of size h from this state, by a rule that keeps energy
+    /// and momentum; the same bodies in the same order for any state. Default: none.
+    virtual void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const;
     /// H += factor · ∂(M(q) a)/∂q for a fixed acceleration a; n. Default: nothing (M is constant).
     virtual void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
                                         MatrixAssembler& H) const;
-    /// Whether add_stiffness or add_damping ever add anything: a step without them factorises nothing.
+    /// Whether add_stiffness or add_damping ever adds anything: a step without them factorises nothing.
     [[nodiscard]] virtual bool has_stiffness() const;
 
     // ---- Bilateral constraints; nothing by default. Timesteppers ask for them only where m() > 0. ----
@@ -203,6 +218,10 @@ public:
     [[nodiscard]] virtual bool has_unilateral() const;
     /// The rows that may become active within a step of size h.
     virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);
+
+    /// Largest speed with which a step should push apart what penetrates, where its user says nothing. Default: 0.01,
+    /// the source's advice in m/s (seed footnote 5).
+    [[nodiscard]] virtual double recovery_speed() const;
 
     // ---- What is conserved; for reports ----
 

@@ -322,6 +322,8 @@ public:
     void add_force(const State& state, double factor, double* result) const override;
     void add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
+    void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
+    void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const override;
     [[nodiscard]] bool has_stiffness() const override;
     void constraint(const State& state, double* C) const override;
     void add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const override;
@@ -333,6 +335,9 @@ public:
                                            MatrixAssembler& H) const override;
     [[nodiscard]] bool has_unilateral() const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
+    /// A hundredth of √(g s), the speed that a fall through s gives but for a factor, s being the median size of the
+    /// shapes; without gravity, of the fastest speed at the start; where nothing moves, of s a second.
+    [[nodiscard]] double recovery_speed() const override;
     [[nodiscard]] double energy(const State& state) const override;
 
 private:

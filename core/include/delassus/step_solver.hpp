@@ -26,7 +26,9 @@ struct SolverEffort {
     std::int64_t resting_parts = 0;  ///< parts with rows that were left out because they stand still
     std::int64_t iterations = 0;     ///< of the plugin
     double seconds = 0.0;            ///< set-up and solve
-    double worst_natural = 0.0;      ///< largest natural error of a plugin solve
+    std::int64_t repeated = 0;       ///< solves that `auto` repeated, since the configured solver missed its tolerance
+    double worst_natural = 0.0;      ///< largest natural error of an answer that was used
+    double worst_unsolved = 0.0;     ///< of these, of those that missed their tolerance; 0: none
     std::string unsolved;            ///< the first message of a solve that did not end solved; empty if none
 };
 
@@ -68,11 +70,15 @@ public:
     DELASSUS_API void leave_nothing_out();
 
     /// Solves the problem of a step. solution: the start if warm_start, then the result. Throws Unsupported if the
-    /// configured solver cannot take the problem, InputError if the problem is not valid. A solve that does not reach
-    /// its tolerance is counted in effort() and in the answer; the best iterate is in solution.
+    /// configured solver cannot take the problem, InputError if the problem is not valid. A solve by a configured
+    /// solver that misses its tolerance is repeated by `auto`. One that misses it still is counted in effort() and in
+    /// the answer; the best iterate is in solution.
     DELASSUS_API bool solve(const Problem& problem, Solution& solution, bool warm_start);
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
     DELASSUS_API bool solve(Problem&& problem, Solution& solution, bool warm_start);
+
+    /// The law of friction by which problems are solved.
+    [[nodiscard]] DELASSUS_API Law law() const;
 
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;
     DELASSUS_API void reset_effort();

@@ -178,7 +178,7 @@ AdaptiveStepping::Trial AdaptiveStepping::until_impact(const State& begin, doubl
 AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double end, StepSolver& solver) {
     restore(memory_);
     const double remaining = end - state.t;
-    report_.h = std::min(impact_step(), remaining);
+    report_.h = remaining < impact_step() + control_.smallest ? remaining : impact_step();
     report_.impact = true;
     const std::int32_t iterations = report_.step.newton_iterations;
     report_.step = stepper_.step(state, report_.h, solver);
@@ -218,8 +218,11 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         try {
             trial = take(state, h, solver);
             const double impact = impact_in(trial, h);
-            if (impact > impact_step() && std::isfinite(impact)) trial = until_impact(state, impact, h, solver);
-            if (impact <= impact_step() || h == 0.0) return take_impact(state, end, solver);
+            if (impact > impact_step() && std::isfinite(impact)) {
+                trial = until_impact(state, impact, h, solver);
+                if (remaining - h < control_.smallest) h = 0.0;  // what would remain is no step
+            }
+            if (impact <= impact_step() || h < control_.smallest) return take_impact(state, end, solver);
         } catch (const StepFailure& error) {
             if (smallest) throw;
             failure = error.what();

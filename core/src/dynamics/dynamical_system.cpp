@@ -108,6 +108,13 @@ void DynamicalSystem::inverse_tangent(const double*, std::vector<DiagonalBlock3>
 
 void DynamicalSystem::add_stiffness(const State&, double, Tangent, MatrixAssembler&) const {}
 void DynamicalSystem::add_damping(const State&, double, Tangent, MatrixAssembler&) const {}
+void DynamicalSystem::add_gyroscopic_damping(const State&, double, Tangent, MatrixAssembler&) const {}
+void DynamicalSystem::free_spins(const State&, double, std::vector<FreeSpin>& spins) const {
+    spins.clear();
+}
+double DynamicalSystem::recovery_speed() const {
+    return 0.01;
+}
 void DynamicalSystem::add_inertial_stiffness(const State&, const double*, double, Tangent, MatrixAssembler&) const {}
 bool DynamicalSystem::has_stiffness() const {
     return true;

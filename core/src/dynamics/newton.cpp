@@ -111,6 +111,7 @@ const SparseMatrix& Newton::matrix(const StepPoint& point, StepSlopes slopes) {
     rates_.begin(n_, n_);
     system_.add_mass(point.state, 1.0, rates_);
     if (system_.has_stiffness()) system_.add_damping(point.state, s * slopes.gamma, tangent, rates_);
+    system_.add_gyroscopic_damping(point.state, s * slopes.gamma, tangent, rates_);
     system_.inverse_tangent(point.delta.data(), blocks_);
     H_.begin(n_, n_);
     add_product(rates_.finish(), blocks_, H_);

@@ -51,6 +51,11 @@ struct StepSolver::Implementation {
 
     /// Takes the arrays of the problem and leaves others.
     bool solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number);
+    /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
+    /// solution, what it is worth in report.
+    void solve_again(const PreparedProblem& prepared, const Solution& first, bool warm_start, Solution& solution,
+                     SolveReport& report);
+    void count(const SolveReport& report);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -60,7 +65,9 @@ struct StepSolver::Implementation {
     std::uint64_t also_needs = 0;  ///< of every problem, where nothing is left out
     SolverConfig config;
     SolveSettings settings;
-    std::vector<Solver> solvers;  // instances by the number of the part
+    std::vector<Solver> solvers;     // instances by the number of the part
+    std::optional<Solver> fallback;  // `auto`, where the configured solver is another
+    Solution before;                 // the start of the part that is solved
     std::set<std::string> loaded;
     Islands islands;
     std::deque<KeptPart> parts;  // by the number of the part
@@ -154,20 +161,50 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     Solver& solver = this->solver(number % most_instances);
     SolveSettings part_settings = settings;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
-    const auto report = solver.solve(prepared, solution, part_settings);
+    const bool may_repeat = config.name != auto_name;
+    if (may_repeat && part_settings.warm_start) before = solution;
+    SolveReport report = solver.solve(prepared, solution, part_settings);
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
-    if (report.stages.empty()) loaded.insert(config.name);
-    for (const auto& stage : report.stages) loaded.insert(stage.solver);
     ++effort.plugin_solves;
-    effort.iterations += report.iterations;
-    effort.seconds += report.seconds_setup + report.seconds_solve;
+    count(report);
+    if (report.status != Status::Solved && may_repeat)
+        solve_again(prepared, before, part_settings.warm_start, solution, report);
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
     if (report.status == Status::Solved) return true;
+    effort.worst_unsolved = std::max(effort.worst_unsolved, report.error.natural);
     if (effort.unsolved.empty())
         effort.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
                         report.error.natural, report.message.empty() ? "" : ": ", report.message);
     return false;
+}
+
+void StepSolver::Implementation::count(const SolveReport& report) {
+    if (report.stages.empty()) loaded.insert(report.solver);
+    for (const auto& stage : report.stages) loaded.insert(stage.solver);
+    effort.iterations += report.iterations;
+    effort.seconds += report.seconds_setup + report.seconds_solve;
+}
+
+void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, const Solution& first, bool warm_start,
+                                             Solution& solution, SolveReport& report) {
+    if (!fallback) {
+        SolverConfig other = config;
+        other.name = auto_name;
+        other.options = {{"simulation", "true"}};
+        fallback = make_solver(registry, other);
+    }
+    SolveSettings again = settings;
+    again.warm_start = warm_start;
+    again.max_iterations = SolveSettings{}.max_iterations;
+    Solution other = warm_start ? first : Solution{};
+    SolveReport second = fallback->solve(prepared, other, again);
+    if (settings.cancelled && second.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
+    count(second);
+    ++effort.repeated;
+    if (second.status != Status::Solved && !(second.error.natural < report.error.natural)) return;
+    solution = std::move(other);
+    report = std::move(second);
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
@@ -194,6 +231,10 @@ std::string StepSolver::choice(std::uint64_t needs) const {
     const auto choice =
         auto_choice(implementation_->registry, config.options, needs, implementation_->settings.tolerance);
     return choice.first.empty() ? std::string() : choice.first.front();
+}
+
+Law StepSolver::law() const {
+    return implementation_->config.law.value_or(Law::Associated);
 }
 
 const SolverEffort& StepSolver::effort() const {

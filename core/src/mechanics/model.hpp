@@ -23,7 +23,9 @@ struct Body {
 struct MovingBody {
     BodyIndex body = -1;
     std::int32_t position = -1, column = -1;
-    bool diagonal = false;  ///< the inertia
+    bool diagonal = false;    ///< the inertia
+    bool gyroscopic = false;  ///< its moments differ
+    bool alone = true;        ///< no joint holds it, and no force but weight acts on it; contacts apart
     double mass = 0.0;
     Matrix3d inertia = Matrix3d::Identity();
 };

@@ -263,9 +263,15 @@ void MultibodySystem::finish() {
         self.position_size += 7;
         self.n += 6;
         const Matrix3d& J = body.inertia;
-        self.moving.push_back(
-            {static_cast<BodyIndex>(k), body.position, body.column, J.isDiagonal(0.0), body.parameters.mass, J});
-        if (!J.isApprox(J(0, 0) * Matrix3d::Identity(), 1e-14)) self.gyroscopic = true;
+        const bool gyroscopic = !J.isApprox(J(0, 0) * Matrix3d::Identity(), 1e-14);
+        self.moving.push_back({.body = static_cast<BodyIndex>(k),
+                               .position = body.position,
+                               .column = body.column,
+                               .diagonal = J.isDiagonal(0.0),
+                               .gyroscopic = gyroscopic,
+                               .mass = body.parameters.mass,
+                               .inertia = J});
+        self.gyroscopic = self.gyroscopic || gyroscopic;
     }
     for (auto& node : self.nodes) {
         if (node.parameters.fixed) continue;
@@ -284,7 +290,25 @@ void MultibodySystem::finish() {
         self.m += joint.row_count();
     }
     self.finished = true;
+    self.find_bodies_alone(*this);
     self.make_detector();
+}
+
+// By the entries that forces and constraints add at the start.
+void MultibodySystem::Implementation::find_bodies_alone(const MultibodySystem& system) {
+    if (!gyroscopic) return;
+    const State start = system.initial_state();
+    MatrixAssembler matrix;
+    matrix.begin(std::max(n, m), n);
+    if (m > 0) system.add_constraint_jacobian(start, 0, matrix);
+    system.add_stiffness(start, 1.0, Tangent::Exact, matrix);
+    system.add_damping(start, 1.0, Tangent::Exact, matrix);
+    std::vector<bool> held(static_cast<std::size_t>(n), false);
+    for (const std::int32_t column : matrix.finish().column) held[static_cast<std::size_t>(column)] = true;
+    for (auto& body : moving) {
+        const auto first = held.begin() + body.column;
+        body.alone = std::find(first, first + 6, true) == first + 6;
+    }
 }
 
 // ---- Reading states ----

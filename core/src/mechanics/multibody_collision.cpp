@@ -29,15 +29,15 @@ double size_of(const Shape& shape) {
     }
 }
 
-/// A twentieth of the median size.
-double envelope_for(const std::vector<Shape>& shapes) {
+/// The median size of shapes that have one; 0 if none has.
+double median_size(const std::vector<Shape>& shapes) {
     std::vector<double> sizes;
     for (const auto& shape : shapes)
         if (const double size = size_of(shape); size > 0.0) sizes.push_back(size);
     if (sizes.empty()) return 0.0;
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
-    return 0.05 * *middle;
+    return *middle;
 }
 
 }  // namespace
@@ -73,10 +73,24 @@ void MultibodySystem::Implementation::make_detector() {
         if (!leaves_out) static_cast<void>(make_collision_detector({}));
         return;
     }
-    if (envelope == 0.0) envelope = envelope_for(setup.shapes);
+    size = median_size(setup.shapes);
+    if (envelope == 0.0) envelope = 0.05 * size;
     poses.resize(bodies.size() + nodes.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) poses[k] = bodies[k].parameters.pose;
     detector = make_collision_detector(std::move(setup));
+}
+
+double MultibodySystem::recovery_speed() const {
+    const auto& self = *implementation_;
+    if (self.size == 0.0) return DynamicalSystem::recovery_speed();
+    constexpr double share = 0.01;
+    if (const double g = vector(self.gravity).norm(); g > 0.0) return share * std::sqrt(g * self.size);
+    double fastest = 0.0;
+    for (const auto& body : self.moving) {
+        const auto& start = self.bodies[static_cast<std::size_t>(body.body)].parameters;
+        fastest = std::max({fastest, vector(start.velocity).norm(), vector(start.angular_velocity).norm() * self.size});
+    }
+    return share * (fastest > 0.0 ? fastest : self.size);
 }
 
 }  // namespace delassus

@@ -155,22 +155,10 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
     }
 }
 
-// Gyroscopic: R = ∂(ω̄ × J ω̄)/∂ω̄ = [ω̄]× J − [J ω̄]×. Its symmetric part ½([ω̄]× J − J [ω̄]×) is indefinite; beside J it
-// stays harmless while factor |R| is small against J. Beyond that (fast spin) it would make H indefinite, and it is
-// left out of the symmetric tangent: a step is consistent with any tangent. Springs: R = c ∇C ∇Cᵀ.
+// Springs: R = c ∇C ∇Cᵀ.
 void MultibodySystem::add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), state.v.data());
-    for (std::size_t k = 0; k < self.moving.size() && self.gyroscopic; ++k) {
-        const auto& body = self.moving[k];
-        const Vector3d& omega = self.at[body.body].omega;
-        Matrix3d R = skew(omega) * body.inertia - skew(body.inertia * omega);
-        if (tangent == Tangent::Symmetric) {
-            R = (0.5 * (R + R.transpose())).eval();
-            if (std::abs(factor) * R.norm() > 0.25 * body.inertia.diagonal().minCoeff()) R.setZero();
-        }
-        add_matrix(body.column + 3, body.column + 3, R, factor, tangent, H);
-    }
     for (const auto& spring : self.springs) {
         if (spring.damping == 0.0) continue;
         const auto columns = spring.row.columns(self.at);
@@ -189,8 +177,8 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
 
 bool MultibodySystem::has_stiffness() const {
     const auto& self = *implementation_;
-    return self.gyroscopic || !self.springs.empty() || !self.loads.empty() || !self.tetrahedra.empty() ||
-           !self.cables.empty() || !self.beams.empty();
+    return !self.springs.empty() || !self.loads.empty() || !self.tetrahedra.empty() || !self.cables.empty() ||
+           !self.beams.empty();
 }
 
 }  // namespace delassus

@@ -40,6 +40,7 @@ struct MultibodySystem::Implementation {
     std::int32_t n = 0, position_size = 0, m = 0;
     std::vector<mechanics::MovingBody> moving;
     bool gyroscopic = false;  // a moving body whose moments differ
+    double size = 0.0;        // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
     bool leaves_out = true;  ///< what no contact needs
 
@@ -114,6 +115,7 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
     [[nodiscard]] Pose pose_of(std::size_t body, const double* q) const;
     void make_detector();
+    void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;
     void collect_motors(double t, UnilateralRows& rows) const;

@@ -20,8 +20,26 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Remaining times within this fraction of a step are whole steps that rounding spoiled.
+/// Times within this fraction of a step are equal but for rounding.
 constexpr double rounding_of_step = 1e-9;
+
+/// A step of fixed size from t: its size, and the time that it reaches.
+struct FixedStep {
+    double h, end;
+};
+
+// Times are multiples of the step, counted, not summed: t = k h. Where `end` is no multiple, the last steps share what
+// remains, so that none is shorter than half a step: a sliver would divide C and Φ by next to nothing. A run that is
+// ended here or goes on later takes the same steps up to the last two.
+FixedStep fixed_step(double t, double end, double h) {
+    const double remaining = end - t;
+    if (remaining <= (1.0 + rounding_of_step) * h)
+        return {remaining >= (1.0 - rounding_of_step) * h ? h : remaining, end};
+    if (remaining < (1.5 - rounding_of_step) * h) return {0.5 * remaining, t + 0.5 * remaining};
+    const double count = std::round(t / h);
+    const bool on_grid = std::abs(t - count * h) <= rounding_of_step * h;
+    return {h, on_grid ? (count + 1.0) * h : t + h};
+}
 
 /// Throws Unsupported if the system's timestepper solves for more than the velocities of one step.
 void require_sleeping(const SceneSystem& system) {
@@ -32,6 +50,14 @@ void require_sleeping(const SceneSystem& system) {
     }
     throw Unsupported(fmt::format("{} cannot leave out bodies that sleep. Can: {}; or remove \"sleeping\"",
                                   system.integrator, fmt::join(able, ", ")));
+}
+
+/// Throws StepFailure if a solve missed its tolerance by orders. Within two orders, or near rounding, the run goes on
+/// and says at its end that it is not solved.
+void require_usable(const SolverEffort& effort, double tolerance) {
+    if (const double limit = std::max(100.0 * tolerance, 1e-6); effort.worst_unsolved > limit)
+        throw StepFailure(
+            fmt::format("{}, where {:.1e} was asked for: such an answer is not used", effort.unsolved, tolerance));
 }
 
 }  // namespace
@@ -81,11 +107,11 @@ void Simulation::advance(State& state, AdaptiveStepReport& report) {
         report = control_->step(state, system_->end, *solver_);
         return;
     }
-    // A whole step unless the end comes sooner: a run that is ended here or goes on later takes the same steps.
-    const double remaining = system_->end - state.t;
-    report.h = remaining < (1.0 - rounding_of_step) * system_->step ? remaining : system_->step;
+    const FixedStep step = fixed_step(state.t, system_->end, system_->step);
+    report.h = step.h;
     if (sleeping_) sleeping_->begin_step(report.h);
     timestepper_->step(state, report.h, *solver_, report.step);
+    state.t = step.end;
     if (sleeping_) sleeping_->end_step(now_.state, state);
 }
 
@@ -147,6 +173,7 @@ const StepRecord& Simulation::step() {
     };
     try {
         advance(next, taken);
+        require_usable(solver_->effort(), system_->solver.settings().tolerance);
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
         measure(next, now_.step + 1);
@@ -192,6 +219,7 @@ const StepRecord& Simulation::step() {
     }
     totals.plugin_solves += effort.plugin_solves;
     totals.resting_parts += effort.resting_parts;
+    totals.repeated_solves += effort.repeated;
     totals.solver_seconds += effort.seconds;
     if (!report.solved) {
         ++totals.unsolved_steps;
@@ -206,10 +234,8 @@ std::vector<ContactRecord> Simulation::contacts() const {
     contacts.reserve(report().contacts.size());
     auto reaction = report().reactions.end() - static_cast<std::ptrdiff_t>(report().contacts.size());
     for (const ContactPoint& contact : report().contacts) {
-        Eigen::Vector3d normal(contact.normal.data()), first, second;
-        tangents(normal, first, second);  // the directions of the contact's rows
-        const auto [n, t, s] = (reaction++)->force;
-        const Eigen::Vector3d force = n * normal + t * first + s * second;
+        const Eigen::Vector3d rows((reaction++)->force.data());
+        const Eigen::Vector3d force = contact_frame(Eigen::Vector3d(contact.normal.data())) * rows;
         ContactRecord& record = contacts.emplace_back();
         record.bodies = system_->system->contact_bodies(contact);
         for (std::size_t k = 0; k < 3; ++k) record.point[k] = 0.5 * (contact.point_a[k] + contact.point_b[k]);

@@ -15,19 +15,28 @@ inline Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
     return result;
 }
 
-/// A unit vector normal to a unit vector: from the axis that is least along it, the first of equals. Continuous almost
-/// everywhere.
+/// A unit vector normal to a unit vector: the x axis without its part along `direction`, or the y axis where x is
+/// nearly along it. Normals of grounds, walls and aligned boxes lie where it is continuous: it jumps at |direction.x| =
+/// 0.9 only, so that rounding does not turn the frame of a contact at rest.
 inline Eigen::Vector3d normal_to(const Eigen::Vector3d& direction) {
-    int least = 0;
-    for (int i = 1; i < 3; ++i)
-        if (std::abs(direction[i]) < std::abs(direction[least])) least = i;
-    return (Eigen::Vector3d::Unit(least) - direction[least] * direction).normalized();
+    const int axis = std::abs(direction.x()) < 0.9 ? 0 : 1;
+    return (Eigen::Vector3d::Unit(axis) - direction[axis] * direction).normalized();
 }
 
 /// Two unit vectors t₁, t₂ with t₁ × t₂ = normal.
 inline void tangents(const Eigen::Vector3d& normal, Eigen::Vector3d& first, Eigen::Vector3d& second) {
     first = normal_to(normal);
     second = normal.cross(first);
+}
+
+/// The rotation whose columns are a contact's directions: the normal, then its tangents. Three rows of a contact give
+/// R r in space, and Rᵀ of a vector in space gives them back.
+inline Eigen::Matrix3d contact_frame(const Eigen::Vector3d& normal) {
+    Eigen::Matrix3d frame;
+    frame.col(0) = normal;
+    frame.col(1) = normal_to(normal);
+    frame.col(2) = normal.cross(frame.col(1));
+    return frame;
 }
 
 }  // namespace delassus

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The impulses of unilateral blocks, from one step to the next (internal).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "delassus/dynamical_system.hpp"
+#include "delassus/export.hpp"
+
+namespace delassus {
+
+/// What acted in each unilateral block of the last step, found again by the block's key: the start of the next solve.
+/// The impulse of a contact is kept as a vector in space, since the tangents of its rows may turn.
+class DELASSUS_API KeptImpulses {
+public:
+    void clear();
+
+    /// Begins a walk over the blocks of a step; blocks usually come by ascending keys, so that each search begins where
+    /// the one before ended.
+    void begin_walk() { next_ = 0; }
+    /// lambda ← the block's impulse of the last step, in the block's rows; 0 where there was none. contact: the block's
+    /// contact, or null. Returns whether the block pushed: its first row had a positive impulse.
+    bool start(const UnilateralRows::Block& block, const ContactPoint* contact, std::span<double> lambda);
+
+    /// Keeps the impulses of these blocks. contacts: of the last blocks; lambda: of the blocks' rows.
+    void keep(std::span<const UnilateralRows::Block> blocks, std::span<const ContactPoint> contacts,
+              std::span<const double> lambda);
+
+    /// For checkpoints: of each block its key in two halves, which a double holds exactly, its number of rows and its
+    /// impulses.
+    void append_to(std::vector<double>& memory) const;
+    /// Takes what append_to() gave. Throws InputError if it ends within a block.
+    void load(std::span<const double> memory);
+
+private:
+    struct Entry {
+        std::uint64_t key;
+        std::int32_t first, rows;  ///< in impulses_
+    };
+    void sort();
+
+    std::vector<Entry> entries_;  // by ascending keys
+    std::vector<double> impulses_;
+    std::size_t next_ = 0;
+};
+
+}  // namespace delassus
