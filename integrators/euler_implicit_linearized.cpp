@@ -42,7 +42,9 @@ namespace {
 // closes; it would push apart what leaves; and a body that slides after the impact would leave faster than e u_n⁻. So
 // contacts with e > 0 take De Saxcé's term s = μ |u_t| into b, by which both laws agree: with the speed before the step
 // where they approach or leave, and where they close with the speed after it, by the iteration s ← μ |u_t⁺(s)|, until s
-// moves by less than 10⁻⁴ of the speed of the approach. Contacts that rest on each other keep the associated law.
+// moves by less than 10⁻⁴ of the speed of the approach. Contacts that rest on each other keep the associated law, under
+// which a sliding one floats at the height h μ |u_t|. Where steps are chosen by their error that height would jump with
+// h: all contacts that pushed then take s of the speed after the step, to 10⁻⁶ of the speed that they slide with.
 //
 // How far f(q⁺, v⁺, t⁺) is from the linear model is measured after the step (dynamics/linearization.hpp).
 class EulerImplicitLinearized : public Timestepper {
@@ -63,6 +65,7 @@ public:
 
     [[nodiscard]] int order() const override { return 1; }
     [[nodiscard]] bool damps_at_once() const override { return true; }
+    void choose_steps() override { follows_sliding_ = true; }
     void restart() override {
         multipliers_.clear();
         kept_.clear();
@@ -118,10 +121,10 @@ private:
         report.multipliers = multipliers_;
     }
 
-    // H and a are looked at once more where the linearisation is judged or an impact slides; else the problem changes
+    // H and a are looked at once more where the linearisation is judged or contacts slide; else the problem changes
     // hands.
     void solve(StepSolver& solver, StepReport& report) {
-        const bool again = linearization_.wanted() || !sliding_impacts_.empty();
+        const bool again = linearization_.wanted() || !sliding_.empty();
         const auto once = [&] {
             ++report.newton_iterations;
             const bool solved =
@@ -135,14 +138,14 @@ private:
         for (int i = 0; !settled(i); ++i) {
             if (i == most_iterations) {
                 report.solved = false;
-                report.message = "contacts that slide while they bounce did not settle on a speed";
+                report.message = "the speeds of sliding contacts did not settle";
                 return;
             }
             if (!once()) return;
         }
     }
 
-    /// The sliding speed in the rows of an impact, at the velocities v.
+    /// The sliding speed in the rows of a contact, at the velocities v.
     [[nodiscard]] double sliding_speed(std::size_t first_row, const std::vector<double>& v) const {
         double squares = 0.0;
         for (std::size_t row = first_row + 1; row < first_row + 3; ++row) {
@@ -154,26 +157,29 @@ private:
         return std::sqrt(squares);
     }
 
-    /// Brings De Saxcé's terms of the impacts to the speeds of the solution; whether they stood there already.
+    /// Brings De Saxcé's terms to the speeds of the solution; whether they stood there already.
     bool settled(int iteration) {
         bool all = true;
-        for (SlidingImpact& impact : sliding_impacts_) {
-            const double wanted = impact.friction * sliding_speed(impact.row, solution_.x);
-            const double change = wanted - impact.term;
-            if (std::abs(change) <= 1e-4 * impact.approach) continue;
+        double rounding = 0.0;
+        for (const double speed : solution_.x) rounding = std::max(rounding, 1e-7 * std::abs(speed));
+        for (Sliding& contact : sliding_) {
+            const double wanted = contact.friction * sliding_speed(contact.row, solution_.x);
+            const double change = wanted - contact.term;
+            if (std::abs(change) <= std::max(contact.enough, rounding)) continue;
             all = false;
-            impact.term += iteration < 5 ? change : 0.5 * change;
-            problem_.b[impact.row] = impact.offset + impact.term;
+            contact.term += iteration < 5 ? change : 0.5 * change;
+            problem_.b[contact.row] = contact.offset + contact.term;
         }
         return all;
     }
 
-    /// A contact with friction that closes in this step, and bounces.
-    struct SlidingImpact {
+    /// A contact whose De Saxcé's term is that of the speed after the step.
+    struct Sliding {
         std::size_t row;  ///< its normal row in the problem
-        double friction, approach;
-        double offset;  ///< b without De Saxcé's term
-        double term;    ///< which is this
+        double friction;
+        double enough;  ///< change of the term that is small enough
+        double offset;  ///< b without the term
+        double term;
     };
     static constexpr int most_iterations = 50;
 
@@ -265,7 +271,7 @@ private:
         penetrating_.clear();
         penetrating_column_.clear();
         penetrating_value_.clear();
-        sliding_impacts_.clear();
+        sliding_.clear();
         std::int32_t row = 0;
         Cone* cone = problem_.cones.data() + blocks_.size();
         kept_.begin_walk();
@@ -284,7 +290,7 @@ private:
                 problem_.b[m_ + row + i] = rate + std::max(gap / h, -recovery_speed_);
             }
             if (block.along_normal()) {
-                if (block.restitution > 0.0) bounce(block, row, pushed, state, h);
+                if (block.restitution > 0.0 || follows_sliding_) bounce(block, row, pushed, state, h);
                 if (const double gap = rows_.rows()[row].gap; gap < 0.0)
                     keep_penetrating(k, row, std::min(-gap / h, recovery_speed_));
             }
@@ -294,19 +300,26 @@ private:
         }
     }
 
-    /// The first b of a contact with e > 0, whose first row of D_A is `row`.
+    /// Restitution and De Saxcé's term in the first b of a contact, whose first row of D_A is `row`.
     void bounce(const UnilateralRows::Block& block, std::int32_t row, bool pushed, const State& state, double h) {
         const auto& [gap, rate] = rows_.rows()[row];
         double& b = problem_.b[m_ + row];
-        const bool closes = block.speed < -restitution_speed_ && gap + h * block.speed <= 0.0;
+        const bool closes =
+            block.restitution > 0.0 && block.speed < -restitution_speed_ && gap + h * block.speed <= 0.0;
         if (closes) b = rate + block.restitution * block.speed;
         const double friction = block.cone.parameters[0];
-        if (coulomb_ || friction == 0.0 || block.cone.rows != 3 || (pushed && !closes)) return;
+        if (coulomb_ || friction == 0.0 || block.cone.rows != 3) return;
+        if (pushed && !closes && !follows_sliding_) return;
         const auto normal_row = static_cast<std::size_t>(m_ + row);
-        if (closes)
-            sliding_impacts_.push_back({normal_row, friction, -block.speed, b, 0.0});
-        else
+        if (closes) {
+            sliding_.push_back({normal_row, friction, 1e-4 * -block.speed, b, 0.0});
+        } else if (pushed) {
+            const double speed = sliding_speed(normal_row, state.v);
+            sliding_.push_back({normal_row, friction, 1e-6 * speed, b, friction * speed});
+            b += sliding_.back().term;
+        } else {
             b += friction * sliding_speed(normal_row, state.v);
+        }
     }
 
     // Of impacts: a contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed
@@ -380,9 +393,10 @@ private:
     double last_h_ = 0.0;
     KeptImpulses kept_;
     bool coulomb_ = false;                 // the law that the solver was told
+    bool follows_sliding_ = false;         // De Saxcé's term in all contacts
     std::vector<std::int32_t> first_row_;  // of the blocks of rows_, in their order
     std::vector<Approach> approaches_;     // likewise
-    std::vector<SlidingImpact> sliding_impacts_;
+    std::vector<Sliding> sliding_;
     std::vector<FreeSpin> spins_, end_spins_;
     std::vector<const FreeSpin*> untouched_;
     std::vector<bool> held_;  // columns that D touches

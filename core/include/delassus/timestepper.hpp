@@ -71,6 +71,12 @@ public:
     /// extrapolated.
     [[nodiscard]] virtual bool damps_at_once() const { return false; }
 
+    /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
+    [[nodiscard]] virtual double reaction_growth() const { return 0.0; }
+    /// Says, before the first step, that steps of chosen sizes follow: what the method lets depend on h besides its
+    /// error, as the height at which a sliding contact of the associated law floats, has to go. Default: nothing.
+    virtual void choose_steps() {}
+
     /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
     [[nodiscard]] virtual std::vector<double> save() const;
     virtual void load(const std::vector<double>& memory);

@@ -51,6 +51,12 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
         throw InputError(
             fmt::format("steps must be positive and finite with smallest ≤ initial ≤ largest, not {}, {} and {}",
                         control.smallest, control.initial, control.largest));
+    if (system.m() > 0 && stepper.reaction_growth() > 1.0 - 1e-6)
+        throw Unsupported(
+            "with joints a \"tolerance\" needs a method in which errors of the reactions decay: in this one they "
+            "oscillate for ever, and no step would be short enough; take hht, generalized_alpha or euler_implicit, or "
+            "give a fixed \"step\"");
+    stepper.choose_steps();
 }
 
 double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h) const {

@@ -1,7 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/implicit_method.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
 namespace delassus {
+
+// A joint holds its coordinate whatever the force: a motion of infinite frequency. With Δ = 0 in every step the
+// equations of ImplicitCoefficients leave, after elimination of v,
+//
+//     p₁ a_{n+2} + (p₀ − p₁ + v₁) a_{n+1} + (v₀ − p₀) a_n = 0,      p₀, p₁ = position_old, position_new, v likewise
+//
+// and v̇ follows a with the factors −α_f/(1 − α_f). Newmark's are β z² + (½ + γ − 2β) z + ½ − γ + β = 0 (Cardona and
+// Géradin, Computers and Structures 33, 1989): a root lies beyond −1 where β < ½γ, and γ = ½ leaves the product of
+// the roots at 1, so that nothing decays.
+double ImplicitCoefficients::reaction_growth() const {
+    const double half = 0.5 * (position_old - position_new + velocity_new) / position_new;
+    const double product = (velocity_old - position_old) / position_new, discriminant = half * half - product;
+    const double root =
+        discriminant < 0.0 ? std::sqrt(product) : std::abs(half) + std::sqrt(std::max(discriminant, 0.0));
+    return std::max(root, alpha_f / (1.0 - alpha_f));
+}
 
 ImplicitMethod::ImplicitMethod(DynamicalSystem& system, ImplicitCoefficients coefficients, NewtonSettings settings)
     : system_(system),
@@ -11,6 +32,12 @@ ImplicitMethod::ImplicitMethod(DynamicalSystem& system, ImplicitCoefficients coe
       newton_(system, std::move(settings)),
       n_(system.n()),
       m_(system.m()) {
+    constexpr double rounding = 1e-6;  // double roots lose half of the digits
+    if (const double growth = c_.reaction_growth(); m_ > 0 && growth > 1.0 + rounding)
+        throw Unsupported(fmt::format(
+            "{} takes no joints with these options: their reactions would grow by the factor {:.3g} in each step; take "
+            "beta ≥ gamma/2",
+            method_, growth));
     restart();
 }
 

@@ -31,6 +31,9 @@ struct ImplicitCoefficients {
         return position_old != 0.0 || velocity_old != 0.0 || alpha_m != 0.0 || alpha_f != 0.0;
     }
 
+    /// By what factor a step multiplies errors of the reactions of joints (ImplicitMethod::reaction_growth).
+    [[nodiscard]] double reaction_growth() const;
+
     /// 2 if γ = ½ + α_f − α_m and positions are of order 2 in themselves, else 1.
     [[nodiscard]] int order() const {
         const bool second = std::abs(velocity_new - 0.5 - alpha_f + alpha_m) < 1e-12 &&
@@ -48,6 +51,7 @@ public:
     [[nodiscard]] int order() const override { return c_.order(); }
     /// Of these methods, only implicit Euler remembers nothing.
     [[nodiscard]] bool damps_at_once() const override { return !c_.remembers(); }
+    [[nodiscard]] double reaction_growth() const override { return c_.reaction_growth(); }
     [[nodiscard]] std::vector<double> save() const override;
     void load(const std::vector<double>& memory) override;
 
