@@ -35,6 +35,9 @@ namespace {
 //
 //     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most the speed η_s (seed footnote 5)
 //
+// and |Φ| taken less by the resolution of gaps: what a solver leaves of the velocities adds up in the gaps, and as Φ/h
+// it would come back as a motion, so that nothing came to rest.
+//
 // A joint's C/h needs no such bound: it pulls both ways, and gains nothing.
 //
 // Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻. The associated
@@ -53,6 +56,7 @@ public:
         : system_(system),
           recovery_speed_(values[0].real < 0.0 ? system.recovery_speed() : values[0].real),
           restitution_speed_(values[1].real),
+          gap_resolution_(system.gap_resolution()),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
           linearization_(system, values[4].real),
@@ -287,7 +291,8 @@ private:
             const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
             for (std::int32_t i = 0; i < block.cone.rows; ++i) {
                 const auto& [gap, rate] = rows_.rows()[row + i];
-                problem_.b[m_ + row + i] = rate + std::max(gap / h, -recovery_speed_);
+                const double resolved = gap - std::clamp(gap, -gap_resolution_, gap_resolution_);
+                problem_.b[m_ + row + i] = rate + std::max(resolved / h, -recovery_speed_);
             }
             if (block.along_normal()) {
                 if (block.restitution > 0.0 || follows_sliding_) bounce(block, row, pushed, state, h);
@@ -381,7 +386,7 @@ private:
     }
 
     DynamicalSystem& system_;
-    double recovery_speed_, restitution_speed_;
+    double recovery_speed_, restitution_speed_, gap_resolution_;
     bool exact_;
     bool constraint_stiffness_;
     Linearization linearization_;

@@ -222,6 +222,8 @@ public:
     /// Largest speed with which a step should push apart what penetrates, where its user says nothing. Default: 0.01,
     /// the source's advice in m/s (seed footnote 5).
     [[nodiscard]] virtual double recovery_speed() const;
+    /// Gaps nearer to 0 than this count as 0, in their own unit. Default: 0.
+    [[nodiscard]] virtual double gap_resolution() const;
 
     // ---- What is conserved; for reports ----
 

@@ -115,6 +115,9 @@ void DynamicalSystem::free_spins(const State&, double, std::vector<FreeSpin>& sp
 double DynamicalSystem::recovery_speed() const {
     return 0.01;
 }
+double DynamicalSystem::gap_resolution() const {
+    return 0.0;
+}
 void DynamicalSystem::add_inertial_stiffness(const State&, const double*, double, Tangent, MatrixAssembler&) const {}
 bool DynamicalSystem::has_stiffness() const {
     return true;

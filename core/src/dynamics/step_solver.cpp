@@ -180,7 +180,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
 }
 
 void StepSolver::Implementation::count(const SolveReport& report) {
-    if (report.stages.empty()) loaded.insert(report.solver);
+    if (report.stages.empty() && report.solver != auto_name) loaded.insert(report.solver);
     for (const auto& stage : report.stages) loaded.insert(stage.solver);
     effort.iterations += report.iterations;
     effort.seconds += report.seconds_setup + report.seconds_solve;

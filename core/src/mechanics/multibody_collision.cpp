@@ -80,6 +80,10 @@ void MultibodySystem::Implementation::make_detector() {
     detector = make_collision_detector(std::move(setup));
 }
 
+double MultibodySystem::gap_resolution() const {
+    return 1e-9 * implementation_->size;
+}
+
 double MultibodySystem::recovery_speed() const {
     const auto& self = *implementation_;
     if (self.size == 0.0) return DynamicalSystem::recovery_speed();

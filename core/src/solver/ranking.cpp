@@ -31,13 +31,15 @@ Structure structure_of(const std::string& name) {
 }
 
 RankedStage read_stage(const nlohmann::json& json) {
-    check_keys(json, {"solver", "options", "tolerance", "max_iterations", "watched", "last", "law", "reason"},
+    check_keys(json,
+               {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "last", "law", "reason"},
                "a stage");
     RankedStage ranked;
     ranked.solver = json.at("solver").get<std::string>();
     if (json.contains("options")) ranked.options = json.at("options").get<OptionTexts>();
     ranked.stage.reason = json.at("reason").get<std::string>();
     ranked.stage.tolerance = json.value("tolerance", 0.0);
+    ranked.stage.sharper = json.value("sharper", 1.0);
     ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
     ranked.stage.watched = json.value("watched", false);
     ranked.last = json.value("last", false);

@@ -53,6 +53,24 @@ StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, con
     if (started_) error_ = problem_.meter().measure(best_.x, best_.lambda);
 }
 
+bool StageRunner::solved_at_start() {
+    if (!started_) return false;
+    const Structure structure = problem_.structure();
+    if (structure == Structure::Diagonal || structure == Structure::Blocks) {
+        // Reactions of the step before balance the velocities of that step.
+        std::vector<double> x;
+        problem_.meter().velocity_of(best_.lambda, x);
+        const Errors error = problem_.meter().measure(x, best_.lambda);
+        if (worst_of(error) < worst_of(error_)) {
+            best_.x = std::move(x);
+            error_ = error;
+        }
+    }
+    if (worst_of(error_) > settings_.tolerance) return false;
+    report_.status = Status::Solved;
+    return true;
+}
+
 const PreparedProblem& StageRunner::problem_of(const Stage& stage) {
     const Law law = stage.law.value_or(problem_.problem().law);
     if (law == problem_.problem().law) return problem_;
@@ -102,6 +120,7 @@ SolveSettings StageRunner::settings_of(const Stage& stage, DecreaseWatch& watch,
                                        const PreparedProblem& problem) const {
     SolveSettings settings = settings_;
     if (stage.tolerance > 0.0) settings.tolerance = std::max(stage.tolerance, settings_.tolerance);
+    settings.tolerance *= stage.sharper;
     settings.max_iterations = std::min(stage.max_iterations, settings_.max_iterations - report_.iterations);
     const double seconds_before = report_.seconds_setup + report_.seconds_solve;
     settings.time_limit = settings_.time_limit - seconds_before;

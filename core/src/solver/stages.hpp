@@ -15,6 +15,9 @@ namespace delassus {
 struct Stage {
     std::string reason;      ///< why this solver, now: for the report
     double tolerance = 0.0;  ///< natural error that ends the stage; 0: the one that was asked for
+    /// The stage aims at this share of the tolerance, and has done its work where it reaches the tolerance itself. In a
+    /// simulation the next steps then start within the tolerance, if they change little.
+    double sharper = 1.0;
     std::int64_t max_iterations = std::numeric_limits<std::int64_t>::max();
     /// The stage is given up when, at the measured decrease, it would not reach its tolerance within max_iterations
     /// (see DecreaseWatch).
@@ -60,6 +63,10 @@ public:
     /// Runs one stage. True if nothing is left to do: solved, proven infeasible, cancelled, or a limit of the whole
     /// solve reached.
     bool run(Solver& solver, const Stage& stage);
+
+    /// Whether the start is within the tolerance, with the velocities that go with its reactions where H gives them
+    /// cheaply: then there is nothing to do. Call it before the first stage.
+    bool solved_at_start();
 
     /// Of the solution, by the meter of the problem; none where nothing was run and there was no start.
     [[nodiscard]] std::optional<Errors> error() const { return started_ ? std::optional(error_) : std::nullopt; }
