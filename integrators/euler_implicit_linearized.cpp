@@ -74,22 +74,37 @@ public:
         multipliers_.clear();
         kept_.clear();
         last_h_ = 0.0;
+        before_.clear();
+        change_.clear();
     }
 
-    // h, whether there are multipliers, these, and the impulses of unilateral blocks.
+    // h, which of the following there are (bits), the multipliers, the velocities at the beginning of the last step,
+    // their change in the step before it, and the impulses of unilateral blocks.
     std::vector<double> save() const override {
-        std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0};
-        memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
+        std::vector<double> memory = {last_h_, (multipliers_.empty() ? 0.0 : 1.0) + (before_.empty() ? 0.0 : 2.0) +
+                                                   (change_.empty() ? 0.0 : 4.0)};
+        for (const auto* part : {&multipliers_, &before_, &change_})
+            memory.insert(memory.end(), part->begin(), part->end());
         kept_.append_to(memory);
         return memory;
     }
     void load(const std::vector<double>& memory) override {
         restart();
-        const auto multipliers = static_cast<std::size_t>(memory.size() > 1 && memory[1] != 0.0 ? m_ : 0);
-        if (memory.size() < 2 + multipliers) throw InputError("the memory of euler_implicit_linearized is too short");
-        last_h_ = memory[0];
-        multipliers_.assign(memory.begin() + 2, memory.begin() + 2 + static_cast<std::ptrdiff_t>(multipliers));
-        kept_.load(std::span(memory).subspan(2 + multipliers));
+        std::span<const double> rest = memory;
+        const auto take = [&](std::size_t count) {
+            if (rest.size() < count) throw InputError("the memory of euler_implicit_linearized is too short");
+            const auto taken = rest.first(count);
+            rest = rest.subspan(count);
+            return std::vector<double>(taken.begin(), taken.end());
+        };
+        const std::vector<double> head = take(2);
+        last_h_ = head[0];
+        const auto present = static_cast<unsigned>(head[1]);
+        const auto n = static_cast<std::size_t>(n_);
+        if (present & 1U) multipliers_ = take(static_cast<std::size_t>(m_));
+        if (present & 2U) before_ = take(n);
+        if (present & 4U) change_ = take(n);
+        kept_.load(rest);
     }
 
 private:
@@ -107,6 +122,7 @@ private:
         coulomb_ = solver.law() == Law::Coulomb;
         assemble_unilateral(state, h);
 
+        estimate_error(state, solver);
         find_untouched();
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
@@ -123,6 +139,26 @@ private:
         report.contacts.swap(rows_.contacts());
         state = end_;
         report.multipliers = multipliers_;
+    }
+
+    // The error of a step in the velocities, ½ h² v̈ for implicit Euler, is about half of the second difference of the
+    // velocities: what the last steps show of it is taken for this one. Of chosen sizes of steps nothing is said: there
+    // the solver must not disturb the estimate.
+    void estimate_error(const State& state, StepSolver& solver) {
+        const auto n = static_cast<std::size_t>(n_);
+        solver.method_error = {};
+        if (before_.size() == n && !follows_sliding_) {
+            const bool known = change_.size() == n;
+            change_.resize(n);
+            error_.resize(n);
+            for (std::size_t i = 0; i < n; ++i) {
+                const double change = state.v[i] - before_[i];
+                error_[i] = 0.5 * std::abs(change - change_[i]);
+                change_[i] = change;
+            }
+            if (known) solver.method_error = error_;
+        }
+        before_ = state.v;
     }
 
     // H and a are looked at once more where the linearisation is judged or contacts slide; else the problem changes
@@ -395,6 +431,8 @@ private:
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
     std::vector<double> after_, delta_, impulse_, force_;
+    std::vector<double> before_, change_;  // of the velocities, see save()
+    std::vector<double> error_;
     double last_h_ = 0.0;
     KeptImpulses kept_;
     bool coulomb_ = false;                 // the law that the solver was told

@@ -79,6 +79,10 @@ public:
     /// velocities without reactions, H⁻¹a, in the same norm), relative to those.
     [[nodiscard]] DELASSUS_API double velocity(std::span<const double> x, std::span<const double> reference) const;
 
+    /// ‖S r‖, what natural errors are relative to: with it they are errors of velocity in the norm of the masses. 1
+    /// where r = 0.
+    [[nodiscard]] DELASSUS_API double reference() const;
+
     /// x ← H⁻¹(a + Dᵀλ), n; throws InputError where H is not definite.
     DELASSUS_API void velocity_of(std::span<const double> lambda, std::vector<double>& x) const;
 

@@ -28,7 +28,7 @@ struct SolverEffort {
     double seconds = 0.0;            ///< set-up and solve
     std::int64_t repeated = 0;       ///< solves that `auto` repeated, since the configured solver missed its tolerance
     double worst_natural = 0.0;      ///< largest natural error of an answer that was used
-    double worst_unsolved = 0.0;     ///< of these, of those that missed their tolerance; 0: none
+    double worst_miss = 0.0;         ///< largest factor by which an answer missed its tolerance; 0: none did
     std::string unsolved;            ///< the first message of a solve that did not end solved; empty if none
 };
 
@@ -89,6 +89,11 @@ public:
     /// Asked before each part of a problem and whenever a solver at work shows an iterate; where the answer is yes,
     /// solve() throws StepInterrupted. May be empty.
     std::function<bool()> cancelled;
+
+    /// The error that the method itself makes in the velocities of this step, n, or empty where it is not known. Where
+    /// the configuration gives no tolerance, each part of the problem is solved to a share of it (docs/tolerance.md).
+    /// Not owned.
+    std::span<const double> method_error;
 
     /// Asked about each part of a problem; null: all of them are solved. Not owned.
     RestingParts* resting = nullptr;

@@ -50,13 +50,19 @@ struct StepSolver::Implementation {
     }
 
     /// Takes the arrays of the problem and leaves others.
-    bool solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number);
+    /// columns: of the part in the whole problem.
+    bool solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number,
+                    std::span<const std::int32_t> columns);
+    /// Of a part, where the method makes this error: see docs/tolerance.md.
+    [[nodiscard]] double tolerance_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
     /// solution, what it is worth in report.
-    void solve_again(const PreparedProblem& prepared, const Solution& first, bool warm_start, Solution& solution,
+    void solve_again(const PreparedProblem& prepared, const Solution& first, SolveSettings again, Solution& solution,
                      SolveReport& report);
     void count(const SolveReport& report);
 
+    /// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
+    static constexpr double rounding_limit = 1e-8;
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
 
@@ -73,6 +79,7 @@ struct StepSolver::Implementation {
     std::deque<KeptPart> parts;  // by the number of the part
     Problem given;               // a copy of what solve() must not change
     Solution start;
+    std::span<const double> method_error;
     SolverEffort effort;
 };
 
@@ -101,15 +108,16 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     if (self.config.law) problem.law = *self.config.law;
     if (on_problem) on_problem(problem);
     self.settings.cancelled = cancelled;
+    self.method_error = method_error;
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
-    if (!self.leaves_out || m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0);
+    if (!self.leaves_out || m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0, {});
 
     self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
     if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
-        return self.solve_part(problem, solution, warm_start, 0);
+        return self.solve_part(problem, solution, warm_start, 0, {});
     if (!warm_start) {
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
@@ -127,7 +135,7 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
             ++self.effort.resting_parts;
         } else {
             self.islands.part(list[number], part.data);
-            solved = self.solve_part(part.data, part.solution, warm_start, number) && solved;
+            solved = self.solve_part(part.data, part.solution, warm_start, number, list[number].columns) && solved;
             if (identity != 0) resting->solved(list[number].columns, identity, part.solution.x);
         }
         self.islands.put(list[number], part.solution, solution);
@@ -135,7 +143,8 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     return solved;
 }
 
-bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number) {
+bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number,
+                                            std::span<const std::int32_t> columns) {
     if (number == parts.size()) parts.emplace_back();
     auto& kept = parts[number].prepared;
     if (!kept) {
@@ -160,6 +169,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     }
     Solver& solver = this->solver(number % most_instances);
     SolveSettings part_settings = settings;
+    part_settings.tolerance = tolerance_for(prepared, columns);
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name;
     if (may_repeat && part_settings.warm_start) before = solution;
@@ -167,11 +177,11 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     ++effort.plugin_solves;
     count(report);
-    if (report.status != Status::Solved && may_repeat)
-        solve_again(prepared, before, part_settings.warm_start, solution, report);
+    if (report.status != Status::Solved && may_repeat) solve_again(prepared, before, part_settings, solution, report);
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
     if (report.status == Status::Solved) return true;
-    effort.worst_unsolved = std::max(effort.worst_unsolved, report.error.natural);
+    effort.worst_miss =
+        std::max(effort.worst_miss, report.error.natural / std::max(part_settings.tolerance, rounding_limit));
     if (effort.unsolved.empty())
         effort.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
@@ -186,18 +196,16 @@ void StepSolver::Implementation::count(const SolveReport& report) {
     effort.seconds += report.seconds_setup + report.seconds_solve;
 }
 
-void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, const Solution& first, bool warm_start,
-                                             Solution& solution, SolveReport& report) {
+void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, const Solution& first,
+                                             SolveSettings again, Solution& solution, SolveReport& report) {
     if (!fallback) {
         SolverConfig other = config;
         other.name = auto_name;
         other.options = {{"simulation", "true"}};
         fallback = make_solver(registry, other);
     }
-    SolveSettings again = settings;
-    again.warm_start = warm_start;
     again.max_iterations = SolveSettings{}.max_iterations;
-    Solution other = warm_start ? first : Solution{};
+    Solution other = again.warm_start ? first : Solution{};
     SolveReport second = fallback->solve(prepared, other, again);
     if (settings.cancelled && second.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     count(second);
@@ -205,6 +213,23 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, co
     if (second.status != Status::Solved && !(second.error.natural < report.error.natural)) return;
     solution = std::move(other);
     report = std::move(second);
+}
+
+double StepSolver::Implementation::tolerance_for(const PreparedProblem& part,
+                                                 std::span<const std::int32_t> columns) const {
+    constexpr double share = 0.05, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
+    if (config.tolerance || method_error.empty()) return settings.tolerance;
+    const Problem& problem = part.problem();
+    double square = 0.0;
+    for (std::int32_t i = 0; i < problem.H.rows; ++i) {
+        const double error = method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
+        if (error == 0.0) continue;
+        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
+            if (problem.H.column[e] == i) square += problem.H.value[e] * error * error;
+    }
+    const bool joints = (part.needs() & DELASSUS_CAN_FREE) != 0;
+    return std::clamp(share * std::sqrt(std::abs(square)) / part.meter().reference(), least,
+                      joints ? most_with_joints : most);
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {

@@ -303,6 +303,10 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
     return errors;
 }
 
+double ErrorMeter::reference() const {
+    return implementation_->residual.reference();
+}
+
 std::int64_t ErrorMeter::measurements() const {
     return implementation_->measurements;
 }
