@@ -5,7 +5,9 @@
 #   libdelassus-dev   headers, SDK, CMake package, pkg-config, documentation, examples
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_DIRECTORY "${PROJECT_BINARY_DIR}/packages")
-set(CPACK_PACKAGE_CONTACT "the Delassus authors <delassus@localhost>" CACHE STRING "Maintainer of the Debian packages: name <address>")
+# example.org takes no mail: who publishes packages gives -DCPACK_PACKAGE_CONTACT="Name <address>".
+set(CPACK_PACKAGE_CONTACT "Delassus maintainers <delassus@example.org>" CACHE STRING
+    "Maintainer of the Debian packages: Name <address>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_COMPONENTS_ALL library plugins command development)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
