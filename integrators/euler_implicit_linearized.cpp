@@ -18,12 +18,12 @@ namespace {
 //
 //     (M + h R + h² K) v⁺ − Dᵀ λ = (M + h R) v + h f(q, v, t⁺)
 //
-// It is consistent for any R and K, so that their symmetric parts do. The reactions turn with the bodies as well: with
-// those of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so H also has h² G. G
-// holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the pull P at the arm
-// l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1 on. Only that part
-// of G is taken that a step cannot bear explicitly and that keeps H definite for every solver; the rest is of the order
-// of the method's own error.
+// The method is consistent for any R and K, so their symmetric parts suffice. The reactions turn with the bodies as
+// well. With the reactions of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so
+// H also has h² G. G holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the
+// pull P at the arm l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1
+// on. H takes only that part of G that an explicit step could not bear and that keeps H definite for every solver. The
+// rest is of the order of the method's own error.
 //
 // Constraints at the end of the step, again to first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows
 // with b = C(q, t⁺)/h. The part C(q, t)/h of it is error of earlier steps; it is recovered with at most the speed η_s
@@ -112,7 +112,7 @@ private:
         report.newton_iterations = 1;
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
-        // H and a are looked at once more where the linearisation is judged; else the problem changes hands.
+        // Judging the linearisation needs H and a again; otherwise the problem is moved to the solver.
         report.solved = linearization_.wanted() ? solver.solve(problem_, solution_, true)
                                                 : solver.solve(std::move(problem_), solution_, true);
         if (!report.solved) report.message = solver.effort().unsolved;
@@ -239,10 +239,10 @@ private:
         }
     }
 
-    // Of impacts: a contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed
-    // of Φ/h at least, also where its first speed was less. One that left and comes back within the step, as a ball
-    // that bounces low, does so about as fast. One that penetrates gives the energy λ_n (u_n + u_n⁺)/2 where it pushes
-    // apart.
+    // Impacts: a contact with the gap Φ > 0 that pushes would otherwise have closed within the step, with a mean speed
+    // of at least Φ/h even if its first speed was less. A contact that opened and comes back within the step (a ball
+    // that bounces low) closes about as fast. A penetrating contact supplies the energy λ_n (u_n + u_n⁺)/2 when it
+    // pushes the bodies apart.
     void report_reactions(const std::vector<double>& lambda, double h, StepReport& report) const {
         for (std::size_t k = 0; k < next_kept_.size(); ++k) {
             const auto& [key, first, rows] = next_kept_[k];
@@ -268,7 +268,7 @@ private:
         }
     }
 
-    /// Of the normal row of a block that penetrates, which is a row of D as long as that is not solved for.
+    /// Keeps the normal row of a penetrating block. Called before the solve, which takes D away.
     void keep_penetrating(std::size_t block, std::size_t row) {
         const auto& [rows, columns, row_start, column, value] = problem_.D;
         const auto first = row_start[m_ + row], last = row_start[m_ + row + 1];

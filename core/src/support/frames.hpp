@@ -15,8 +15,8 @@ inline Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
     return result;
 }
 
-/// A unit vector normal to a unit vector: from the axis that is least along it, the first of equals. Continuous almost
-/// everywhere.
+/// A unit vector normal to the given unit vector, made from the axis with the smallest component along it (the first of
+/// equal ones). Continuous almost everywhere.
 inline Eigen::Vector3d normal_to(const Eigen::Vector3d& direction) {
     int least = 0;
     for (int i = 1; i < 3; ++i)
