@@ -1,5 +1,6 @@
-# Target `coverage` (preset of that name): runs tests that are built, and prints which share of the lines and branches they reach, by module
-# and in total, by gcovr. DELASSUS_COVERAGE_TESTS restricts the tests; build their targets first, or everything.
+# Target `coverage` (preset of that name): runs tests that are built, and prints which share of the lines and branches they
+# reach, by module and in total, by gcovr. DELASSUS_COVERAGE_TESTS restricts the tests; build their targets first, or
+# everything.
 if(NOT DELASSUS_COVERAGE)
   return()
 endif()
