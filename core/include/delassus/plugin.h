@@ -33,7 +33,8 @@ extern "C" {
 #define DELASSUS_PLUGIN_MAGIC 0x53414c44u /* "DLAS" in memory order on a little-endian machine */
 /* A minor version adds fields at the end of structs, and bits and numbers; it changes nothing that is there. Either
  * side may be the older one: a field marked "since 2.k" is read only if the struct_size that comes with it covers it.
- * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0. Version 1 was never released. */
+ * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
+ * Major version 1 was never released; its cones had no stride. */
 #define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
 #define DELASSUS_ABI_MINOR 1
 
