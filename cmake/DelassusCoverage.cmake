@@ -1,5 +1,6 @@
-# Target `coverage` (preset of that name): runs tests that are built, and prints which share of the lines they reach, by module
-# and in total, by gcovr. DELASSUS_COVERAGE_TESTS restricts the tests; build their targets first, or everything.
+# Target `coverage` (preset of that name): runs tests that are built, and prints which share of the lines and branches they
+# reach, by module and in total, by gcovr. DELASSUS_COVERAGE_TESTS restricts the tests; build their targets first, or
+# everything.
 if(NOT DELASSUS_COVERAGE)
   return()
 endif()
@@ -14,9 +15,13 @@ add_custom_target(coverage
   COMMAND find "${PROJECT_BINARY_DIR}" -name "*.gcda" -delete
   COMMAND "${CMAKE_CTEST_COMMAND}" --test-dir "${PROJECT_BINARY_DIR}" -R "${DELASSUS_COVERAGE_TESTS}" -j2 --output-on-failure
           --no-tests=error
+  # Branches of exceptions that may pass through any call say nothing about the tests.
   COMMAND "${GCOVR_PROGRAM}" -j2 --root "${PROJECT_SOURCE_DIR}" --filter "(core|integrators|plugins|tools)/"
-          --json-summary "${folder}/summary.json" --html-details "${folder}/index.html" "${PROJECT_BINARY_DIR}"
-  COMMAND "${Python3_EXECUTABLE}" "${PROJECT_SOURCE_DIR}/scripts/coverage-by-module" "${folder}/summary.json"
+          --exclude-throw-branches --json "${folder}/gcovr.json" "${PROJECT_BINARY_DIR}"
+  COMMAND "${Python3_EXECUTABLE}" "${PROJECT_SOURCE_DIR}/scripts/coverage-by-module" "${folder}/gcovr.json"
+          "${folder}/merged.json"
+  COMMAND "${GCOVR_PROGRAM}" --root "${PROJECT_SOURCE_DIR}" --add-tracefile "${folder}/merged.json"
+          --html-details "${folder}/index.html"
   COMMAND "${CMAKE_COMMAND}" -E echo "Line by line: ${folder}/index.html"
   WORKING_DIRECTORY "${PROJECT_SOURCE_DIR}"
   USES_TERMINAL VERBATIM)

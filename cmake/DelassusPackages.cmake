@@ -5,7 +5,9 @@
 #   libdelassus-dev   headers, SDK, CMake package, pkg-config, documentation, examples
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_DIRECTORY "${PROJECT_BINARY_DIR}/packages")
-set(CPACK_PACKAGE_CONTACT "the Delassus authors <delassus@localhost>" CACHE STRING "Maintainer of the Debian packages: name <address>")
+# example.org takes no mail: who publishes packages gives -DCPACK_PACKAGE_CONTACT="Name <address>".
+set(CPACK_PACKAGE_CONTACT "Delassus maintainers <delassus@example.org>" CACHE STRING
+    "Maintainer of the Debian packages: Name <address>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_COMPONENTS_ALL library plugins command development)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
@@ -20,6 +22,7 @@ set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${CMAKE_LIBRARY_OUTPUT_DIRECTORY}")
+set(CPACK_POST_BUILD_SCRIPTS "${PROJECT_SOURCE_DIR}/cmake/DelassusInstalledSize.cmake")
 set(same_version "(= ${PROJECT_VERSION})")
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libdelassus)

@@ -19,12 +19,12 @@ namespace {
 //
 //     (M + h R + h² K) v⁺ − Dᵀ λ = (M + h R) v + h f(q, v, t⁺)
 //
-// It is consistent for any R and K, so that their symmetric parts do. The reactions turn with the bodies as well: with
-// those of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so H also has h² G. G
-// holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the pull P at the arm
-// l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1 on. Only that part
-// of G is taken that a step cannot bear explicitly and that keeps H definite for every solver; the rest is of the order
-// of the method's own error.
+// The method is consistent for any R and K, so their symmetric parts suffice. The reactions turn with the bodies as
+// well. With the reactions of the last step, λ₀ as forces, C_q(q⁺)ᵀ λ ≈ C_qᵀ λ − G h v⁺ with G = −∂(C_qᵀ λ₀)/∂q, and so
+// H also has h² G. G holds a light body across a heavy pull: a link of a chain with the moment of inertia J, under the
+// pull P at the arm l, swings at √(P l/J), and without G this would be an explicit step, unstable from h √(P l/J) ≈ 1
+// on. H takes only that part of G that an explicit step could not bear and that keeps H definite for every solver. The
+// rest is of the order of the method's own error.
 //
 // The gyroscopic torque is not taken from f: a body that spins by itself is turned by the midpoint rule, which keeps
 // its energy and its momentum (DynamicalSystem::free_spins), and its impulse J (ω⁺ − ω) stands on the right-hand side.
@@ -363,10 +363,10 @@ private:
         }
     }
 
-    // Of impacts: a contact at the gap Φ > 0 that pushes would otherwise have closed within the step: with a mean speed
-    // of Φ/h at least, also where its first speed was less. One that left and comes back within the step, as a ball
-    // that bounces low, does so about as fast. One that penetrates gives at most the energy λ_n u where it pushes apart
-    // with the speed u, and the recovery explains no speed beyond its own.
+    // Impacts: a contact with the gap Φ > 0 that pushes would otherwise have closed within the step, with a mean speed
+    // of at least Φ/h even if its first speed was less. A contact that opened and comes back within the step (a ball
+    // that bounces low) closes about as fast. A penetrating contact that pushes apart with the speed u supplies the
+    // energy λ_n u at most, and the recovery explains no speed beyond its own.
     void report_reactions(const std::vector<double>& lambda, double h, StepReport& report) const {
         for (std::size_t k = 0; k < first_row_.size(); ++k) {
             const std::int32_t first = first_row_[k], rows = rows_.blocks()[k].cone.rows;
@@ -393,7 +393,7 @@ private:
         }
     }
 
-    /// Of the normal row of a block that penetrates, which is a row of D as long as that is not solved for.
+    /// Keeps the normal row of a penetrating block. Called before the solve, which takes D away.
     void keep_penetrating(std::size_t block, std::size_t row, double recovery) {
         const auto& [rows, columns, row_start, column, value] = problem_.D;
         const auto first = row_start[m_ + row], last = row_start[m_ + row + 1];

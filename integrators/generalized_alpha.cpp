@@ -15,12 +15,12 @@ namespace {
 //
 //     α_m = (2ρ_∞ − 1)/(1 + ρ_∞),   α_f = ρ_∞/(1 + ρ_∞),   γ = ½ + α_f − α_m,   β = (γ + ½)²/4
 //
-// of which the choice of γ makes order 2. γ′ = γ/(hβ), β′ = (1 − α_m)/((1 − α_f) h² β). Once v̇_{n+1} is known,
+// where the choice of γ gives order 2. γ′ = γ/(hβ), β′ = (1 − α_m)/((1 − α_f) h² β). Once v̇_{n+1} is known,
 //
 //     a_{n+1} = (α_f v̇_n − α_m a_n)/(1 − α_m) + (1 − α_f)/(1 − α_m) v̇_{n+1}
 //
-// where the seed's last update has a_n for the first term. The first step has a_0 = v̇_0, an error of
-// O(h) that ρ_∞ < 1 makes vanish; q and v are of order 2 from the first step on, λ once it has gone.
+// where the seed's last update has a_n for the first term. The first step has a_0 = v̇_0, an error of O(h) that decays
+// for ρ_∞ < 1. q and v are of order 2 from the first step on, λ after that error has decayed.
 const RegisterTimestepper generalized_alpha_row{
     {.name = "generalized_alpha",
      .description = "generalised-alpha: order 2 with damping of high frequencies by rho_infinity",

@@ -6,9 +6,10 @@ namespace delassus {
 namespace {
 
 // One linear problem a step: the equations of trapezoidal.cpp, linearised at a guess of the end of the step and solved
-// once. The guess keeps acceleration and reaction, v̇_{n+1} = v̇_n and λ_{n+1} = λ_n, and so is off by O(h³) in the
-// position and O(h) in λ. What one iteration leaves is of second order in that, below the rule's own h³, with the exact
-// matrix; its symmetric part leaves a term of the rule's own order. Linear systems are solved exactly.
+// once. The guess keeps acceleration and reaction, v̇_{n+1} = v̇_n and λ_{n+1} = λ_n, so its error is O(h³) in the
+// position and O(h) in λ. One iteration with the exact matrix leaves an error of second order in these, below the
+// rule's own h³. With the symmetric part of the matrix it leaves an error of the rule's own order. Linear systems are
+// solved exactly.
 //
 // The seed's eq. 170 starts from v_{n+1} = 0 and λ_{n+1} = 0 at q_n instead. Its constraint row then is
 // C_q v_{n+1} = −(2/h) C − C_q v_n − 2 C_t, of which eq. 170 lacks the factor 2 and the last two terms. It drops λ_n

@@ -66,9 +66,9 @@ void AcceleratedGradient::iterate(sdk::ScaledRun& run, sdk::Team& team) {
     }
 }
 
-// next = Π(y − t û(y)) with the largest t that backtracking allows: f(next) must not exceed the quadratic model
-// f(y) + û(y)ᵀd + ‖d‖²/(2t). f is ½ λ̂ᵀN̂λ̂ + r̂ᵀλ̂ as a whole, so f(next) − f(y) − û(y)ᵀd = ½ dᵀN̂d exactly, and the test is
-// t dᵀN̂d ≤ ‖d‖²: no difference of two values of f, hence no stall by cancellation. What judging next takes is
+// next = Π(y − t û(y)) with the largest t that backtracking allows: f(next) must not exceed the quadratic model f(y) +
+// û(y)ᵀd + ‖d‖²/(2t). f is ½ λ̂ᵀN̂λ̂ + r̂ᵀλ̂ as a whole, so f(next) − f(y) − û(y)ᵀd = ½ dᵀN̂d exactly, and the test is
+// t dᵀN̂d ≤ ‖d‖². It subtracts no values of f, so cancellation cannot stall it. The quantities that judge next are
 // computed on the way, while its rows are in the cache. True: stop.
 bool AcceleratedGradient::gradient_step(sdk::ScaledRun& run, sdk::Team& team) {
     while (true) {

@@ -115,8 +115,8 @@ private:
         std::int64_t iterations = 0;
     };
 
-    /// Repeats x, λ ← x, λ + A⁻¹(residual − offset) until nothing is gained; leaves the best iterate. offset: a
-    /// residual (problem's units) that is not to be removed.
+    /// Repeats x, λ ← x, λ + A⁻¹(residual − offset) until nothing is gained; leaves the best iterate. offset: the part
+    /// of the residual (problem's units) that is to stay.
     delassus_status refine(Refinement& state, const Pair& offset) const {
         const ScaledSystem& system = factor_.system();
         const double limit = 0.99 * std::max(state.request.tolerance(), kFloor);
@@ -167,14 +167,15 @@ private:
         return met() ? DELASSUS_SOLVED : DELASSUS_STALLED;
     }
 
-    /// What no x and λ can remove from the equations, in the problem's units; nothing if there is no proof of it.
+    /// The part of the residual that no x and λ can remove, in the problem's units; nothing if there is no proof of
+    /// one.
     ///
     /// A = [H̃ −D̃ᵀ; D̃ Ẽ] is monotone, so that A and Aᵀ have the same null space: H̃ y_x = 0, D̃ y_x = 0, D̃ᵀ y_λ = 0,
-    /// Ẽ y_λ = 0. The part y of the right-hand side in it stays whatever x and λ are, and is the least-squares
-    /// residual. T = (A + diag(ρ, δ))⁻¹ diag(ρ, δ) keeps this part and shrinks every other, so that powers of T isolate
-    /// it, but for an error ε/δ in its size, which is corrected by applying the same to what is left. That ‖A y‖ is
-    /// then at rounding level is the proof. (A direction that is merely ill-conditioned has ‖A y‖ = √σ, many powers of
-    /// ten larger.)
+    /// Ẽ y_λ = 0. The part y of the right-hand side in that space stays for every x and λ: it is the least-squares
+    /// residual. T = (A + diag(ρ, δ))⁻¹ diag(ρ, δ) keeps this part and shrinks every other, so powers of T isolate it
+    /// up to an error ε/δ in its size. Applying the same to the remainder corrects that error. The proof is that ‖A y‖
+    /// is then at rounding level. (A direction that is merely ill-conditioned has ‖A y‖ = √σ, many powers of ten
+    /// larger.)
     [[nodiscard]] std::optional<Pair> find_contradiction(const Refinement& state) const {
         const ProblemView& problem = state.problem;
         const ScaledSystem& system = factor_.system();
@@ -209,7 +210,7 @@ private:
         return offset;
     }
 
-    /// The answer to the equations without their contradiction, which is the least-squares answer to the whole.
+    /// The answer to the equations without their contradictory part: the least-squares answer to all of them.
     delassus_status answer_least_squares(Refinement& state, const Pair& contradiction) const {
         state.x.setZero();
         state.lambda.setZero();

@@ -36,8 +36,8 @@ class ShiftedFactor {
 public:
     explicit ShiftedFactor(const FactorSettings& settings) : settings_(settings) {}
 
-    /// The pattern is new: what was analysed is forgotten, and analysed again at the next factorize, which has what the
-    /// choice of the form needs.
+    /// Announces a new pattern. The next factorize() repeats the analysis: it has the values that the choice of the
+    /// form needs.
     void analyze() { pattern_is_new_ = true; }
 
     /// Throws delassus::sdk::NumericalFailure.

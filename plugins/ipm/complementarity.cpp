@@ -311,8 +311,8 @@ void Complementarity::advance(double step) {
     }
 }
 
-// Where rounding of z and s leaves them their digits they are the better source: what is carried along agrees with them
-// no more than to the rounding of the largest z and s that there have been.
+// z and s themselves are the better source while rounding leaves them enough digits: the values carried along agree
+// with them only up to the rounding of the largest z and s so far.
 void Complementarity::renew_products(Block& block) const {
     constexpr double clear = 1e-6;
     const Triple z = load_rows(z_, block.first, block.rows), s = load_rows(s_, block.first, block.rows);

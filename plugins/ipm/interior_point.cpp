@@ -10,11 +10,11 @@ namespace delassus::ipm {
 
 namespace {
 
-// ‖S r‖ = 1 in scaled units: a solution this much larger than the data is none.
+// ‖S r‖ = 1 in scaled units. A solution larger than the data by this factor counts as none.
 constexpr double largest_solution = 1e9;
 
-// Relative residuals of linear solves: the predictor is only a forecast, and the residuals of the next iteration
-// contain what the corrector leaves of the equations.
+// Relative residuals of linear solves. The predictor is only a forecast. Errors that the corrector leaves show in the
+// residuals of the next iteration.
 constexpr double predictor_residual = 1e-3;
 constexpr double corrector_residual = 1e-9;
 
@@ -124,7 +124,7 @@ void InteriorPoint::find_residuals() {
         if (cones_.is_held(i)) g_[i] = 0.0;
 }
 
-// Mehrotra's predictor and corrector. With H (or E) both equations hold z, so that one step length serves all.
+// Mehrotra's predictor and corrector. With H (or E) both equations contain z, so one step length serves all.
 bool InteriorPoint::step() {
     cones_.scale(theta_);
     kkt_.factorize(cones_, theta_);
@@ -178,7 +178,7 @@ void InteriorPoint::iterate(const sdk::ProblemView& problem, sdk::Monitor& monit
     }
 }
 
-// Progress is a smaller natural error, or less of the equations and products, on which the natural error follows later.
+// Progress is a smaller natural error, or smaller residuals and products: the natural error follows those later.
 bool InteriorPoint::is_stuck(double error) {
     const double rest = std::max({cones_.mean_product(), f_.norm(), g_.norm()});
     ++idle_iterations_;

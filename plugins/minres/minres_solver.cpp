@@ -98,8 +98,8 @@ constexpr double kAim = 0.9;
 constexpr double kFloor = 1e-12;
 // ‖K y‖ ≤ this · ‖y‖ counts as zero, in norms where K has the size 1.
 constexpr double kNull = 1e-9;
-// Iterations without a smaller residual after which, and after each multiple of the second, a contradiction is looked
-// for: soon, since further steps along a null space only add rounding.
+// A contradiction is looked for after kFirstLook iterations without a smaller residual and after each multiple of
+// kLookPeriod. The first look is early, since further steps along a null space only add rounding.
 constexpr std::int64_t kFirstLook = 2, kLookPeriod = 25;
 
 std::string formatted(const char* format, double value) {

@@ -19,8 +19,8 @@ namespace {
 constexpr double kLargestProduct = 5e7;
 // Eigenvalues of a block N_cc below this share of the largest are raised to it: Ŝ must be definite.
 constexpr double kBlockFloor = 1e-10;
-// Where a pivot vanishes, because N is singular or of what is left out, the factorisation is tried again with N +
-// shift·1. Eigen doubles the shift ten times; then the next of these comes.
+// If a pivot vanishes, because N is singular or because entries are left out, the factorisation is tried again with N +
+// shift·1. Eigen doubles the shift ten times; then the next of these values comes.
 constexpr double kFirstShifts[] = {1e-6, 2e-3};
 
 }  // namespace

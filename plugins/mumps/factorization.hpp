@@ -21,7 +21,7 @@ struct Settings {
     double null_pivot = 1e-14;      ///< −CNTL(3): pivot columns of C K C below it count as zero
 };
 
-/// What the first solution after a factorisation was found to be worth by MUMPS (ICNTL(11)).
+/// MUMPS' error analysis of the first solution after a factorisation (ICNTL(11)).
 struct ErrorAnalysis {
     bool known = false;
     double backward_1 = 0.0, backward_2 = 0.0;    ///< RINFOG(7), RINFOG(8)

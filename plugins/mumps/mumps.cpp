@@ -113,14 +113,14 @@ private:
     int null_pivots_ = 0;
 };
 
-// Is there a solution at all? K z = f has none exactly if some w with Kᵀ w = 0 has wᵀ f ≠ 0 (Fredholm), and then the
-// residual of every z has the part wᵀ f / ‖w‖. Such a w is what repeated application of
+// Is there a solution at all? K z = f has none exactly if some w with Kᵀ w = 0 has wᵀ f ≠ 0 (Fredholm). Then the
+// residual of every z has the part wᵀ f / ‖w‖. Repeating
 //
 //     w ← σ J (K + σ J)⁻¹ w,   J = diag(I, −I)
 //
-// leaves of the residual: with w = σ J v a fixed point has (K + σ J) v = σ J v, so K v = 0, and J K is monotone for
-// a semidefinite H, so that everything else decays by σ/(σ + its eigenvalue). w is accepted as a certificate only
-// if Kᵀ v vanishes to rounding and |vᵀ f| is far above what that rounding can do. All in scaled quantities.
+// on the residual isolates such a w. A fixed point w = σ J v has (K + σ J) v = σ J v, so K v = 0. J K is monotone for a
+// semidefinite H, so every other component decays by σ/(σ + its eigenvalue). w counts as a certificate only if
+// Kᵀ v vanishes to rounding and |vᵀ f| is far above what that rounding can do. All quantities are scaled.
 bool MumpsSolver::is_inconsistent(const ProblemView& problem, const Vector& z, const Vector& residual) {
     const auto n = problem.n, m = problem.m;
     Vector v = C_.cwiseProduct(residual);
@@ -168,7 +168,7 @@ Outcome MumpsSolver::solve(const ProblemView& problem, const Request& request, M
     const auto& communicator = factors_.communicator();
     // Refinement goes on to here even if less is asked for: it is cheap, and stops by itself at the rounding level.
     constexpr double goal = 1e-10;
-    // A refinement step that gains less than this factor is the last with the factors at hand.
+    // A refinement step that gains less than this factor is the last one with the present factors.
     constexpr double worthwhile = 0.5;
     constexpr int proximal_steps = 60;
 
@@ -212,7 +212,7 @@ Outcome MumpsSolver::solve(const ProblemView& problem, const Request& request, M
         ++outcome.iterations;
         ++steps;
         const double gain = trial_value.worst() / value.worst();
-        // One measure may rise within what is asked for while the other falls.
+        // One measure may rise, as long as it stays within the tolerance, while the other falls.
         const bool better = communicator.agree(trial_value.worst() < value.worst() ? 0 : 1) == 0;
         if (better) {
             z = trial;

@@ -17,7 +17,7 @@ bool is_key(const std::string& word) {
     return word.size() > 1 && word[0] == '-' && std::isalpha(static_cast<unsigned char>(word[1]));
 }
 
-// Of the solvers that exist; read and written under a Session. PETSc remembers every prefix that it has ever seen, so
+// The numbers of the existing solvers, used under a Session. PETSc remembers every prefix that it has ever seen, so
 // numbers are used again.
 std::set<int>& numbers_in_use() {
     static std::set<int> numbers;

@@ -46,7 +46,7 @@ struct Eigen2 {
     }
 };
 
-/// What the solution of one contact needs of N, prepared once for all q and μ.
+/// The data of N that the solution of one contact needs, prepared once for all q and μ.
 ///
 /// The matrix that is kept is N + δ I with δ = 2e-14 tr N: a singular N (a contact that moves in fewer directions than
 /// it has rows) has neither a unique nor always a finite answer, and its Schur complement is rounding. A sweep takes

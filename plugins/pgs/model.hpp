@@ -27,7 +27,7 @@ inline std::vector<Block> blocks_of(const sdk::ConeRange& cones) {
     std::vector<Block> blocks;
     for (std::size_t c = 0; c < cones.size(); ++c) {
         const bool together = cones[c].kind == DELASSUS_CONE_FRICTION ||
-                              (cones[c].kind == DELASSUS_CONE_FREE && cones[c].rows <= sdk::largest_group);
+                              (cones[c].kind == DELASSUS_CONE_FREE && cones[c].rows <= sdk::largest_block_rows);
         const std::int32_t rows = together ? cones[c].rows : 1;
         for (std::int32_t i = 0; i < cones[c].rows; i += rows)
             blocks.push_back({{cones[c].first_row + i, rows}, static_cast<std::int32_t>(c)});
@@ -49,7 +49,7 @@ inline bool can_sweep_on_velocities(const sdk::ProblemView& problem) {
            is_nonnegative_diagonal(problem.E);
 }
 
-/// What a sweep changes, counted as the sweep counts rows.
+/// The state that a sweep changes, with rows in the order of the sweep.
 struct SweepState {
     sdk::Vector z;       ///< v̂, or λ; padded
     sdk::Vector lambda;  ///< on velocities: λ

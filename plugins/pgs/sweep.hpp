@@ -43,7 +43,7 @@ struct LocalProblems {
     mutable std::vector<double> kappa;   ///< sliding multipliers of the last visit, guesses for the next; one a contact
 };
 
-/// How a sweep goes about it.
+/// The settings of a sweep.
 struct SweepRule {
     Local local = Local::Exact;
     Direction direction = Direction::Forward;
@@ -121,7 +121,7 @@ inline void local_step(const LocalProblems& problems, const LocalBlock& local, c
 template <bool OnVelocities, int Width, Local Choice>
 void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
                   const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
-    constexpr std::size_t ahead = 256, line = 8;  // doubles: coefficients are fetched so far before their use
+    constexpr std::size_t ahead = 256, line = 8;  // doubles: coefficients are fetched this far ahead
     const bool forward = rule.direction == Direction::Forward;
     for (std::size_t k = first; k < last; ++k) {
         const std::size_t index = forward ? k : last - 1 - (k - first);

@@ -55,7 +55,8 @@ private:
         return columns;
     }
 
-    // First the longest waiting block that may come, then the next of the problem, then whoever waits longest.
+    // The next visit goes to the longest waiting block that may come, else to the next block of the problem that may,
+    // else to the longest waiting one.
     // Two chunks of one width overlap if and only if one contains the first or the last column of the other.
     void space_out(const sdk::BlockRows& rows) {
         const int width = rows.width();
@@ -91,8 +92,8 @@ private:
         }
     }
 
-    // The first colour that no neighbour has, in the order of the problem. What finds none of the colours free, and
-    // what has a rare one, comes last and one after another.
+    // Each block takes the first colour that no neighbour has, in the order of the problem. Blocks that find no free
+    // colour, and those of a rare colour, come last, one after another.
     static SweepOrder colours(const sdk::BlockRows& rows, bool written_is_covered) {
         const auto width = static_cast<std::size_t>(rows.width());
         // Colours of the blocks that write to an entry, and of those that read it (or multiply it by a zero).

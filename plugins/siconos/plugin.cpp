@@ -133,9 +133,9 @@ OptionsHandle Siconos::settings() const {
     return handle;
 }
 
-// Siconos judges by its own error, with its own divisor, and cannot be stopped from outside. So it is called for a
-// number of iterations that doubles from call to call, each from where the last one ended, with a tolerance that is
-// lowered as long as the natural error is not met where Siconos is content.
+// Siconos judges by its own error, with its own divisor, and cannot be stopped from outside. So it is called
+// repeatedly, each time from where the last call ended and for twice as many iterations. Its tolerance is lowered while
+// it is content but the natural error is not met.
 Outcome Siconos::solve(const ProblemView& problem, const Request& request, MutableVectorView x,
                        MutableVectorView lambda) {
     contacts_.load(problem);

@@ -59,8 +59,8 @@ void NewtonSystem::factorize(const ProblemView& problem, const ScaledProblem& sc
     if (!same_pattern(before, matrix_)) factor_.reset();
 }
 
-// Velocities where they are fewer than rows; with more velocities than rows, N is the smaller matrix, unless it has too
-// many entries to be formed.
+// The form by velocities where they are fewer than rows. With more velocities than rows N is the smaller matrix, and
+// rows are used unless N has too many entries to be formed.
 void NewtonSystem::choose_form(const ProblemView& problem, const std::vector<RowGroup>& groups) {
     bool separate = true;
     const std::vector<std::int32_t> piece = piece_of_row(groups, problem.m);

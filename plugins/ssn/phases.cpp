@@ -13,7 +13,7 @@ namespace {
 constexpr double smallest_tau = 1e-13;
 constexpr double largest_tau = 1e3;
 constexpr int most_solves = 25;        // of a subproblem
-constexpr int watch = 6;               // solves of a Coulomb subproblem without a better iterate that give it up
+constexpr int watch = 6;               // solves without a better iterate after which a Coulomb subproblem ends
 constexpr double allowed_growth = 10;  // of its merit over its best so far
 constexpr int failures_allowed = 2;    // Newton steps in a row that do not halve the error
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double first_tau = 0.1;
 constexpr double newton_threshold = 1e-2;   // error below which Newton's method is tried without a centre
-constexpr std::int64_t direct_solves = 40;  // in which Coulomb's error must fall by half, or the law is followed
+constexpr std::int64_t direct_solves = 40;  // in which the error under the Coulomb law must halve; else path
 constexpr double last_gain = 0.9;           // to which the error must fall in stall_iterations
 constexpr Patience associated_patience{200, 0.5};
 constexpr Patience path_patience{20, 0.5};
@@ -62,7 +62,7 @@ sdk::Outcome SemismoothNewton::solve(const sdk::ProblemView& problem, const sdk:
     map_.set_law(problem.coulomb ? 1.0 : 0.0);
     const double size = scaled_.r().norm();
     reference_ = size > 0.0 ? size : 1.0;
-    // The stall is found in iterate(): to the monitor, the way between the laws would look like one.
+    // iterate() finds a stall itself: the monitor would take the path between the laws for one.
     sdk::ScaledRun run(problem, scaled_, request, 0);
     move_to(run.start(lambda));
     const bool stopped = run.check(lambda_, velocity_);

@@ -20,7 +20,7 @@ public:
     [[nodiscard]] std::int64_t analyses() const override;
     [[nodiscard]] std::int64_t factorizations() const override;
 
-    /// When a phase gives up: after so many solves without bringing the error to this part of what it was.
+    /// A phase gives up after so many solves that do not reduce the error to this fraction of what it was.
     struct Patience {
         std::int64_t solves;
         double gain;

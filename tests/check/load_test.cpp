@@ -33,7 +33,8 @@ std::string refusal_of(const std::string& name) {
 
 TEST(Load, RefusesBrokenHandshakesWithASentence) {
     const std::pair<const char*, std::vector<const char*>> cases[] = {
-        {"wrong_abi", {"99.1", "this is version 1.1"}},
+        {"wrong_abi", {"99.1", "this is version 2.1"}},
+        {"before_release", {"built for version 1.0", "this is version 2.1"}},
         {"wrong_magic", {"magic number"}},
         {"small_descriptor", {"24 bytes"}},
         {"bad_name", {"../Bad Name", "not a word"}},
@@ -82,7 +83,7 @@ TEST(Load, ReadsNothingBehindAnOlderDescriptor) {
     EXPECT_NE(Plugin::load(fixture("newer_minor"))->descriptor().accepts, nullptr);
 }
 
-TEST(Load, RefusesADescriptorShorterThanThatOfVersion10) {
+TEST(Load, RefusesADescriptorShorterThanThatOfVersion20) {
     const auto sentence = refusal_of("short_descriptor");
     const auto needed = offsetof(delassus_plugin_descriptor, accepts);
     EXPECT_NE(sentence.find(std::to_string(needed - 8) + " bytes; " + std::to_string(needed) + " are needed"),

@@ -28,6 +28,8 @@ for name in "${names[@]}"; do
         [ -n "$(dpkg-deb -f "$file" "$field")" ] || fail "$name has no $field"
     done
     dpkg-deb -c "$file" >"$scratch/$name.contents"
+    size=$(awk '/^-/ { size += int(($3 + 1023) / 1024) } !/^-/ { size += 1 } END { print size }' "$scratch/$name.contents")
+    [ "$(dpkg-deb -f "$file" Installed-Size)" = "$size" ] || fail "$name: Installed-Size is not $size"
     if grep -vE '^[^ ]+ root/root .* \./(usr/.*)?$' "$scratch/$name.contents"; then fail "$name has files outside /usr, or not root's"; fi
     grep -q " ./usr/share/doc/$name/copyright$" "$scratch/$name.contents" || fail "$name has no copyright file"
     printf '%s: %s kB; depends on %s; recommends %s\n' "$name" "$(($(stat -c %s "$file") / 1024))" \

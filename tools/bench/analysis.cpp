@@ -155,7 +155,7 @@ Json analyse_scaling(const Rows& rows, const std::map<std::string, const Json*>&
     return list;
 }
 
-/// Below this multiple of the reference's own error, an error says more of the reference.
+/// An error below this multiple of the reference's own error says more about the reference than about the run.
 constexpr double above_reference = 3.0;
 
 /// Error of a trajectory's end against the step, for each scene, timestepper and solver.
@@ -212,8 +212,8 @@ Json count_failures(const Rows& rows) {
     return list;
 }
 
-/// Median of solve seconds of the recorded run over the least of the repeats, over runs long enough for a clock: what
-/// recording the error, and being the first run, cost.
+/// The cost of recording the error and of being the first run: the median, over runs long enough for a clock, of the
+/// recorded run's solve seconds over the least of the repeats.
 Json recording_ratio(const Rows& rows) {
     std::vector<double> ratios;
     for (const Json* row : rows) {

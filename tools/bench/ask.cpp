@@ -11,7 +11,7 @@ namespace delassus::bench {
 
 namespace {
 
-/// How the last words of a worker begin that had no memory left even to answer (process/out_of_memory.hpp).
+/// The beginning of the last message of a worker that had no memory left to answer (process/out_of_memory.hpp).
 constexpr std::string_view no_memory = "delassus: out of memory";
 
 /// Cuts the output into lines of JSON.
@@ -112,7 +112,7 @@ void judge_end(std::string& status, std::string& message, const ChildResult& chi
         return;
     }
     append(message, sentence);
-    // A result that was complete stays one, and says what happened afterwards.
+    // A complete result keeps its status, and its message tells what happened afterwards.
     if (!complete || child.over_memory) status = ended;
 }
 

@@ -20,14 +20,14 @@ inline constexpr double exit_limit = 10.0;
 /// have come. Throws Error if no process can be started.
 ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear);
 
-/// For a request that is answered by facts and no runs. what: of what, for messages. Throws InputError with the
+/// For a request that is answered by facts, without runs. what: their subject, for messages. Throws InputError with the
 /// worker's sentence, or that the process ended; Error if it was interrupted.
 void ask_for_facts(const WorkerSettings& worker, const Json& request, const std::string& what,
                    const std::function<void(const std::string& event, const Json& line)>& hear);
 
-/// Sets the status by how the process of a run ended, where that tells more than what it said, and appends a sentence
-/// to the message. status: of its result, empty if it gave none; done: it said that it had finished; reached: how far
-/// it had come, "after iteration 3", or empty. A result that was complete keeps its status.
+/// Sets the status by how the process of a run ended, if that tells more than its output did, and appends a sentence to
+/// the message. status: of its result, empty if it gave none. done: it said that it had finished. reached: how far it
+/// had come, "after iteration 3", or empty. A complete result keeps its status.
 void judge_end(std::string& status, std::string& message, const ChildResult& child, const WorkerSettings& worker,
                double time_limit, bool done, const std::string& reached);
 

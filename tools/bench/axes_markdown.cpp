@@ -16,7 +16,7 @@ std::string number_text(double value) {
     return fmt::format("{:g}", value);
 }
 
-/// What would break a table's row.
+/// The text without what would break a row of a table, and shortened.
 std::string cell_text(std::string text) {
     std::replace(text.begin(), text.end(), '|', '/');
     std::replace(text.begin(), text.end(), '\n', ' ');

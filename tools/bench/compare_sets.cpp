@@ -29,7 +29,7 @@ void check_comparable(const ResultSet& before, const ResultSet& after, bool any_
                                          what, a.at("settings").at(what).dump(), b.at("settings").at(what).dump()));
 }
 
-/// What makes two runs the same whatever the code.
+/// The key by which two runs are the same, whatever the code.
 std::string identity(const Json& row) {
     if (row.at("kind") == "solve")
         return Json{row.at("problem"), row.at("law"), row.at("label"), row.at("tolerance")}.dump();

@@ -15,7 +15,7 @@ namespace delassus::bench {
 
 namespace {
 
-/// The rest of the first line of the file that begins with key, without what stands around the value.
+/// The value on the first line of the file that begins with key, without the separators and quotes around it.
 std::string value_in(const char* file, const std::string& key) {
     std::ifstream stream(file);
     for (std::string line; std::getline(stream, line);) {

@@ -118,7 +118,7 @@ Judgement judge(const SimulationMeasurement& run, const std::vector<Bound>& boun
         compare(judgement, bounds);
         return judgement;
     }
-    // "diverged" is said by who measures: the run itself took the state for good.
+    // The measuring process says "diverged"; the run itself took the state for good.
     explain(judgement, run.status, run.message, "diverged");
     if (run.status == "unsolved") show(judgement, "natural");
     return judgement;

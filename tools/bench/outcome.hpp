@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What became of a run whose right answer is bounded (docs/stability.md).
+// The outcome of a run whose right answer is bounded (docs/stability.md).
 #pragma once
 
 #include <array>

@@ -51,7 +51,7 @@ public:
             if (row.status != "solved") break;
             if (best && !(row.error->natural < best->result.error->natural)) break;
             best = Candidate{label_of(request.solver), std::move(row), request.solution, tolerance};
-            if (!against.empty()) break;  // a second opinion need not be the last word
+            if (!against.empty()) break;  // a confirmation need not be as accurate as possible
         }
         return best;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Solutions that velocities are compared with, and ends of trajectories likewise, each with its own error, kept in a
-// cache by the hash of what they belong to.
+// References: solutions for the velocity error, and ends of trajectories. Each has an error of its own and is kept in a
+// cache by the hash of what it belongs to.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace delassus::bench {
 
-/// A reference whose natural error is above this is none.
+/// The largest natural error of a reference.
 inline constexpr double reference_accuracy = 1e-9;
 
 struct Reference {

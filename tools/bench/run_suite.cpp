@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Whether a solver that ended for this cause is taken to do so at every tighter tolerance. Crashes, false claims and
-/// errors are defects: each is run, to be seen.
+/// Whether a solver that ended for this cause is assumed to do so at every tighter tolerance. Crashes, false claims and
+/// errors are defects, so those runs are always made.
 bool fails_again(const std::string& cause) {
     static const std::set<std::string> causes = {"unsupported", "iteration_limit", "time_limit", "memory",
                                                  "diverged",    "stalled",         "infeasible", "numerical_failure"};
@@ -104,13 +104,13 @@ private:
         if (listener_.on_begin) listener_.on_begin(what, counts_.done + 1, total_);
     }
 
-    /// A row that says that its run was left out does not stand for it in a suite that leaves none out.
+    /// In a suite that leaves no run out, a row that says that its run was left out does not count.
     [[nodiscard]] bool done(const SolveTask& task) const {
         return file_.has(task.key) && (plan_.suite.skip_after_failure || !file_.end_of(task.key).skipped);
     }
 
-    /// Tasks of a problem, a law and a solver follow one another, the loosest tolerance first, so that the one that
-    /// tells is the one before. Of a chain of those left out, the looser one that did run is named.
+    /// Tasks of a problem, a law and a solver follow one another, the loosest tolerance first, so the task before this
+    /// one decides. In a chain of tasks that were left out, the row names the looser one that did run.
     bool skip(const SolveTask& task) {
         if (!plan_.suite.skip_after_failure) return false;
         const auto index = static_cast<std::size_t>(&task - tasks_.solves.data());

@@ -61,10 +61,11 @@ struct Watch {
     double momentum = 0.0, angular_momentum = 0.0;  ///< ‖change‖ since the start
     double speed = 0.0;                             ///< largest entry of |v|
     double end_speed = 0.0;                         ///< the same at the end
-    /// Largest entry of the way from the start to where the run comes that goes back from its end; NaN: not asked for.
+    /// Largest entry of the difference between the start and the end of the run back, with velocities reversed at the
+    /// end; NaN: not asked for.
     double reversal = std::numeric_limits<double>::quiet_NaN();
 
-    /// NaN stays, once it is there.
+    /// A NaN is kept.
     static void raise(double& worst, double value) {
         if (std::isnan(value) || value > worst) worst = value;
     }
@@ -121,7 +122,8 @@ public:
         time_limit_ = time_limit;
     }
 
-    /// extent, watch: measure them as well, on a clock that stands still. reverse: and Watch::reversal.
+    /// extent, watch: whether to measure them too, while the clock stands still. reverse: whether to measure
+    /// Watch::reversal.
     Run run(bool extent, bool watch, bool reverse) {
         std::vector<State> start;
         std::vector<StepRecord> records;
@@ -140,7 +142,7 @@ public:
         run_.message = result.status == RunStatus::TimeLimit || result.status == RunStatus::Interrupted
                            ? fmt::format("had come to t = {:.6g} s", reached_time(simulations_))
                            : result.message;
-        run_.seconds = result.seconds;
+        run_.seconds = result.step_seconds;
         if ((result.status == RunStatus::Finished || result.status == RunStatus::Unsolved) && reverse) go_back(start);
         for (const Extent& own : extents) {
             run_.extent.displacement += own.displacement;
@@ -210,8 +212,8 @@ private:
         extent.speed = std::max(extent.speed, mass_norm_squared(system, now, now.v));
     }
 
-    /// From the end with all velocities turned, by as many steps: in a system without damping and without forces that
-    /// depend on time or velocity that is the way back.
+    /// Runs as long again from the end with all velocities reversed. Without damping, and without forces that depend on
+    /// time or velocity, this leads back to the start.
     void go_back(const std::vector<State>& start) {
         run_.watch.reversal = 0.0;
         for (std::size_t i = 0; i < simulations_.size(); ++i) {

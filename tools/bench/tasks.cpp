@@ -77,7 +77,7 @@ void add_simulations(Tasks& tasks, const Suite& suite, const std::string& code) 
                 }
         }
     }
-    // What the end is measured against is part of the result.
+    // The reference that the end is measured against is part of the result.
     const auto& references = suite.references;
     for (auto& task : tasks.simulations) {
         const TaskScene& scene = tasks.scenes[task.scene];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a suite comes down to: single runs, each known by a key of its content.
+// The single runs that a suite consists of, each known by a key of its content.
 #pragma once
 
 #include <string>

@@ -40,7 +40,7 @@ PreparedProblem read(const Json& request) {
     return PreparedProblem(std::move(problem));
 }
 
-/// Of everything that a solver sees, names and the friction law apart: 16 hexadecimal digits.
+/// A hash, 16 hexadecimal digits, of everything that a solver sees except names and the friction law.
 std::string content_hash(const PreparedProblem& prepared) {
     const Problem& problem = prepared.problem();
     Hash hash;
@@ -118,7 +118,7 @@ void measure(const Channel& channel, const Json& request) {
     settings.record_curve = true;
     bool past_limit = false;
     settings.on_sample = [&](const CurveSample& sample) {
-        // A solver that goes on after it was told to stop falls silent here, and is found to hang.
+        // A solver that does not stop when told falls silent here, and counts as hung.
         if (past_limit) return;
         past_limit = sample.seconds >= settings.time_limit;
         channel.send("sample", {{"iteration", sample.iteration},

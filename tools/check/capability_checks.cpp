@@ -103,8 +103,8 @@ std::string check_tolerances(const Subject& subject) {
     return fmt::format("{} solves, each claim true", solves);
 }
 
-/// Below rounding there is nothing to reach; whoever cannot must say so. Solver and host round differently, so a claim
-/// is false here only if the error is more than rounding.
+/// A tolerance below rounding cannot be reached, and a solver that misses it must say so. Solver and host round
+/// differently, so a claim is false here only if the error exceeds rounding.
 constexpr double rounding = 1e-12;
 
 std::string check_impossible_tolerance(const Subject& subject) {

@@ -28,11 +28,11 @@ struct KnownProblem {
     [[nodiscard]] KnownProblem with_values(double factor) const;
 };
 
-/// Every capability but those of warm starts and distribution is needed by one of them at least.
+/// Each capability, except those of warm starts and distribution, is needed by at least one of them.
 [[nodiscard]] std::vector<KnownProblem> known_problems();
 
-/// Towers of 100 bodies on one another: iterative solvers need many iterations for them. Of every kind of cone and
-/// both laws, with H diagonal and reduced.
+/// Towers of 100 bodies on one another: iterative solvers need many iterations for them. They cover every kind of cone,
+/// both laws, and H diagonal and reduced.
 [[nodiscard]] std::vector<KnownProblem> towers();
 
 /// Free rows that repeat one another and ask for different velocities: there is no solution.

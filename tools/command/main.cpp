@@ -34,7 +34,7 @@ std::vector<std::filesystem::path> absolute(std::vector<std::filesystem::path> f
 
 namespace {
 
-/// What was printed has been written; throws Error if not. A disk may be full where standard output is a file.
+/// Throws Error unless everything printed has been written: standard output may be a file on a full disk.
 void flush_output() {
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout.flush())
         throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
@@ -92,7 +92,7 @@ int main(int argc, char** argv) {
     using namespace delassus;
     using namespace delassus::command;
     prepare_for_out_of_memory(exit_bad_input);
-    std::signal(SIGXFSZ, SIG_IGN);  // a file beyond the limit of sizes is one that cannot be written, with a sentence
+    std::signal(SIGXFSZ, SIG_IGN);  // writing beyond the size limit then fails with a sentence
     try {
         return parse_and_run(argc, argv);
     } catch (const Unsupported& error) {

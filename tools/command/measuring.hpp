@@ -31,8 +31,8 @@ private:
     std::chrono::steady_clock::time_point next_;
 };
 
-/// Writes a report: all of its files, and the page that page_text makes, or none of them. Where a part of the page is
-/// missing, removes the page that was there before, which would mislead, and returns the sentence why there is none.
+/// Writes all files of a report and the page that page_text makes, or none of them. If a part of the page is missing,
+/// it removes an older page, which would mislead, and returns the sentence that says why there is none.
 [[nodiscard]] std::string write_report_files(std::vector<std::pair<std::filesystem::path, std::string>> files,
                                              const std::filesystem::path& page,
                                              const std::function<std::string()>& page_text);

@@ -77,40 +77,26 @@ private:
     Clock::time_point begin_ = Clock::now(), shown_ = begin_;
 };
 
-struct Run {
-    RunOutcome outcome;
-    int exit_code = exit_solved;
-};
-
 int exit_code_of(RunStatus status) {
     if (status == RunStatus::Finished) return exit_solved;
     return status == RunStatus::Unsupported ? exit_unsupported : exit_not_converged;
 }
 
 /// Steps until the end, an interrupt or a failure.
-Run advance(std::vector<Simulation>& simulations, RunFolder* folder) {
-    const auto begin = Clock::now();
+RunResult advance(std::vector<Simulation>& simulations, RunFolder* folder) {
     Progress progress(simulations);
     const auto stepped = [&](std::size_t system) {
         if (folder != nullptr) folder->add_step(system);
         progress.show();
     };
-    const RunResult result = run_to_end(simulations, {stepped, interrupted});
+    RunResult result = run_to_end(simulations, {stepped, interrupted});
     progress.clear();
-    Run run{{"finished", result.message, seconds_since(begin)}, exit_code_of(result.status)};
-    if (result.status == RunStatus::Unsolved) {
-        run.outcome.status = "unsolved";
-    } else if (result.status == RunStatus::Interrupted) {
-        run.outcome.status = "interrupted";
-        run.outcome.message =
-            fmt::format("stopped at t = {:.9g} s; --resume goes on from there", reached_time(simulations));
-    } else if (result.status != RunStatus::Finished) {
-        run.outcome.status = "failed";
-    }
-    return run;
+    if (result.status == RunStatus::Interrupted)
+        result.message = fmt::format("stopped at t = {:.9g} s; --resume goes on from there", reached_time(simulations));
+    return result;
 }
 
-void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outcome) {
+void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
     for (auto& simulation : simulations) {
         const auto& system = simulation.system();
         const auto& totals = simulation.totals();
@@ -139,7 +125,7 @@ void print_summary(std::vector<Simulation>& simulations, const RunOutcome& outco
             fmt::print("  {} solves missed the tolerance with {} and were repeated with auto\n", totals.repeated_solves,
                        system.solver.name);
     }
-    if (outcome.status != "finished") fmt::print("{}\n", outcome.status);
+    if (status != RunStatus::Finished) fmt::print("{}\n", status_word(status));
 }
 
 int run(const RunArguments& arguments) {
@@ -175,12 +161,11 @@ int run(const RunArguments& arguments) {
     for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
     install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
-    const Run result = advance(simulations, folder.get());
+    const RunResult result = advance(simulations, folder.get());
     if (const auto bytes = guard.release())
         fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
 
-    const std::string report =
-        run_report_json(arguments.scene.file.filename().string(), scene, simulations, result.outcome);
+    const std::string report = run_report_json(arguments.scene.file.filename().string(), scene, simulations, result);
     if (folder) {
         folder->checkpoint();
         folder->write_report(report);
@@ -188,12 +173,12 @@ int run(const RunArguments& arguments) {
     if (arguments.json) {
         fmt::print("{}", report);
     } else {
-        print_summary(simulations, result.outcome);
+        print_summary(simulations, result.status);
     }
     for (const auto& simulation : simulations)
         for (const auto& warning : simulation.warnings()) fmt::print(stderr, "delassus: {}\n", warning);
-    if (!result.outcome.message.empty()) fmt::print(stderr, "delassus: {}\n", result.outcome.message);
-    return result.exit_code;
+    if (!result.message.empty()) fmt::print(stderr, "delassus: {}\n", result.message);
+    return exit_code_of(result.status);
 }
 
 }  // namespace

@@ -139,7 +139,7 @@ public:
     ChildResult run() {
         while (!ended()) {
             std::array<pollfd, 2> ends{pollfd{output_, POLLIN, 0}, pollfd{errors_, POLLIN, 0}};
-            // Once both ends are closed there is nothing to wait for but the end itself, which is near.
+            // Once both pipes are closed, only the end of the process is left to wait for, and it is near.
             const bool closed = output_ < 0 && errors_ < 0;
             poll(ends.data(), ends.size(), closed ? 2 : poll_milliseconds);
             if (ends[0].revents) drain(output_);
@@ -169,7 +169,7 @@ private:
                information.si_pid == pid_;
     }
 
-    /// Takes all that is there; an end that is closed turns to −1, which poll() ignores.
+    /// Reads all that is there. A closed end becomes −1, which poll() ignores.
     void drain(int& end) {
         std::array<char, 16384> buffer{};
         while (end >= 0) {

@@ -27,8 +27,8 @@ struct ChildSettings {
     std::uint64_t resident_limit = 0;
     std::optional<int> core;  ///< the only core that it may run on, as far as the system grants that
 
-    /// Called with each piece of standard output as it comes; answers the seconds that the child has from now on, in
-    /// place of what was left. May be empty: the output is then collected in ChildResult.
+    /// Called with each piece of standard output. Returns the seconds that the child has from now on, in place of those
+    /// it had left. May be empty: the output is then collected in ChildResult.
     std::function<double(std::string_view)> on_output;
     /// Asked about twenty times a second; true: the child is sent SIGINT, and killed if it is still there after
     /// cancel_grace. May be empty.
@@ -48,8 +48,8 @@ struct ChildResult {
     std::string errors;            ///< the last 64 KiB of standard error
 };
 
-/// Runs the program to its end in a process group of its own, whatever is left of the group being killed then. It dies
-/// with this process, and leaves no core dump. Throws Error if it cannot be started.
+/// Runs the program to its end in a process group of its own, then kills what is left of the group. The child dies with
+/// this process and leaves no core dump. Throws Error if it cannot be started.
 ChildResult run_child(const ChildSettings& settings);
 
 /// The cores that this process may run on.

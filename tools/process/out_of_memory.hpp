@@ -4,16 +4,17 @@
 
 namespace delassus {
 
-/// Readies this process for an allocation that fails. Some memory is kept back and given free at that moment, for the
-/// exception's way up: destructors allocate too (those of nlohmann::json do), and one that fails there ends the process
-/// by std::terminate. If it comes to that all the same, say_out_of_memory() and this exit code are its end.
+/// Prepares this process for an allocation that fails. Some memory is kept back and freed at that moment, so that the
+/// exception can travel up: destructors allocate too (those of nlohmann::json do), and one that fails there ends the
+/// process by std::terminate. If that happens all the same, the process ends with say_out_of_memory() and this exit
+/// code.
 void prepare_for_out_of_memory(int exit_code);
 
 /// What this process does, for the sentence: "solving", say. The text must live on.
 void set_activity(const char* activity);
 
-/// Whether an allocation has failed in this process. Streams swallow the exception, so that what follows may be told
-/// as something else.
+/// Whether an allocation has failed in this process. Streams swallow the exception, so a later error may hide this
+/// cause.
 [[nodiscard]] bool memory_has_ended();
 
 /// "delassus: out of memory while solving" to standard error. Allocates nothing.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What stands between a plugin in this process and the user: interrupts, crashes and hangs.
+// Protects the user from plugins in this process: interrupts, crashes and hangs.
 #pragma once
 
 #include <condition_variable>

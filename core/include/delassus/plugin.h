@@ -32,9 +32,10 @@ extern "C" {
 
 #define DELASSUS_PLUGIN_MAGIC 0x53414c44u /* "DLAS" in memory order on a little-endian machine */
 /* A minor version adds fields at the end of structs, and bits and numbers; it changes nothing that is there. Either
- * side may be the older one: a field marked "since 1.k" is read only if the struct_size that comes with it covers it.
- * Of a descriptor the host checks that itself: it takes any that has all fields of 1.0. */
-#define DELASSUS_ABI_MAJOR 1 /* must be equal on both sides */
+ * side may be the older one: a field marked "since 2.k" is read only if the struct_size that comes with it covers it.
+ * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
+ * Major version 1 was never released; its cones had no stride. */
+#define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
 #define DELASSUS_ABI_MINOR 1
 
 #if defined(_WIN32)
@@ -111,7 +112,7 @@ typedef struct delassus_problem {
     const double* a;   /* n */
     const double* b;   /* m */
     int32_t cone_count;
-    int32_t cone_stride;        /* bytes from one cone to the next, ≥ sizeof(delassus_cone) of version 1.0 */
+    int32_t cone_stride;        /* bytes from one cone to the next, ≥ sizeof(delassus_cone) of version 2.0 */
     const delassus_cone* cones; /* cone_count; delassus_cone_at(problem, k) is the k-th */
     int32_t h_block_count;      /* diagonal blocks of H (connected components of its pattern) */
     int32_t reserved;
@@ -237,7 +238,7 @@ typedef struct delassus_plugin_descriptor {
     /* One sentence on the last DELASSUS_ERROR or DELASSUS_NUMERICAL_FAILURE; never NULL. */
     const char* (*last_error)(void* solver);
 
-    /* Since 1.1. Optional (may be NULL): a last look at a problem whose needs are all met. Returns 1 to take it, or 0
+    /* Since 2.1. Optional (may be NULL): a last look at a problem whose needs are all met. Returns 1 to take it, or 0
      * after writing a short NUL-terminated reason. Cheap: no factorisation. */
     int32_t (*accepts)(void* solver, const delassus_problem* problem, char* reason, int32_t capacity);
 } delassus_plugin_descriptor;

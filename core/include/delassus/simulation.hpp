@@ -84,6 +84,19 @@ struct SimulationState {
 
 class EnergyGuard;
 
+/// One system of a scene, advanced step by step by its timestepper and its solver.
+///
+/// Life cycle: the constructor takes the state of the SceneSystem as the start; step() until finished(); in between,
+/// save() and load() keep and restore everything that the next steps depend on. run_to_end() does this for several
+/// systems in the order of their times.
+///
+/// Ownership: the simulation owns its state, its StepSolver with the loaded solvers, and its timestepper. It refers to
+/// the SceneSystem, which must stay at its address. Two simulations of one SceneSystem may exist, but not step at the
+/// same time. References that a simulation returns are valid until its next step() or load(). A simulation can be moved
+/// but not copied, and one thread at a time may use it.
+///
+/// Errors: what step() throws is listed there. A solve that misses its tolerance is not an error: the step counts, and
+/// record().solved, totals().unsolved_steps and totals().first_unsolved tell of it.
 class Simulation {
 public:
     /// system and registry outlive the simulation. Throws InputError or Unsupported for an integrator or a solver that

@@ -36,7 +36,7 @@ public:
     }
     /// The folder that relative paths in the text start from: that of the file.
     [[nodiscard]] std::filesystem::path folder() const { return std::filesystem::path(where_).parent_path(); }
-    /// The node did not come from the text but from that place.
+    /// Records that the node came from that place and not from the text.
     void comes_from(const YAML::Node& node, const std::string& place) { elsewhere_.emplace_back(node, place); }
 
 private:

@@ -7,7 +7,7 @@
 namespace delassus::fclib {
 namespace {
 
-/// Of the cones, friction and free rows: FCLib has no others.
+/// Transfers friction cones and free rows only: FCLib has no others.
 template <class Message>
 void transfer(Message& message, Problem& problem) {
     for (SparseMatrix* A : {&problem.H, &problem.D, &problem.E}) {

@@ -115,7 +115,7 @@ void note(Problem& problem, const std::string& text) {
     problem.notes += text;
 }
 
-/// Rounding is evened out silently, so that what is written as symmetric is so bit by bit.
+/// Asymmetry from rounding is averaged out silently, so that a matrix written as symmetric is symmetric bit by bit.
 void symmetrise(SparseMatrix& matrix, const char* name, Problem& problem) {
     for (const double value : matrix.value) {
         if (!std::isfinite(value)) return;  // validate() will say so

@@ -62,7 +62,7 @@ std::string last_complaint() {
         return 0;
     };
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
-    // Of a system call that failed: time, file and addresses, and among them the system's words.
+    // A failed system call is told by time, file and addresses, with the system's own words among them.
     const std::string opening = "error message = '";
     if (const auto at = text.find(opening); at != std::string::npos) {
         text.erase(0, at + opening.size());

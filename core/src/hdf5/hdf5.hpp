@@ -43,8 +43,8 @@ private:
     hid_t id_ = H5I_INVALID_HID;
 };
 
-/// Throws std::bad_alloc unless HDF5 has the memory that it needs for small files, and so many bytes more. It crashes
-/// where an allocation of its own fails.
+/// Throws std::bad_alloc unless there is the memory that HDF5 needs for small files, and so many bytes more. HDF5
+/// crashes if an allocation of its own fails.
 void require_memory(std::uint64_t bytes = 0);
 
 /// What HDF5 last complained about, in its words; empty if nothing.

@@ -8,10 +8,10 @@
 
 namespace delassus::hdf5 {
 
-/// Lets `read` look into the file and pack what it finds in a child process, and gives what was packed to `take`.
-/// HDF5 1.10 reads and writes beyond its memory on some damaged files (a fuzzer needs seconds to find one); so the
-/// child dies, and the caller gets an InputError. It gets one too, with the same sentence, if `read` throws any, and if
-/// `take` does not use up exactly what was packed.
+/// Runs `read` in a child process, where it packs what it finds in the file, and gives what was packed to `take`. HDF5
+/// 1.10 reads and writes beyond its memory on some damaged files (a fuzzer finds one within seconds). Then only the
+/// child dies, and the caller gets an InputError. If `read` throws an InputError, the caller gets one with the same
+/// sentence. It also gets one if `take` does not use up exactly what was packed.
 void read_isolated(const std::filesystem::path& file, const std::function<void(Packer&)>& read,
                    const std::function<void(Unpacker&)>& take);
 

@@ -47,8 +47,8 @@ private:
     }
 };
 
-/// Takes apart what a Packer made. The child read a file that may be hostile, so nothing it says is believed unchecked:
-/// what is not there is read as zero or empty, and complete() says so.
+/// Reads what a Packer made. The child read a file that may be hostile, so its message is checked: missing parts are
+/// read as zero or empty, and complete() is false then.
 class Unpacker {
 public:
     explicit Unpacker(std::string_view bytes) : bytes_(bytes) {}

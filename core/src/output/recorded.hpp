@@ -12,8 +12,8 @@
 
 namespace delassus {
 
-/// A figure of every step against time. Where there are many steps, in each stretch of time those with the least and
-/// the greatest value.
+/// A quantity of each step against time. Where there are many steps, each stretch of time keeps the steps with its
+/// least and its greatest value.
 struct RecordedSeries {
     std::string name, unit, description;
     std::vector<double> t, values;  ///< s; the values may be NaN
@@ -37,16 +37,16 @@ struct RecordedSystem {
     std::vector<RecordedSeries> series;
 };
 
-/// How much of it is read.
+/// Limits of what is read.
 struct RecordingLimits {
     std::int64_t frames = 600;        ///< of each system at most; ≥ 2
     std::int64_t points = 1000;       ///< of each series at most; ≥ 2
     std::int64_t contacts = 500'000;  ///< of each system, in all its chosen frames; all of them or none
 };
 
-/// Loads the HDF5 module and reads in a child process, for HDF5 crashes on some damaged files. Of a run that was not
-/// finished, or still goes on, what is on disk. Throws InputError for a file that is damaged, is no trajectory, or
-/// lacks the model.
+/// Loads the HDF5 module and reads in a child process, because HDF5 crashes on some damaged files. Of a run that was
+/// not finished, or still goes on, it reads what is on disk. Throws InputError for a file that is damaged, is no
+/// trajectory, or lacks the model.
 DELASSUS_API std::vector<RecordedSystem> read_trajectory(const std::filesystem::path& file,
                                                          const RecordingLimits& limits);
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// scene.html is what `delassus view` makes of the rest.
+/// The names in a run folder. `delassus view` makes scene.html from the others.
 constexpr std::array<std::string_view, 8> own_files = {"checkpoint.json", "scene.yaml", "trajectory.h5", "scene.pvd",
                                                        "report.json",     "vtk",        "problems",      "scene.html"};
 constexpr std::chrono::seconds between_checkpoints{5};

@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// Puts the totals in their places; not into what is null.
+/// Puts the totals in their places, except below a key whose value is null.
 void add_totals(const SimulationTotals& totals, Json& system) {
     for (const TotalColumn& column : total_columns) {
         if (!column.report) continue;
@@ -35,13 +35,30 @@ void add_totals(const SimulationTotals& totals, Json& system) {
 
 }  // namespace
 
+std::string_view status_word(RunStatus status) {
+    switch (status) {
+        case RunStatus::Finished:
+            return "finished";
+        case RunStatus::Unsolved:
+            return "unsolved";
+        case RunStatus::Interrupted:
+        case RunStatus::TimeLimit:
+            return "interrupted";
+        case RunStatus::Diverged:
+        case RunStatus::Failed:
+        case RunStatus::Unsupported:
+            return "failed";
+    }
+    return "failed";
+}
+
 std::string run_report_json(const std::string& scene, const Scene& read, std::vector<Simulation>& simulations,
-                            const RunOutcome& outcome) {
+                            const RunResult& result) {
     Json json = {{"scene", scene},
                  {"title", read.title},
-                 {"status", outcome.status},
-                 {"message", outcome.message},
-                 {"seconds", outcome.seconds},
+                 {"status", status_word(result.status)},
+                 {"message", result.message},
+                 {"seconds", result.seconds},
                  {"systems", Json::array()}};
     for (auto& simulation : simulations) {
         const SceneSystem& system = simulation.system();

@@ -2,22 +2,20 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delassus/export.hpp"
 #include "delassus/simulation.hpp"
+#include "simulation/run_loop.hpp"
 
 namespace delassus {
 
-/// How a run ended.
-struct RunOutcome {
-    std::string status;   ///< finished, interrupted, failed or unsolved (a solve missed its tolerance)
-    std::string message;  ///< what a person should know; may be empty
-    double seconds = 0.0;
-};
+/// The status of a run as reports say it: finished, unsolved, interrupted or failed.
+DELASSUS_API std::string_view status_word(RunStatus status);
 
 /// The report as JSON text (docs/running.md).
 DELASSUS_API std::string run_report_json(const std::string& scene, const Scene& read,
-                                         std::vector<Simulation>& simulations, const RunOutcome& outcome);
+                                         std::vector<Simulation>& simulations, const RunResult& result);
 
 }  // namespace delassus

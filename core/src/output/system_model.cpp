@@ -9,7 +9,7 @@
 namespace delassus {
 namespace {
 
-/// Where a point of the world at the start is in the frame of the body.
+/// A point of the world, at the start, in the frame of the body.
 Vector3 in_frame_of(const SceneSystem& system, BodyIndex body, const Vector3& point) {
     if (body == world_body) return point;
     const auto& [position, orientation] = system.bodies[static_cast<std::size_t>(body)].pose;

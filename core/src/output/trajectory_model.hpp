@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a picture of a system needs and what does not change while it moves. It stands in trajectory.h5 beside the
-// motion.
+// The part of a picture of a system that does not change while the system moves. It is stored in trajectory.h5 beside
+// the motion.
 #pragma once
 
 #include <array>

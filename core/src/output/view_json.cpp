@@ -60,7 +60,7 @@ Json links(const std::vector<TrajectoryLink>& links) {
     return list;
 }
 
-/// The poses of moving bodies, frame by frame, and once those of fixed ones.
+/// The poses of moving bodies for each frame, and those of fixed bodies once.
 void add_poses(const RecordedSystem& system, Json& json) {
     constexpr std::ptrdiff_t size = 7;
     const auto bodies = static_cast<std::ptrdiff_t>(system.model.bodies.size());

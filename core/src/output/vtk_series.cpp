@@ -88,7 +88,7 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
         }
         speed.push_back(static_cast<float>(v));
     };
-    // Of nodes: no body's, and the mean of their speeds.
+    // Cells made of nodes belong to no body and have the mean speed of their nodes.
     const auto add_node_cell = [&](const auto& nodes) {
         double v = 0.0;
         for (const auto node : nodes) {

@@ -33,7 +33,7 @@ inline const sdk::ConeOperations* find_cone_kind(std::string_view name) {
     return row == sdk::cone_table.end() ? nullptr : row;
 }
 
-/// What of its parameters counts in a hash: the first one always, as when μ was the only one.
+/// The bytes of its parameters that enter a hash. The first parameter always does, so that older hashes stay valid.
 inline std::size_t parameter_bytes(const Cone& cone) {
     return sizeof(double) * static_cast<std::size_t>(std::max(1, operations_of(cone).parameter_count));
 }

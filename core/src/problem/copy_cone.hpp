@@ -5,7 +5,7 @@
 
 namespace delassus {
 
-/// to = from, for steps of many contacts: vectors are left alone where neither cone has bounds.
+/// to = from, cheap for steps with many contacts: vectors are not touched where neither cone has bounds.
 inline void copy_cone(const Cone& from, Cone& to) {
     to.kind = from.kind;
     to.rows = from.rows;

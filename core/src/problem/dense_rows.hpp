@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rows of D as small dense matrices, for passes over it that a step repeats: a contact has its entries in the same
-// columns in all of its rows, six for each body, so that their indices are read once, and vectors by them too.
+// Rows of D as small dense matrices, for passes that every step repeats. All rows of a contact have their entries in
+// the same columns, six for each body, so indices and entries of vectors are read once for all of them.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,7 +30,7 @@ struct DenseRows {
     }
 };
 
-/// Says that entries a page ahead of a row will be read: the processor's own prefetching ends at each page.
+/// Prefetches the entries one page ahead of a row: the prefetching of the processor itself ends at each page.
 inline void prefetch_after(const delassus_matrix& D, std::int32_t row) {
     const auto ahead = static_cast<std::ptrdiff_t>(D.row_start[row]) + 512;
     if (ahead >= D.entries) return;
@@ -38,8 +38,8 @@ inline void prefetch_after(const delassus_matrix& D, std::int32_t row) {
     __builtin_prefetch(D.column + ahead);
 }
 
-/// Calls visit(DenseRows) where the rows of the cone, which share their columns, have the length of a contact: of one
-/// body (6) or two (12). Otherwise false.
+/// Calls visit(DenseRows) and returns true if the cone's rows, which share their columns, have the length of a contact
+/// of one body (6) or two (12). Returns false otherwise.
 template <class Visitor>
 bool for_dense_rows(const delassus_matrix& D, const delassus_cone& cone, Visitor&& visit) {
     const auto begin = D.row_start[cone.first_row];

@@ -74,11 +74,11 @@ struct AnyCone {
         return operations.gap(cone, lambda, u);
     }
 };
-/// Three rows, in the operations of sdk::FrictionCone but without its branches: near a solution of a pile, which of
-/// them a contact takes is a matter of chance, and a guess that fails costs more than the whole projection.
+/// Three rows, with the operations of sdk::FrictionCone but without its branches. Near the solution of a pile the
+/// processor cannot predict which branch a contact takes, and a wrong prediction costs more than the whole projection.
 struct SpatialFriction : sdk::FrictionCone {
     explicit SpatialFriction(const delassus_cone& cone) : mu(sdk::friction_coefficient(cone)) {}
-    const double mu;  // a copy: projections write numbers, which might be the cone's for all that the compiler knows
+    const double mu;  // a copy, since the compiler must assume that projections overwrite the cone
 
     [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
     [[nodiscard]] static constexpr bool is_linear() { return false; }
@@ -111,7 +111,7 @@ struct ErrorMeter::Implementation {
         take_mobility();
     }
 
-    /// Whether r and the diagonal of N, which is not negative, came out finite, as their sums tell.
+    /// Returns whether r and the diagonal of N, which is not negative, are finite, judged by their sums.
     bool take_mobility() {
         const Vector* diagonal = &reference.diagonal;
         if (prepared.mobility) {
@@ -132,14 +132,14 @@ struct ErrorMeter::Implementation {
         return plain_u;
     }
 
-    /// What Errors reports, in sums over the cones: of squares, but for the gap.
+    /// The measures of Errors as sums over the cones: of squares, except for the gap.
     struct Sums {
         double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
         double velocity = 0.0;  ///< ‖u‖²
         double rounding = 0.0;
     };
 
-    /// The rows of one cone, which share their columns, times x, and by λ into the impulse.
+    /// Multiplies the rows of one cone, which share their columns, by x, and adds their part of Dᵀλ to the impulse.
     struct RowsAtSolution {
         const double *x, *lambda;  // λ: of the cone's rows
         double *u, *magnitude;     // of the cone's rows
@@ -201,7 +201,7 @@ struct ErrorMeter::Implementation {
         double squared_velocity = 0.0;
         for (std::int32_t i = 0; i < rows; ++i) squared_velocity += u[i] * u[i];
         sums.velocity += squared_velocity;
-        if (on.is_linear()) {  // λ cancels; it must not leave its rounding
+        if (on.is_linear()) {  // λ cancels; leaving it out avoids its rounding
             sums.natural += square * squared_velocity;
         } else {
             for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - square * u[i];

@@ -32,7 +32,7 @@ struct Units {
     double size;
 };
 
-/// gain / cost, 0 where the gain ⟨data, direction⟩ is rounding; length: of the direction.
+/// gain / cost, or 0 if the gain ⟨data, direction⟩ is only rounding. length: of the direction.
 double bound(const VectorView& data, const Vector& direction, double cost, double length) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const double gain = data.dot(direction);
@@ -94,8 +94,8 @@ Vector without_range(const sdk::ProblemView& problem, const Units& units, const 
 
 }  // namespace
 
-// An interior point's x and λ diverge along y and d. Of a least-squares answer the residuals are proofs: −S²u, and
-// a + Dᵀλ − H x.
+// The x and λ of an interior-point method diverge along y and d. The residuals of a least-squares answer are proofs:
+// −S²u for d, and a + Dᵀλ − H x for y.
 double proven_size(const PreparedProblem& prepared, std::span<const double> x_values,
                    std::span<const double> lambda_values) {
     const sdk::ProblemView problem(prepared.raw());

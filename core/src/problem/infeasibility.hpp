@@ -8,9 +8,9 @@
 
 namespace delassus {
 
-/// A lower bound of the size of all solutions, ‖(R⁻¹x, S⁻¹λ)‖ / ‖S r‖, that an answer proves which is said to belong to
-/// a problem without one; 0 if it proves nothing. R = |diag H|^(−½); S and r are those of docs/errors.md with R² in
-/// place of H⁻¹. x: n, lambda: m.
+/// A lower bound of the size ‖(R⁻¹x, S⁻¹λ)‖ / ‖S r‖ of every solution. The answer (x, λ) of a solver that claims that
+/// there is none proves it; 0 if the answer proves nothing. R = |diag H|^(−½); S and r are those of docs/errors.md with
+/// R² in place of H⁻¹. x: n, lambda: m.
 [[nodiscard]] double proven_size(const PreparedProblem& problem, std::span<const double> x,
                                  std::span<const double> lambda);
 

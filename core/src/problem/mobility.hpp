@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the host itself asks of a definite H.
+// Solves with a definite H, and the diagonal of N, for the host itself.
 #pragma once
 
 #include <span>
@@ -8,16 +8,16 @@
 
 namespace delassus {
 
-/// The diagonal of N = D H⁻¹ Dᵀ + E and the velocities that go with given reactions. All calls with the same problem;
-/// new a and b are fine. Where H is diagonal it makes no blocks of N, unlike sdk::DelassusOperator, which serves the
-/// rest.
+/// The diagonal of N = D H⁻¹ Dᵀ + E and the velocities that go with given reactions. All calls are for the same
+/// problem, of which a and b may change. For a diagonal H no blocks of N are formed; any other H is left to
+/// sdk::DelassusOperator.
 class Mobility {
 public:
     /// Reads the structure of H; throws std::invalid_argument unless it is definite or n = 0.
     void analyze(const sdk::ProblemView& problem);
     /// Throws NumericalFailure if H is not positive definite.
     void factorize(const sdk::ProblemView& problem);
-    /// Says that D and E are new, while the values of H are those of the last factorisation.
+    /// Announces new D and E. The values of H must be those of the last factorisation.
     void refresh() { rows_are_new_ = true; }
 
     [[nodiscard]] const sdk::HInverse& inverse() const { return H_is_diagonal_ ? inverse_ : operator_.inverse(); }

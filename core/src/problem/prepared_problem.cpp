@@ -131,8 +131,8 @@ void PreparedProblem::renew(const Problem& other) {
     renew(Problem(other));
 }
 
-// Values of rows that are not finite show in the error meter's own pass over them, which saves a pass; finite ones that
-// overflow in it show as well, so that a look at the values decides.
+// The error meter passes over all rows anyway and shows values that are not finite, which saves a pass here. Finite
+// values that overflow there show as well, so the values themselves are then checked.
 void PreparedProblem::renew(Problem&& other) {
     auto& self = *implementation_;
     if (!self.same_places_of_H(other)) {
@@ -188,7 +188,7 @@ bool same_places(const SparseMatrix& here, const SparseMatrix& there) {
            here.column == there.column;
 }
 
-/// Solvers may keep where bounds stand as long as the pattern stays.
+/// Solvers may keep the positions of bounds while the pattern stays.
 void exchange_cones(std::vector<Cone>& here, std::vector<Cone>& there, bool new_places) {
     const auto has_bounds = [](const Cone& cone) { return operations_of(cone).has_bounds; };
     if (new_places || std::none_of(there.begin(), there.end(), has_bounds)) return here.swap(there);
@@ -296,7 +296,7 @@ void PreparedProblem::Implementation::point_to_arrays() {
     raw.h_block_index = blocks.index.data();
 }
 
-// A candidate by pattern counts as definite once its factorisation succeeds with pivots that are not rounding.
+// A matrix that its pattern makes a candidate is definite if its factorisation succeeds with pivots above rounding.
 void PreparedProblem::Implementation::detect_structure() {
     const Structure before = structure;
     structure = structure_by_pattern(problem.H, blocks);
@@ -308,7 +308,7 @@ void PreparedProblem::Implementation::detect_structure() {
     raw.needs = need_of(structure);
     const sdk::ProblemView view(raw);
     try {
-        // One that was there has analysed the same pattern.
+        // An existing factorisation has analysed the same pattern.
         if (!candidate || before != structure || candidate.use_count() > 1) {
             candidate = std::make_shared<Mobility>();
             candidate->analyze(view);
@@ -354,8 +354,8 @@ void PreparedProblem::Implementation::identify() {
     raw.values_id = values.value();
 }
 
-// Hashing every entry would cost a step as much as judging its solution; numbers drawn from a counter tell as well that
-// something is new.
+// Hashing every entry would cost as much as judging the step's solution. Numbers from a counter mark new content just
+// as well.
 void PreparedProblem::Implementation::identify_anew(bool new_places) {
     static std::atomic<std::uint64_t> drawn = 0;
     Hash hash;

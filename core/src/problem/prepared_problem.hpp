@@ -26,7 +26,7 @@ struct PreparedProblem::Implementation {
     RedundancyCheck redundancy;
 
     void lay_out();
-    /// raw's pointers to the arrays of the problem and the cones' numbers, which lay_out() placed.
+    /// Points raw to the arrays of the problem and to the numbers of the cones, which lay_out() placed.
     void point_to_arrays();
     /// Whether the other problem has as many columns, and the entries of H in the same places.
     [[nodiscard]] bool same_places_of_H(const Problem& other) const;
@@ -38,11 +38,12 @@ struct PreparedProblem::Implementation {
     void detect_structure();
     /// new_places: whether entries of D or E stand elsewhere than at the last call.
     void derive_needs(bool new_places);
-    /// The needs that come with the law, in place of another law's.
+    /// Replaces the needs of another law by those of the present one.
     void set_law_needs();
-    /// Identities from the content.
+    /// Makes the identities from the content.
     void identify();
-    /// Identities that no other problem of this process has; the pattern's only if the places are new.
+    /// Takes identities that no other problem of this process has. The pattern gets a new one only if the places are
+    /// new.
     void identify_anew(bool new_places);
 };
 

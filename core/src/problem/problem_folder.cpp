@@ -21,7 +21,7 @@ namespace {
 constexpr std::array<std::string_view, 6> problem_files = {"problem.json", "H.mtx", "D.mtx", "E.mtx", "a.mtx", "b.mtx"};
 constexpr std::array<std::string_view, 3> solution_files = {"x.mtx", "lambda.mtx", "report.json"};
 
-/// So many zeros may be asked for by problem.json alone.
+/// The longest vector of zeros that problem.json may ask for without a file for it.
 constexpr std::int32_t most_rows_without_file = 1'000'000;
 
 bool present(const fs::path& file) {

@@ -18,8 +18,7 @@ struct ProblemJson {
     std::string source;
     std::string notes;
 
-    /// The rows that the runs cover are known to be m; expanding them is left to expand_cones, for when the vectors
-    /// have shown that m is honest.
+    /// The runs are known to cover m rows. expand_cones() expands them later, once the vectors have confirmed m.
     struct Run {
         ConeKind kind = ConeKind::Free;
         std::int32_t rows = 0;                        ///< of a block

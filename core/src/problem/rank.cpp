@@ -23,8 +23,8 @@ sdk::SparseRowsView view_of(const SparseMatrix& matrix) {
             matrix.column.data(), matrix.value.data()};
 }
 
-/// D and E side by side, transposed: a column for each row of the problem. They may have different units: each gets
-/// the same overall size where both are there.
+/// D and E side by side, transposed: one column for each row of the problem. D and E may have different units, so both
+/// are scaled to the same overall size where both are present.
 sdk::SparseColumns columns_of(const SparseMatrix& D, const SparseMatrix& E, std::int32_t m) {
     std::vector<Eigen::Triplet<double, std::int32_t>> entries;
     entries.reserve(D.value.size() + E.value.size());

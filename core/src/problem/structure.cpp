@@ -128,7 +128,7 @@ bool RedundancyCheck::by_values(const SparseMatrix& D, const SparseMatrix& E) {
         if (!is_rigid(E, row) || D.value[begin] == 0.0) continue;
         Hash hash;
         hash.add(D.column.data() + begin, static_cast<std::size_t>(end - begin) * sizeof(std::int32_t));
-        // The ratio to the row's first entry, rounded so that parallel rows meet in one bucket as a rule.
+        // The ratio to the row's first entry, rounded so that parallel rows usually fall into one bucket.
         for (auto k = begin; k < end; ++k) {
             const auto ratio = static_cast<float>(D.value[k] / D.value[begin]);
             hash.add(&ratio, sizeof ratio);

@@ -24,8 +24,8 @@ struct BlockPartition {
 
 [[nodiscard]] BlockPartition connected_components(const SparseMatrix& matrix);
 
-/// The structure of H as far as its pattern and symmetry tell: Reduced, Unsymmetric, or a candidate among Diagonal,
-/// Blocks and Definite that definiteness has still to confirm.
+/// The structure of H as far as its pattern and symmetry show it: Reduced, Unsymmetric, or a candidate (Diagonal,
+/// Blocks or Definite) that still has to be checked for definiteness.
 [[nodiscard]] Structure structure_by_pattern(const SparseMatrix& H, const BlockPartition& blocks);
 
 /// Semidefinite or Indefinite, for a symmetric matrix that is not definite: whether H + 1e-10 diag(|H|) is.

@@ -5,14 +5,14 @@
 
 namespace delassus {
 
-/// What is known to be right of a problem, and need not be looked at.
+/// The parts of a problem that are known to be valid and need no check.
 struct Known {
     bool places = false;  ///< where entries stand, and that the cones' rows are m
     bool H = false;       ///< the values of H
     bool rows = false;    ///< the values of D and b
 };
 
-/// As validate(), but for what is known.
+/// As validate(), without checking the known parts.
 void validate(const Problem& problem, const Known& known);
 
 }  // namespace delassus

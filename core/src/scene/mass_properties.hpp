@@ -14,8 +14,8 @@ struct MassProperties {
     Inertia inertia;      ///< about the centre for density one, in the axes of the body's frame, m⁵
 };
 
-/// Of the union of the shapes, which are taken as if they did not overlap. Planes have no volume; InputError for them
-/// and for open meshes.
+/// For the union of the shapes, which are assumed not to overlap. Planes have no volume: InputError for them and for
+/// open meshes.
 MassProperties mass_properties(std::span<const Shape> shapes);
 
 }  // namespace delassus::scene

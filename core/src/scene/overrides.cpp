@@ -22,7 +22,7 @@ std::optional<std::size_t> position_of(const YAML::Node& list, const std::string
     return std::nullopt;
 }
 
-/// What may stand in place of a step that leads nowhere.
+/// The valid alternatives to a step that leads nowhere.
 std::string choices(const YAML::Node& node, const std::string& step) {
     std::vector<std::string> names;
     if (node.IsMap())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Beams of a scene: made with bodies at their nodes, or between bodies that are there.
+// Beams of a scene: made with bodies at their nodes, or between existing bodies.
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -48,7 +48,7 @@ void SystemReader::read_beam(const YAML::Node& item, const Copy& copy) {
     std::vector<BodyIndex> bodies;
     std::optional<Vector3> from, to;
     bool section = false;
-    std::string_view of_made_bodies;  // a key that has no meaning where the bodies are there
+    std::string_view of_made_bodies;  // a key that has no meaning between existing bodies
     const auto made = [&](std::string_view key, Handler read) {
         return std::pair<std::string_view, Handler>{key, [&of_made_bodies, key, read](const YAML::Node& n) {
                                                         of_made_bodies = key;

@@ -20,7 +20,7 @@ public:
     /// The keys of a system, for the map that holds them.
     [[nodiscard]] std::vector<std::pair<std::string_view, Handler>> handlers();
 
-    /// Builds the system from what the handlers met. place: the map, for what is missing in it.
+    /// Builds the system from what the handlers have read. place: the map, for messages about missing keys.
     void build(const YAML::Node& place);
 
 private:
@@ -78,7 +78,7 @@ private:
     void take_name(const YAML::Node& node, Numbers& numbers, std::string_view kind, const std::string& name,
                    std::int32_t number);
 
-    /// Adds the place to the sentence of an InputError that knows none.
+    /// Adds the place to an InputError whose sentence names none.
     template <class Action>
     auto at(const YAML::Node& node, Action&& action) {
         try {

@@ -16,6 +16,10 @@ namespace {
 
 using StepClock = std::chrono::steady_clock;
 
+double seconds_since(StepClock::time_point begin) {
+    return std::chrono::duration<double>(StepClock::now() - begin).count();
+}
+
 /// The system that is farthest behind, or none if all have reached their ends.
 std::optional<std::size_t> next_system(const std::vector<Simulation>& simulations) {
     std::optional<std::size_t> next;
@@ -45,14 +49,11 @@ void judge(const std::vector<Simulation>& simulations, RunResult& result) {
     }
 }
 
-}  // namespace
-
-RunResult run_to_end(std::vector<Simulation>& simulations, const RunHooks& hooks) {
-    RunResult result;
+void step_to_end(std::vector<Simulation>& simulations, const RunHooks& hooks, RunResult& result) {
     for (auto next = next_system(simulations); next; next = next_system(simulations)) {
         if (hooks.interrupted && hooks.interrupted()) {
             result.status = RunStatus::Interrupted;
-            return result;
+            return;
         }
         const auto begin = StepClock::now();
         try {
@@ -66,15 +67,24 @@ RunResult run_to_end(std::vector<Simulation>& simulations, const RunHooks& hooks
             result.status = RunStatus::Unsupported;
             result.message = error.what();
         }
-        result.seconds += std::chrono::duration<double>(StepClock::now() - begin).count();
-        if (result.status != RunStatus::Finished) return result;
+        result.step_seconds += seconds_since(begin);
+        if (result.status != RunStatus::Finished) return;
         if (hooks.stepped) hooks.stepped(*next);
-        if (result.seconds > hooks.time_limit) {
+        if (result.step_seconds > hooks.time_limit) {
             result.status = RunStatus::TimeLimit;
-            return result;
+            return;
         }
     }
     judge(simulations, result);
+}
+
+}  // namespace
+
+RunResult run_to_end(std::vector<Simulation>& simulations, const RunHooks& hooks) {
+    const auto begin = StepClock::now();
+    RunResult result;
+    step_to_end(simulations, hooks, result);
+    result.seconds = seconds_since(begin);
     return result;
 }
 

@@ -25,14 +25,15 @@ enum class RunStatus {
 
 struct RunResult {
     RunStatus status = RunStatus::Finished;
-    std::string message;   ///< what a person should know; empty where the run finished
-    double seconds = 0.0;  ///< of wall time within the steps; hooks do not count
+    std::string message;        ///< what a person should know; empty where the run finished
+    double seconds = 0.0;       ///< wall time of the whole run, hooks included
+    double step_seconds = 0.0;  ///< wall time within the steps alone
 };
 
 struct RunHooks {
     std::function<void(std::size_t)> stepped;                     ///< after each step, with its system's index
     std::function<bool()> interrupted;                            ///< asked before each step
-    double time_limit = std::numeric_limits<double>::infinity();  ///< s, on RunResult::seconds
+    double time_limit = std::numeric_limits<double>::infinity();  ///< s, on RunResult::step_seconds
 };
 
 /// Steps the system that is farthest behind until all have reached their ends or something stops the run. Throws

@@ -48,7 +48,7 @@ bool can(const Registry& registry, const std::string& name, std::uint64_t needs)
                        [&](const PluginInfo& plugin) { return plugin.name == name && plugin.missing(needs) == 0; });
 }
 
-/// Who can take problems with these needs without being named; ascending.
+/// The plugins, by ascending name, that can take problems with these needs and work without being named by the user.
 std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) {
     std::vector<std::string> names = registry.capable(needs);
     std::erase_if(names, [&](const std::string& name) {
@@ -92,7 +92,8 @@ public:
             done = runner.run(*solver, ranked.stage) || ranked.last;
             if (done) break;
         }
-        // Nothing of the rule is installed, or none got there: everyone else who can, from the best so far.
+        // No solver of the rule is installed, or none reached the tolerance: try every other capable solver, each from
+        // the best iterate so far.
         if (!done)
             for (const auto& name : unnamed(registry_, needs)) {
                 const RankedStage ranked{

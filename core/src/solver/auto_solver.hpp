@@ -24,7 +24,7 @@ inline constexpr const char* ranking_file_name = "ranking.json";
 /// The plugins that `auto` may load for problems with these needs (DELASSUS_CAN_* bits), of whatever size.
 struct AutoChoice {
     std::vector<std::string> first;  ///< that start; more than one where it depends on m
-    std::vector<std::string> later;  ///< that are loaded where those before them do not get there
+    std::vector<std::string> later;  ///< that are loaded if those before them do not reach the tolerance
 };
 /// options: as configured. Throws as make_auto.
 [[nodiscard]] DELASSUS_API AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs,

@@ -18,8 +18,8 @@ struct FinishOptions {
 /// Takes the keys "finish" and "finish_at" out of the options. Throws InputError on a bad value, or on finish_at alone.
 [[nodiscard]] FinishOptions take_finish(OptionTexts& options);
 
-/// A solver in three stages: main to the finish's tolerance, the finish to the one that is asked, and, where that
-/// failed, main again from the best of both. chosen: all options as the user wrote them.
+/// A solver in three stages: `main` down to the finish's tolerance, the finish down to the requested one, and, if that
+/// failed, `main` again from the best iterate of both. chosen: all options as the user wrote them.
 [[nodiscard]] Solver make_finished(Solver main, Solver finish, double finish_at, OptionTexts chosen);
 
 }  // namespace delassus

@@ -17,7 +17,7 @@ namespace delassus {
 
 namespace {
 
-// The descriptor of version 1.0, whose last field is last_error: a plugin must have at least these fields.
+// The descriptor of version 2.0, whose last field is last_error: a plugin must have at least these fields.
 constexpr std::uint32_t smallest_descriptor =
     offsetof(delassus_plugin_descriptor, last_error) + sizeof(delassus_plugin_descriptor::last_error);
 

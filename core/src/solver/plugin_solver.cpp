@@ -39,7 +39,7 @@ private:
     bool running_ = false;
 };
 
-/// What stands behind the progress callback during one solve.
+/// The context of the progress callback during one solve.
 struct Listener {
     const SolveSettings& settings;
     const ErrorMeter* meter;  // null unless the curve is recorded
@@ -112,7 +112,7 @@ Status status_of(std::int32_t raw) {
     }
 }
 
-/// That there is no solution is a claim like others.
+/// Checks the claim that there is no solution, as any other claim is checked.
 void check_proof(const PreparedProblem& problem, const Solution& answer, SolveReport& report) {
     const double size = proven_size(problem, answer.x, answer.lambda);
     if (size >= beyond_all_sizes) return;

@@ -6,11 +6,10 @@
 //
 // It is the problem with the velocities (x, s), H = 1, D' = [D e], a' = (0, −1), b' = 0: x = Dᵀλ, s = eᵀλ − 1,
 // u = D x + e s. It always has a solution, with ⟨λ, u⟩ = ‖x‖² + (eᵀλ) s = 0. Either
-//   s < 0: D x = u + |s| e lies inside Υ* on all cones and is 0 on free rows. A λ ∈ Υ with Dᵀλ = 0 would have 0 = ⟨λ, D
-//   x⟩ > 0
-//          unless its cone part vanished. The cone is pointed, up to dependence among the free rows. The smallest ‖Dᵀλ‖
-//          with eᵀλ = 1 is d = ‖x‖/eᵀλ by homogeneity.
-//   s = 0: Dᵀλ = 0 with eᵀλ = 1: λ itself shows that it is not.
+//   s < 0: D x = u + |s| e lies inside Υ* on all cones and is 0 on free rows. A λ ∈ Υ with Dᵀλ = 0 would have
+//          0 = ⟨λ, D x⟩ > 0 unless its cone part vanished. So the cone is pointed, up to dependence among the free
+//          rows. The smallest ‖Dᵀλ‖ with eᵀλ = 1 is d = ‖x‖/eᵀλ by homogeneity.
+//   s = 0: Dᵀλ = 0 with eᵀλ = 1: λ itself shows that the cone is not pointed.
 // A reduced problem has E in the place of D Dᵀ: one velocity s, D' = e.
 #include "delassus/qualification.hpp"
 
@@ -103,7 +102,7 @@ std::vector<double> squared_rows(const Problem& problem) {
     return square;
 }
 
-/// One factor a block: a mean row of length 1. A block without entries keeps its own.
+/// Scales each block by one factor, so that its rows have length 1 in the mean. A block without entries is left alone.
 void scale(Recession& recession, const std::vector<double>& square) {
     std::size_t row = 0;
     for (const Cone& cone : recession.cones) {
@@ -177,7 +176,7 @@ void find_pointedness(const Problem& problem, const Recession& recession, const 
     const SolveReport report = solver.solve(prepared, solution, settings);
     if (!(report.error.natural <= accepted)) return;
 
-    // Not from s, whose root would lose half of the digits.
+    // Not computed from s, whose root would lose half of the digits.
     double square = 0.0, sum = 0.0;
     for (std::int32_t j = 0; j < problem.n(); ++j)
         square += solution.x[static_cast<std::size_t>(j)] * solution.x[static_cast<std::size_t>(j)];

@@ -22,21 +22,22 @@ namespace {
 constexpr double claim_slack = 1.001;
 /// A balance error at this level is rounding, whatever tolerance was asked.
 constexpr double balance_floor = 1e-12;
-/// A claim is true at the rounding floor as well: up to so many times Errors::rounding (sums of some hundred products),
-/// and up to this natural error at most.
+/// A claim also counts as true at the rounding floor: up to so many times Errors::rounding (sums of some hundred
+/// products), and up to this natural error at most.
 constexpr double rounding_slack = 32.0;
 constexpr double rounding_limit = 1e-10;
-/// A claim is lost where natural is so many times smaller than it can be.
+/// Rounding has swallowed a claim if natural is below its own lower bound by this factor.
 constexpr double lost_in_rounding = 10.0;
 
-/// What natural is at least, by what does not add velocities to reactions. With R = z − P(z − F) its map for z = S⁻¹λ
-/// and F = S u, P(z − F) − (z − F) = F − R lies in Υ* and is orthogonal to P(z − F) = z − R (Moreau), so that
+/// A lower bound of natural from quantities that do not add velocities to reactions. Let R = z − P(z − F) be the
+/// natural map for z = S⁻¹λ and F = S u. Then P(z − F) − (z − F) = F − R lies in Υ* and is orthogonal to P(z − F) = z −
+/// R (Moreau), so that
 ///
 ///     ‖R‖ ≥ dist(F, Υ*)      and      ‖R‖ ‖z + F‖ + ‖R‖² ≥ |⟨z, F⟩|
 ///
-/// are Errors::dual and Errors::gap. In numbers, reactions that are large enough swallow a velocity to the last digit:
-/// then R is 0, whatever u. rounding/ε is ‖z‖/‖S r‖ or more. A set that is no cone (a box) has no Υ*, and a gap of
-/// another kind.
+/// are Errors::dual and Errors::gap. In floating point, reactions that are large enough swallow a velocity to the last
+/// digit; then R is 0 for any u. rounding/ε is at least ‖z‖/‖S r‖. A set that is not a cone (a box) has no Υ*, and its
+/// gap means something else.
 double least_natural(const Problem& problem, const Errors& error) {
     for (const Cone& cone : problem.cones)
         if (!operations_of(cone).is_cone) return 0.0;
@@ -180,7 +181,7 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
     const double balance_bound = std::max(claimed, balance_floor);
     if (report.status == Status::Solved &&
         !(report.error.natural <= natural_bound && report.error.balance <= balance_bound)) {
-        // A claim that only the rounding of x stands against is no lie, and no solution either.
+        // If only the rounding of x contradicts the claim, the answer is neither a false claim nor a solution.
         const double rounding = n > 0 ? rounding_of_balance(problem.problem(), solution) : 0.0;
         if (report.error.natural <= natural_bound && report.error.balance <= rounding_slack * rounding) {
             report.status = Status::NumericalFailure;

@@ -7,8 +7,8 @@
 
 namespace delassus {
 
-/// What stands behind a Solver: one plugin, or several in stages. Settings are checked and the starting point is in
-/// place when run() is called; the result is judged afterwards.
+/// The inside of a Solver: one plugin, or several in stages. run() is called after the settings have been checked and
+/// the starting point is in place; its result is judged afterwards.
 class Solver::Implementation {
 public:
     Implementation() = default;
@@ -21,8 +21,8 @@ public:
     [[nodiscard]] virtual const OptionTexts& options() const = 0;
     /// See Solver::refusal.
     [[nodiscard]] virtual std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) = 0;
-    /// Solves; fills the report's status, message, counts, times, curve and stages. Returns the errors of the result
-    /// if they have been measured, which then is finite.
+    /// Solves; fills the report's status, message, counts, times, curve and stages. Returns the errors of the result if
+    /// they have been measured; the result is then finite.
     virtual std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                                       SolveReport& report) = 0;
 };

@@ -89,7 +89,7 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
     const SolveReport result = solver.solve(problem, solution, settings);
 
     const Errors error = other ? problem_.meter().measure(solution.x, solution.lambda) : result.error;
-    // A stage with the other law is there for its end point, whatever that is worth under the problem's own.
+    // A stage with the other law provides a start for the next one, whatever its error under the problem's own law.
     if (!started_ || worst_of(error) < worst_of(error_) || other) {
         best_ = std::move(solution);
         error_ = error;
@@ -112,7 +112,7 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
         report_.status = Status::TimeLimit;
         return true;
     }
-    if (report_.status == Status::Solved) report_.status = Status::Stalled;  // as far as this stage was to go
+    if (report_.status == Status::Solved) report_.status = Status::Stalled;  // it reached only the goal of this stage
     return false;
 }
 
@@ -132,7 +132,7 @@ SolveSettings StageRunner::settings_of(const Stage& stage, DecreaseWatch& watch,
     };
     if (settings_.on_progress)
         settings.on_progress = [this, shifted](const CurveSample& sample) { settings_.on_progress(shifted(sample)); };
-    // The curve is one of the problem's own law; of a stage with the other it has the end only.
+    // The curve shows errors under the problem's own law. A stage with the other law adds its end only.
     if (&problem != &problem_) settings.record_curve = false;
     if (settings_.on_sample)
         settings.on_sample = [this, shifted](const CurveSample& sample) { settings_.on_sample(shifted(sample)); };

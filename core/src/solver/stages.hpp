@@ -22,7 +22,8 @@ struct Stage {
     /// The stage is given up when, at the measured decrease, it would not reach its tolerance within max_iterations
     /// (see DecreaseWatch).
     bool watched = false;
-    /// The law that the stage solves with, if not the problem's own, which judges the result all the same.
+    /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's own
+    /// law.
     std::optional<Law> law = {};
 };
 
@@ -57,7 +58,7 @@ public:
     /// solution: the start if settings.warm_start; the best so far at any time. All must outlive the runner.
     StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings, SolveReport& report);
 
-    /// The problem as the stage's solver sees it: the own one, or a copy under the other law, which is made once.
+    /// The problem that the stage's solver gets: the problem itself, or a copy under the other law, which is made once.
     [[nodiscard]] const PreparedProblem& problem_of(const Stage& stage);
 
     /// Runs one stage. True if nothing is left to do: solved, proven infeasible, cancelled, or a limit of the whole
@@ -68,7 +69,7 @@ public:
     /// cheaply: then there is nothing to do. Call it before the first stage.
     bool solved_at_start();
 
-    /// Of the solution, by the meter of the problem; none where nothing was run and there was no start.
+    /// The errors of the solution by the meter of the problem; none if nothing was run and there was no start.
     [[nodiscard]] std::optional<Errors> error() const { return started_ ? std::optional(error_) : std::nullopt; }
 
     /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".

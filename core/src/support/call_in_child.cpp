@@ -25,7 +25,7 @@ namespace {
 constexpr char holds_result = 'R';
 constexpr char holds_refusal = 'E';
 constexpr char message_end = '.';
-/// The message of a child whose memory did not suffice.
+/// The message of a child that ran out of memory.
 constexpr std::string_view out_of_memory = "M.";
 
 void send(std::string_view message, int pipe) {
@@ -57,7 +57,7 @@ std::string message_of(const Task& task) {
     }
 }
 
-/// Nothing that is thrown may leave the child: it would go on as a second parent.
+/// No exception may leave the child, which would otherwise go on as a second parent.
 [[noreturn]] void run_in_child(const Task& task, int pipe) noexcept {
     for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGPIPE}) std::signal(signal, SIG_DFL);
     const rlimit no_core{0, 0};

@@ -9,15 +9,14 @@
 
 namespace delassus {
 
-/// The bytes that work() returns, which runs in a child process: for libraries that crash or do not end on damaged
-/// files. What work() prints goes nowhere. Throws InputError with the sentence of an exception of work(), or one that
-/// says that the library fails on the file, or used more than `seconds` of processor time; std::bad_alloc if work()
-/// does.
+/// Runs work() in a child process and returns its bytes: some libraries crash or hang on damaged files. What work()
+/// prints is dropped. Throws InputError with the sentence of an exception of work(), or one that says that the library
+/// failed on the file or used more than `seconds` of processor time. Throws std::bad_alloc if work() does.
 DELASSUS_API std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
                                        const std::function<std::string()>& work);
 
-/// Runs work(), which writes the file, in a child process: for libraries that crash where memory or the disk ends.
-/// Throws likewise.
+/// Runs work(), which writes the file, in a child process: some libraries crash when memory or the disk runs out.
+/// Throws as the function above.
 DELASSUS_API void write_in_child(const std::filesystem::path& file, const char* library,
                                  const std::function<void()>& work);
 

@@ -8,7 +8,8 @@
 
 namespace delassus {
 
-/// Whether no value is infinite or NaN. v · 0 is NaN for those alone; eight sums side by side need no branch a value.
+/// Whether all values are finite. v · 0 is NaN for infinite values and NaN only. Eight sums side by side need no branch
+/// for each value.
 inline bool all_finite(std::span<const double> values) {
     std::array<double, 8> sums{};
     std::size_t k = 0;

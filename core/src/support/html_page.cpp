@@ -7,7 +7,7 @@
 namespace delassus {
 namespace {
 
-/// text with `by` in place of each `what`.
+/// Replaces each `what` in text by `by`.
 std::string replaced(std::string_view text, std::string_view what, std::string_view by) {
     std::string result;
     for (;;) {

@@ -10,11 +10,11 @@
 
 namespace delassus::trajectory {
 
-/// Sees to it that the disk has room for so many bytes at the end of the file, before HDF5 begins to change it: HDF5
-/// changes what is there in place, and a file that it cannot end to change is lost.
+/// Reserves disk space for so many bytes at the end of the file before HDF5 begins to change it. HDF5 changes a file in
+/// place, and the file is lost if the disk is full before the change is complete.
 void reserve(hid_t open_file, std::uint64_t bytes, const std::string& file);
 
-/// Gives back what was reserved and is not part of the file.
+/// Releases reserved space that has not become part of the file.
 void release_reserve(hid_t open_file);
 
 /// A handle of what HDF5 has just made or opened.

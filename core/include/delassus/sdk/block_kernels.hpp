@@ -14,7 +14,6 @@
 
 namespace delassus::sdk {
 
-inline constexpr int largest_group = 6;  ///< rows
 inline constexpr int chunk_padding = 6;
 
 /// Where chunk k of a row starts among the coefficients of a group.
@@ -153,7 +152,7 @@ inline void transpose_multiply_chunk(const double* value, std::int32_t start, in
     }
 }
 
-/// Calls `body.template operator()<Rows>()` for a group's number of rows, 1 to largest_group.
+/// Calls `body.template operator()<Rows>()` for a group's number of rows, 1 to 6: largest_block_rows.
 template <class Body>
 inline void with_rows(int rows, Body&& body) {
     switch (rows) {

@@ -15,13 +15,13 @@
 
 namespace delassus::sdk {
 
-/// Rows first … first + rows − 1 of a matrix; at most largest_group where they go into BlockRows.
+/// Rows first … first + rows − 1 of a matrix; at most largest_block_rows where they go into BlockRows.
 struct RowGroup {
     std::int32_t first = 0;
     std::int32_t rows = 0;
 };
 
-static_assert(largest_block_rows <= largest_group);
+static_assert(largest_block_rows == 6, "with_rows() has a case for each number of rows");
 
 /// The rows of a problem by what is projected together: the blocks of friction, and single rows of separable kinds.
 inline std::vector<RowGroup> row_groups(const ConeRange& cones) {

@@ -10,7 +10,7 @@
 
 namespace delassus::sdk {
 
-/// A block that is projected as a whole has at most so many rows.
+/// A block that is projected, or treated by a kernel, as a whole has at most so many rows.
 inline constexpr std::int32_t largest_block_rows = 6;
 /// A kind has at most so many parameters.
 inline constexpr std::int32_t most_parameters = 4;
