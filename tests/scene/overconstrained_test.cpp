@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Mechanisms with redundant joints, written with few digits, against their closed forms.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <bit>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "delassus/error.hpp"
 #include "delassus/plan.hpp"
@@ -166,12 +170,54 @@ TEST(Overconstrained, BennettLinkageTakesTheMotorsSpeedAtTheStart) {
 
 TEST(Overconstrained, AStartFarFromTheMotorsAngleIsAssembled) {
     const Bennett bennett;
-    Running run(parse_scene(bennett.scene(8, "linear: {start: 0.6, rate: 0}", head("newmark", 0.001, 0.1)), "bennett"));
-    for (std::size_t k = 0; k < 3; ++k)
-        EXPECT_LT((position(run, fmt::format("bar_{}", k)) - bennett.middle(bennett.start + 0.6, k)).norm(), 1e-6) << k;
-    ASSERT_EQ(run.simulation.warnings().size(), 1U);
-    EXPECT_NE(run.simulation.warnings()[0].find("does not fit"), std::string::npos);
-    finish(run, [] {});
+    for (const double angle : {0.6, 1.6, -2.2, 2.9}) {
+        const auto motion = fmt::format("linear: {{start: {}, rate: 0}}", angle);
+        Running run(parse_scene(bennett.scene(8, motion, head("newmark", 0.001, 0.05)), "bennett"));
+        for (std::size_t k = 0; k < 3; ++k)
+            EXPECT_LT((position(run, fmt::format("bar_{}", k)) - bennett.middle(bennett.start + angle, k)).norm(), 2e-5)
+                << k << " at " << angle;
+        ASSERT_EQ(run.simulation.warnings().size(), 1U);
+        EXPECT_NE(run.simulation.warnings()[0].find("does not fit"), std::string::npos);
+        finish(run, [] {});
+    }
+}
+
+// Rows that are good to keep at the start are not so half a turn later.
+TEST(Overconstrained, ATurningBennettLinkageChangesTheRowsItKeeps) {
+    const Bennett bennett;
+    for (const auto* method : {"hht", "euler_implicit_linearized"}) {
+        Running run(
+            parse_scene(bennett.scene(6, "linear: {start: 0, rate: 1.7}", head(method, 0.002, 4.0)), "bennett"));
+        const auto first = run.system().kept_rows();
+        bool changed = false;
+        double worst = 0.0;
+        finish(run, [&] {
+            changed = changed || run.system().kept_rows() != first;
+            const double theta = bennett.start + 1.7 * run.simulation.state().t;
+            worst = std::max(worst, (position(run, "bar_1") - bennett.middle(theta, 1)).norm());
+        });
+        EXPECT_TRUE(changed) << method;
+        EXPECT_LT(worst, 2e-4) << method;
+        Simulation again(run.scene.systems[0], registry());
+        EXPECT_EQ(run.system().kept_rows(), first);  // a new run begins with those of the start
+    }
+}
+
+TEST(Overconstrained, GoesOnWithTheRowsOfItsCheckpoint) {
+    const auto scene = [] {
+        return parse_scene(Bennett().scene(6, "linear: {start: 0, rate: 1.7}", head("hht", 0.002, 4.0)), "bennett");
+    };
+    Running whole(scene()), resumed(scene());
+    while (whole.simulation.state().t < 1.5) whole.simulation.step();
+    EXPECT_NE(whole.system().kept_rows(), resumed.system().kept_rows());
+    resumed.simulation.load(whole.simulation.save());
+    EXPECT_EQ(whole.system().kept_rows(), resumed.system().kept_rows());
+    for (int i = 0; i < 300; ++i) {
+        whole.simulation.step();
+        resumed.simulation.step();
+    }
+    EXPECT_EQ(whole.simulation.state().q, resumed.simulation.state().q);
+    EXPECT_EQ(whole.simulation.state().v, resumed.simulation.state().v);
 }
 
 TEST(Overconstrained, ReactionsKeepTheirLayout) {
@@ -270,7 +316,10 @@ TEST(Overconstrained, PlanarFourBarInSpaceKeepsItsEnergy) {
         finish(run, [&] { above = std::max(above, std::abs(position(run, "coupler")[2])); });
         EXPECT_LT(above, 1e-9) << method;
         EXPECT_LT(run.simulation.totals().worst_drift, 1e-4) << method;
-        EXPECT_LT(std::abs(run.simulation.totals().energy - run.simulation.totals().start_energy), 0.1) << method;
+        // Methods of second order keep it; Euler's loses some of the 4 J that move.
+        const bool second = std::string(method).find("euler") == std::string::npos;
+        EXPECT_LT(std::abs(run.simulation.totals().energy - run.simulation.totals().start_energy), second ? 0.01 : 0.3)
+            << method;
     }
 }
 
@@ -356,8 +405,8 @@ TEST(Overconstrained, MotorsThatContradictEachOtherAreNamed) {
     } catch (const StepFailure& error) {
         EXPECT_NE(std::string(error.what()).find("contradicts them now"), std::string::npos) << error.what();
     }
-    const auto contradictory = parse_scene(scene("linear: {start: 0.5, rate: 0}"), "motors");
-    EXPECT_THROW(Simulation(const_cast<SceneSystem&>(contradictory.systems[0]), registry()), InputError);
+    Scene contradictory = parse_scene(scene("linear: {start: 0.5, rate: 0}"), "motors");
+    EXPECT_THROW(Simulation(contradictory.systems[0], registry()), InputError);
 }
 
 TEST(Overconstrained, ConsistentStartsKeepTheirBits) {
@@ -369,7 +418,8 @@ TEST(Overconstrained, ConsistentStartsKeepTheirBits) {
         const State after = system.initial_state();
         EXPECT_EQ(done.displacement, 0.0) << name;
         EXPECT_TRUE(before.q == after.q) << name;
-        if (done.velocity_share_of_all == 0.0) EXPECT_TRUE(before.v == after.v) << name;
+        EXPECT_EQ(done.velocity_share_of_all, 0.0) << name;
+        EXPECT_TRUE(before.v == after.v) << name;
     }
 }
 

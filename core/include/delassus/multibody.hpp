@@ -332,8 +332,9 @@ public:
     /// Chooses anew which rows to keep, if those that are kept nearly depend on each other at this state and others do
     /// not, or if rows that were left out no longer hold; moves the state to where the new ones hold. Returns whether
     /// it did: then timesteppers must be made anew. Throws StepFailure where rows that are left out no longer hold and
-    /// no others are better.
-    bool renew_rows(State& state);
+    /// no others are better. step: steps taken so far; linkages of m rows are looked at every 10 (1 + m²/2000) steps,
+    /// and where left-out rows have drifted.
+    bool renew_rows(State& state, std::int64_t step);
     /// C of all rows, kept or not; constraint_rows().
     void all_constraints(const State& state, double* C) const;
     /// λ of all rows from that of those that are kept: 0 in the others.

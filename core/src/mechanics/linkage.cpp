@@ -82,8 +82,15 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         const Body& body = bodies[static_cast<std::size_t>(members_[k])];
         (*at_)[members_[k]].column = static_cast<std::int32_t>(6 * k);
         box.extend((*at_)[members_[k]].x);
-        radius = std::max(radius, std::sqrt(body.inertia.diagonal().maxCoeff() / body.parameters.mass));
+        arms_.push_back(std::sqrt(body.inertia.diagonal().maxCoeff() / body.parameters.mass));
+        radius = std::max(radius, arms_.back());
     }
+    const auto reach = [&](BodyIndex body, const Vector3d& point) {
+        box.extend(point);
+        if (body == world_body || (*at_)[body].column < 0) return;
+        double& arm = arms_[static_cast<std::size_t>((*at_)[body].column / 6)];
+        arm = std::max(arm, (point - (*at_)[body].x).norm());
+    };
     bool grounded = false;
     for (const auto index : own_joints) {
         const Joint& joint = joints[static_cast<std::size_t>(index)];
@@ -93,8 +100,9 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         if (joint.gear) {
             rows_.push_back({&joint, nullptr, false, false});
         } else {
-            box.extend(vector(joint.parameters.point));
-            if (joint.parameters.kind == JointKind::Distance) box.extend(vector(joint.parameters.second_point));
+            const JointParameters& given = joint.parameters;
+            reach(given.first, vector(given.point));
+            reach(given.second, vector(given.kind == JointKind::Distance ? given.second_point : given.point));
         }
         int driven = 0;
         for (const Row& row : joint.rows) {
@@ -290,7 +298,7 @@ Linkage::Residual Linkage::rate_residual(const State& state, const std::vector<s
 // ---- The shortest change ----
 //
 // With the unit lengths of a metric, z = T⁻¹ δ, where M = T⁻ᵀ T⁻¹ for that of the mass: T = 1/√m of a mass centre and
-// L⁻ᵀ of a rotation, J = L Lᵀ. The metric of lengths has T = 1 and 1/size. The shortest z with A z = −c, A = C_q T, has
+// L⁻ᵀ of a rotation, J = L Lᵀ. The metric of lengths has T = 1 and 1/arm. The shortest z with A z = −c, A = C_q T, has
 // no part in the null space of A. Rows are scaled to length one.
 
 Eigen::SparseMatrix<double, Eigen::RowMajor> Linkage::scaled(const Values& values, Metric metric) const {
@@ -299,7 +307,7 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> Linkage::scaled(const Values& value
     for (std::size_t k = 0; k < members_.size(); ++k) {
         const auto first = static_cast<int>(6 * k);
         const Body& body = (*bodies_)[static_cast<std::size_t>(members_[k])];
-        Matrix3d turn = Matrix3d::Identity() / size_;
+        Matrix3d turn = Matrix3d::Identity() / arms_[k];
         double line = 1.0;
         if (metric == Metric::Mass) {
             line = 1.0 / std::sqrt(body.parameters.mass);
@@ -326,7 +334,7 @@ Eigen::VectorXd Linkage::unscaled(const Eigen::VectorXd& change, Metric metric) 
             line /= std::sqrt(body.parameters.mass);
             turn = body.inertia.llt().matrixU().solve(Vector3d(turn));
         } else {
-            turn /= size_;
+            turn /= arms_[k];
         }
     }
     return result;
@@ -399,8 +407,14 @@ namespace {
 constexpr double singular = 1e-10;
 /// Rows that are dependent to this relative measure repeat each other: coordinates of six digits are no better.
 constexpr double dependent = 1e-5;
+/// For directions and residuals on the way to a configuration.
+constexpr double coarse = 1e-4;
 
 }  // namespace
+
+void Linkage::approach(State& state) const {
+    if (residual(state, all_).value > coarse) settle(state, all_, Metric::Mass, coarse, 100);
+}
 
 Linkage::Residual Linkage::assemble_positions(State& state, const std::vector<std::size_t>& rows) const {
     return settle(state, rows, Metric::Mass, singular, 100);
@@ -468,7 +482,6 @@ Linkage::Rank Linkage::rank_at(const State& state, const std::vector<std::size_t
 bool Linkage::move(State& state, std::uint32_t seed) const {
     constexpr int parts = 5;
     constexpr double part = 0.08;     // rad, or as a share of the size
-    constexpr double coarse = 1e-4;   // for directions and residuals on the way
     constexpr double straight = 0.1;  // what must be left of a direction from part to part
     const State begin = state;
     const auto n = static_cast<Eigen::Index>(6 * members_.size());

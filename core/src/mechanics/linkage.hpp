@@ -49,6 +49,9 @@ public:
     [[nodiscard]] bool is_rounding(const Residual& position) const;
     [[nodiscard]] static bool is_rounding_of_rates(const Residual& rate);
 
+    /// If rows are far from holding, state ← positions at which all of them nearly do, so that it can be seen which
+    /// ones imply others.
+    void approach(State& state) const;
     /// state ← the nearest positions, in the mass metric, at which these rows hold. The residual that is left.
     Residual assemble_positions(State& state, const std::vector<std::size_t>& rows) const;
     /// state ← the nearest velocities, in the mass metric, at which the rates of these rows vanish.
@@ -103,6 +106,7 @@ private:
     std::vector<std::int32_t> numbers_;
     std::vector<std::size_t> all_, scleronomic_;
     bool has_loops_ = false;
+    std::vector<double> arms_;         // of members: the farthest joint from the mass centre, or the radius of inertia
     double size_ = 0.0, reach_ = 0.0;  // reach: largest coordinate
     std::shared_ptr<Placements> at_;   // of all linkages; columns: within each. Work space of the call that runs
 };

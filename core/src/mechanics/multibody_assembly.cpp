@@ -22,6 +22,12 @@ constexpr double most_drift = 1e-3;
 /// Rows whose dependence has ended where they have drifted.
 constexpr double dependent_after_drift = 1e-2;
 
+/// Ten for a spatial loop; so many that looking costs no more than proportional to the rows where there are many.
+std::int64_t steps_between_looks(const Linkage& linkage) {
+    const auto rows = static_cast<std::int64_t>(linkage.numbers().size());
+    return 10 * (1 + rows * rows / 2000);
+}
+
 /// What assembly must reach.
 constexpr double assembled_position = 1e-9, assembled_velocity = 1e-7;
 
@@ -56,8 +62,8 @@ void MultibodySystem::Implementation::number_rows() {
     }
 }
 
-void MultibodySystem::Implementation::assemble(const Linkage& linkage, State& state, Assembly& done) const {
-    const State given = state;
+void MultibodySystem::Implementation::assemble(const Linkage& linkage, const State& given, State& state,
+                                               Assembly& done) const {
     const auto rows = kept_of(linkage);
     if (!linkage.is_rounding(linkage.residual(state, rows))) {
         const auto left = linkage.assemble_positions(state, rows);
@@ -101,13 +107,15 @@ const Assembly& MultibodySystem::assemble() {
         keep_rows(self.first_kept_rows);
         return *self.assembly;
     }
-    State state = initial_state();
+    const State given = initial_state();
+    State state = given;
     Assembly done;
-    for (auto& linkage : Linkage::of(self.bodies, self.joints, self.at)) {
+    for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {
+        linkage.approach(state);
         const auto rows = linkage.independent_rows(state);
         const bool leaves_out_rows = rows.size() < linkage.numbers().size();
         if (leaves_out_rows) self.keep_of(linkage, rows);
-        self.assemble(linkage, state, done);
+        self.assemble(linkage, given, state, done);
         if (!leaves_out_rows) continue;
         const auto left = linkage.residual(state, self.left_out_of(linkage));
         if (left.value > most_drift)
@@ -142,13 +150,14 @@ void MultibodySystem::keep_rows(const std::vector<std::int32_t>& rows) {
     self.number_rows();
 }
 
-bool MultibodySystem::renew_rows(State& state) {
+bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
     auto& self = *implementation_;
     bool renewed = false;
     for (const auto& linkage : self.redundant) {
         auto rows = self.kept_of(linkage);
         const auto drift = linkage.residual(state, self.left_out_of(linkage));
-        const bool drifted = drift.value > most_drift;
+        // A method whose steps are long opens all joints alike.
+        const bool drifted = drift.value > most_drift && drift.value > 10.0 * linkage.residual(state, rows).value;
         if (drifted) {
             auto needed = linkage.rows_by_rank(state, dependent_after_drift);
             if (needed.size() <= rows.size())
@@ -157,13 +166,13 @@ bool MultibodySystem::renew_rows(State& state) {
                     "mechanism's size of {:.3g} m (or in rad)",
                     linkage.joint_of(drift.row), drift.value, linkage.size()));
             rows = std::move(needed);
-        } else if (!linkage.better_rows(state, rows)) {
+        } else if (step % steps_between_looks(linkage) != 0 || !linkage.better_rows(state, rows)) {
             continue;
         }
         self.keep_of(linkage, rows);
         Assembly done;
         try {
-            self.assemble(linkage, state, done);
+            self.assemble(linkage, State(state), state, done);
         } catch (const InputError& error) {
             throw StepFailure(error.what());
         }

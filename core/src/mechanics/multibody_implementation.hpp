@@ -106,8 +106,9 @@ struct MultibodySystem::Implementation {
     /// Keeps these rows of a linkage, and all others as they are.
     void keep_of(const mechanics::Linkage& linkage, const std::vector<std::size_t>& rows);
     void number_rows();
-    /// state ← with the kept rows of a linkage assembled, if they do not hold. Throws InputError.
-    void assemble(const mechanics::Linkage& linkage, State& state, Assembly& done) const;
+    /// state ← with the kept rows of a linkage assembled, if they do not hold; done ← with what that changed since
+    /// `given`. Throws InputError.
+    void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done) const;
 
     /// The two angles of a gear with their factors in C.
     struct GearTerm {

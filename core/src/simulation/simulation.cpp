@@ -85,12 +85,12 @@ void Simulation::make_method() {
 }
 
 void Simulation::renew_rows(State& state) {
-    /// So often rows are looked at, and where the constraints have drifted.
+    /// MultibodySystem::renew_rows() does nothing in other steps, as long as nothing has drifted further.
     constexpr std::int64_t every = 10;
     constexpr double drifted = 1e-4;
     MultibodySystem& mechanics = *system_->system;
-    const bool all_kept = mechanics.m() == mechanics.constraint_rows();
-    if (all_kept || (now_.step % every != 0 && record_.drift < drifted) || !mechanics.renew_rows(state)) return;
+    if (mechanics.m() == mechanics.constraint_rows() || (now_.step % every != 0 && record_.drift < drifted)) return;
+    if (!mechanics.renew_rows(state, now_.step)) return;
     const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
     make_method();
     if (control_) control_->load(control);
