@@ -379,6 +379,7 @@ Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& v
 Linkage::Residual Linkage::settle(State& state, const std::vector<std::size_t>& rows, Metric metric, double threshold,
                                   int iterations) const {
     constexpr double longest = 0.4;  // of one iteration: rad, or as a share of the size
+    constexpr double part = 0.1;     // of a motor's residual, likewise
     constexpr double good = 1e-10;   // where no iteration helps, this much is well
     Values values;
     double last = HUGE_VAL;
@@ -389,6 +390,12 @@ Linkage::Residual Linkage::settle(State& state, const std::vector<std::size_t>& 
             return left;
         last = left.value;
         evaluate(state, rows, values);
+        // A motor that is far off is followed in parts, so that the other joints stay nearly closed on the way.
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            const double most = part * unit_of(rows[i]);
+            double& C = values.C[static_cast<Eigen::Index>(i)];
+            if (rows_[rows[i]].driven) C = std::clamp(C, -most, most);
+        }
         Eigen::VectorXd change = shortest(values, values.C, metric, threshold);
         double most = 0.0;
         for (std::size_t k = 0; k < members_.size(); ++k) {
