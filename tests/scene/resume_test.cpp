@@ -68,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"pendulum", "trapezoidal", 0.0005}, Case{"pendulum", "trapezoidal_linearized", 0.0005},
                     Case{"pendulum", "newmark", 0.0005}, Case{"pendulum", "hht", 0.0005},
                     Case{"heavy_top", "generalized_alpha", 0.0005}, Case{"four_bar", "generalized_alpha", 0.002},
-                    Case{"bouncing_ball", "euler_implicit_linearized", 0.02},
+                    Case{"bricard", "hht", 0.02}, Case{"bouncing_ball", "euler_implicit_linearized", 0.02},
                     Case{"brick_wall", "euler_implicit_linearized", 0.002},
                     Case{"sphere_pile", "euler_implicit_linearized", 0.01}),
     [](const auto& parameter) { return std::string(parameter.param.scene) + "_" + parameter.param.integrator; });

@@ -109,6 +109,10 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
             fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
         fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
                    totals.worst_penetration, totals.most_contacts);
+        if (const auto start = simulation.start(); !start.empty()) fmt::print("  start: {}\n", start);
+        if (const auto left_out = system.system->constraint_rows() - system.system->m(); left_out > 0)
+            fmt::print("  {} of {} rows of joints and motors left out: others imply them\n", left_out,
+                       system.system->constraint_rows());
         if (system.sleeping)
             fmt::print("  sleeping: {} bodies and nodes at the end; {} parts of problems left out\n",
                        simulation.record().sleeping, totals.resting_parts);

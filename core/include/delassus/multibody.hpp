@@ -233,6 +233,19 @@ struct ContactMaterial {
     double restitution = 0.0;  ///< in [0, 1]
 };
 
+/// What MultibodySystem::assemble() changed.
+struct Assembly {
+    // The largest change of a body:
+    double displacement = 0.0, rotation = 0.0;      ///< m, rad
+    double velocity = 0.0, angular_velocity = 0.0;  ///< m/s, rad/s
+    /// The largest change of a position: in sizes of its linkage, or in rad.
+    double position_share = 0.0;
+    /// The largest change of velocities over the largest velocity of the linkage; of linkages that were not at rest.
+    double velocity_share = 0.0;
+    /// The same of all linkages: 1 where motors set bodies in motion that were at rest.
+    double velocity_share_of_all = 0.0;
+};
+
 /// Built by add_…(), which check their input (InputError with one sentence), and completed by finish(). From then on it
 /// serves as a DynamicalSystem.
 class DELASSUS_API MultibodySystem : public DynamicalSystem {
@@ -299,8 +312,36 @@ public:
     [[nodiscard]] std::array<Vector3, 2> velocities(const State& state, BodyIndex index) const;
     /// Of bodies; the spheres of nodes are not among them.
     [[nodiscard]] const std::vector<Shape>& shapes() const;
-    /// Rows of joint `index` within C and λ: first row and count.
+    /// Rows of joint `index` within all_constraints() and all_multipliers(): first row and count.
     [[nodiscard]] std::array<std::int32_t, 2> joint_rows(std::int32_t index) const;
+
+    // ---- Assembly, and rows that others imply ----
+    /// Makes the start consistent, after finish(): leaves out rows of joints that others imply in every configuration
+    /// (docs/mechanics.md), moves joined bodies by the least change (in the metric of the mass) to where C(q, 0) = 0,
+    /// and changes velocities by the least to where C_q v + C_t = 0. A start that is consistent up to rounding keeps
+    /// its bits. initial_state() then is the result, and C, its derivatives, constraint_blocks() and λ speak of the
+    /// rows that are kept. Later calls keep the first rows again and change nothing else. Throws InputError, and names
+    /// a joint, if there is no such position or velocity.
+    const Assembly& assemble();
+    /// Rows of all joints and motors, kept or not.
+    [[nodiscard]] std::int32_t constraint_rows() const;
+    /// Their numbers, ascending; all until assemble().
+    [[nodiscard]] const std::vector<std::int32_t>& kept_rows() const;
+    /// Keeps these rows; ascending. Timesteppers made before do not know.
+    void keep_rows(const std::vector<std::int32_t>& rows);
+    /// Chooses anew which rows to keep, if those that are kept nearly depend on each other at this state and others do
+    /// not, or if rows that were left out no longer hold; moves the state to where the new ones hold. Returns whether
+    /// it did: then timesteppers must be made anew. Throws StepFailure where rows that are left out no longer hold and
+    /// no others are better. step: steps taken so far; linkages of m rows are looked at every 10 (1 + m²/2000) steps,
+    /// and where left-out rows have drifted.
+    bool renew_rows(State& state, std::int64_t step);
+    /// C of all rows, kept or not; constraint_rows().
+    void all_constraints(const State& state, double* C) const;
+    /// λ of all rows from that of those that are kept: 0 in the others.
+    [[nodiscard]] std::vector<double> all_multipliers(const std::vector<double>& kept) const;
+    /// Names of the joints that have rows that are left out, ascending by joint.
+    [[nodiscard]] std::vector<std::string> joints_with_rows_left_out() const;
+
     /// The spheres of nodes have the numbers from shapes().size() on, in the order of add_node_contact().
     /// The bodies of a contact's first and its second shape, or body_count() + number of a node; world_body for the
     /// world.

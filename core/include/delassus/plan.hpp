@@ -22,7 +22,7 @@ struct PlanLine {
 struct SystemPlan {
     std::string name;
     std::int32_t velocities = 0;   ///< n
-    std::int32_t constraints = 0;  ///< m of the bilateral constraints
+    std::int32_t constraints = 0;  ///< rows of joints and motors, kept or not
     std::int32_t parts = 0;        ///< of the first step's problem that go to a solver, each apart from the others
     std::vector<PlanLine> kept, left_out;
     /// Plugins: those that the first step loaded, then those that later contacts will load.

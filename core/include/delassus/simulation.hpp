@@ -27,7 +27,7 @@ struct StepRecord {
     double kinetic = 0.0;        ///< the kinetic part of it, J
     Vector3 momentum{};          ///< kg m/s
     Vector3 angular_momentum{};  ///< about the origin, kg m²/s
-    double drift = 0.0;          ///< largest |C| of the bilateral constraints, in their own units (m, rad)
+    double drift = 0.0;          ///< largest |C| of all rows of joints and motors, in their own units (m, rad)
     double penetration = 0.0;    ///< of the deepest contact, m; ≥ 0
     std::int64_t contacts = 0;   ///< contacts and other unilateral blocks in the problem
     std::int64_t sleeping = 0;   ///< bodies and nodes that sleep
@@ -76,8 +76,10 @@ struct SimulationTotals {
 struct SimulationState {
     std::int64_t step = 0;
     State state;
-    std::vector<double> memory;    ///< Timestepper::save(), warm starts included
-    std::vector<double> control;   ///< AdaptiveStepping::save(); empty with fixed steps
+    std::vector<double> memory;   ///< Timestepper::save(), warm starts included
+    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps
+    std::vector<std::int32_t>
+        rows_left_out;             ///< of the bilateral constraints (MultibodySystem::kept_rows()); ascending
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
     SimulationTotals totals;
 };
@@ -118,7 +120,8 @@ public:
     [[nodiscard]] const State& state() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
-    /// What the last step reported; empty before the first, and where a run goes on.
+    /// What the last step reported; empty before the first, and where a run goes on. Its multipliers are those of all
+    /// rows, 0 in rows that are left out.
     [[nodiscard]] const StepReport& report() const { return report_.step; }
     /// The contacts in report(), in their order.
     [[nodiscard]] DELASSUS_API std::vector<ContactRecord> contacts() const;
@@ -126,6 +129,10 @@ public:
 
     /// What a user should know about a run that has not failed so far, one sentence each.
     [[nodiscard]] DELASSUS_API std::vector<std::string> warnings() const;
+
+    [[nodiscard]] const Assembly& assembly() const { return assembly_; }
+    /// How assembly changed the start: one clause, or nothing where it did not beyond rounding.
+    [[nodiscard]] DELASSUS_API std::string start() const;
 
     [[nodiscard]] DELASSUS_API SimulationState save() const;
     /// Throws InputError if the sizes are not the system's.
@@ -137,12 +144,17 @@ private:
     /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     void advance(State& state, AdaptiveStepReport& report);
+    /// The timestepper and what controls its steps.
+    void make_method();
+    /// Has the system choose anew which rows to keep where it must; the method then starts anew.
+    void renew_rows(State& state);
 
     SceneSystem* system_;
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<AdaptiveStepping> control_;  // empty with fixed steps
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
+    Assembly assembly_;
     SimulationState now_;
     StepRecord record_;
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next

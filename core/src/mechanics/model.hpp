@@ -40,6 +40,11 @@ struct Gear {
     Angle first, second;
     double numerator = 1.0, denominator = 1.0;
     double offset = 0.0;  ///< at t = 0
+
+    [[nodiscard]] double value(const Placements& at) const {
+        const double angle = denominator * second.value(at) - numerator * first.value(at) - offset;
+        return std::remainder(angle, 2.0 * M_PI) / denominator;
+    }
 };
 
 /// A joint's rows, in order; a gear has one of its own.
@@ -47,9 +52,9 @@ struct Joint {
     JointParameters parameters;
     std::vector<Row> rows;
     std::unique_ptr<Gear> gear;
-    Angle angle;  ///< Revolute
-    Row slide;    ///< Prismatic: the coordinate
-    std::int32_t first_row = 0;
+    Angle angle;                 ///< Revolute
+    Row slide;                   ///< Prismatic: the coordinate
+    std::int32_t first_row = 0;  ///< among all rows, kept or not
     [[nodiscard]] std::int32_t row_count() const { return gear ? 1 : static_cast<std::int32_t>(rows.size()); }
 };
 

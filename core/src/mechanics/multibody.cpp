@@ -285,10 +285,13 @@ void MultibodySystem::finish() {
     self.at = self.initial_placements();
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
         self.at[static_cast<BodyIndex>(k)].column = self.bodies[k].column;
+    std::int32_t rows = 0;
     for (auto& joint : self.joints) {
-        joint.first_row = self.m;
-        self.m += joint.row_count();
+        joint.first_row = rows;
+        rows += joint.row_count();
     }
+    self.place_of_row.assign(static_cast<std::size_t>(rows), 0);
+    self.number_rows();
     self.finished = true;
     self.find_bodies_alone(*this);
     self.make_detector();
@@ -429,6 +432,7 @@ std::int32_t MultibodySystem::position_size() const {
 State MultibodySystem::initial_state() const {
     const auto& self = *implementation_;
     self.must_be_finished();
+    if (self.assembled) return *self.assembled;
     State state;
     for (const auto& body : self.bodies) {
         if (body.column < 0) continue;

@@ -20,13 +20,14 @@ std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
     // Rows of one unit make a block: three of a point (m), then the others one by one or, of equal kind, together.
     for (const auto& joint : implementation_->joints) {
         if (joint.gear) {
-            blocks.push_back(1);
+            if (implementation_->place_of(joint, 0) >= 0) blocks.push_back(1);
             continue;
         }
         std::int32_t count = 0;
         bool last_is_point = false;
-        for (const Row& row : joint.rows) {
-            const bool point = row.u.count == 2;
+        for (std::size_t i = 0; i < joint.rows.size(); ++i) {
+            if (implementation_->place_of(joint, i) < 0) continue;
+            const bool point = joint.rows[i].u.count == 2;
             if (count > 0 && point != last_is_point) {
                 blocks.push_back(count);
                 count = 0;
@@ -43,11 +44,17 @@ void MultibodySystem::constraint(const State& state, double* C) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr);
     self.for_each_row([&](std::int32_t i, const Row& row) { C[i] = row.value(self.at, state.t); });
-    self.for_each_gear([&](std::int32_t i, const Gear& gear) {
-        const double angle =
-            gear.denominator * gear.second.value(self.at) - gear.numerator * gear.first.value(self.at) - gear.offset;
-        C[i] = std::remainder(angle, 2.0 * M_PI) / gear.denominator;
-    });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) { C[i] = gear.value(self.at); });
+}
+
+void MultibodySystem::all_constraints(const State& state, double* C) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), nullptr);
+    for (const auto& joint : self.joints) {
+        double* own = C + joint.first_row;
+        if (joint.gear) own[0] = joint.gear->value(self.at);
+        for (std::size_t i = 0; i < joint.rows.size(); ++i) own[i] = joint.rows[i].value(self.at, state.t);
+    }
 }
 
 void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
@@ -145,8 +152,9 @@ void MultibodySystem::add_definite_constraint_stiffness(const State& state, cons
         const Feature* span = nullptr;
         for (std::size_t i = 0; i < joint.rows.size(); ++i) {
             const Row& row = joint.rows[i];
-            if (row.u.count != 2) continue;
-            force += row.force(self.at, state.t, lambda[static_cast<std::size_t>(joint.first_row) + i]);
+            const auto place = self.place_of(joint, i);
+            if (row.u.count != 2 || place < 0) continue;
+            force += row.force(self.at, state.t, lambda[place]);
             span = &row.u;
         }
         if (span == nullptr) continue;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <set>
 
 #include "mechanics/beam.hpp"
 #include "mechanics/elements.hpp"
+#include "mechanics/linkage.hpp"
 #include "mechanics/model.hpp"
 
 namespace delassus {
@@ -37,7 +39,13 @@ struct MultibodySystem::Implementation {
     bool finished = false;
 
     // ---- Since finish() ----
-    std::int32_t n = 0, position_size = 0, m = 0;
+    std::int32_t n = 0, position_size = 0;
+    std::vector<std::int32_t> place_of_row;  // of all joints' rows: number among those that are kept, −1: left out
+    std::vector<std::int32_t> kept_rows;     // ascending
+    std::optional<State> assembled;          // since assemble()
+    std::optional<Assembly> assembly;
+    std::vector<std::int32_t> first_kept_rows;  // those of assemble()
+    std::vector<mechanics::Linkage> redundant;  // those with rows that are left out
     std::vector<mechanics::MovingBody> moving;
     bool gyroscopic = false;  // a moving body whose moments differ
     double size = 0.0;        // the median of the shapes that collide
@@ -77,18 +85,31 @@ struct MultibodySystem::Implementation {
         for (const auto& beam : beams) visit(beam, mechanics::Beam::Ends{at[beam.bodies()[0]], at[beam.bodies()[1]]});
     }
 
-    /// Visits the rows of all joints but gears: visit(row of C, Row).
+    /// Among the rows that are kept, −1 if it is left out.
+    [[nodiscard]] std::int32_t place_of(const mechanics::Joint& joint, std::size_t i) const {
+        return place_of_row[static_cast<std::size_t>(joint.first_row) + i];
+    }
+    /// Visits the kept rows of all joints but gears: visit(row of C, Row).
     template <class Visitor>
     void for_each_row(Visitor&& visit) const {
         for (const auto& joint : joints)
             for (std::size_t i = 0; i < joint.rows.size(); ++i)
-                visit(joint.first_row + static_cast<std::int32_t>(i), joint.rows[i]);
+                if (const auto place = place_of(joint, i); place >= 0) visit(place, joint.rows[i]);
     }
     template <class Visitor>
     void for_each_gear(Visitor&& visit) const {
         for (const auto& joint : joints)
-            if (joint.gear) visit(joint.first_row, *joint.gear);
+            if (const auto place = joint.gear ? place_of(joint, 0) : -1; place >= 0) visit(place, *joint.gear);
     }
+    /// The rows of a linkage that are kept, numbered within it.
+    [[nodiscard]] std::vector<std::size_t> kept_of(const mechanics::Linkage& linkage) const;
+    [[nodiscard]] std::vector<std::size_t> left_out_of(const mechanics::Linkage& linkage) const;
+    /// Keeps these rows of a linkage, and all others as they are.
+    void keep_of(const mechanics::Linkage& linkage, const std::vector<std::size_t>& rows);
+    void number_rows();
+    /// state ← with the kept rows of a linkage assembled, if they do not hold; done ← with what that changed since
+    /// `given`. Throws InputError.
+    void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done) const;
 
     /// The two angles of a gear with their factors in C.
     struct GearTerm {

@@ -115,6 +115,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"v", bits(simulation.state.v)},
                                    {"memory", bits(simulation.memory)},
                                    {"control", bits(simulation.control)},
+                                   {"rows_left_out", simulation.rows_left_out},
                                    {"sleeping", bits(simulation.sleeping)},
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)}});
@@ -140,6 +141,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
             system.simulation.sleeping = numbers(one.at("sleeping"));
+            if (one.contains("rows_left_out"))  // older checkpoints kept all rows
+                one.at("rows_left_out").get_to(system.simulation.rows_left_out);
             system.simulation.totals = totals_of(written == 2 ? totals_with_names(one.at("totals")) : one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             checkpoint.systems.push_back(std::move(system));

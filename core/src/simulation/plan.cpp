@@ -98,7 +98,7 @@ public:
         : system_(system), registry_(registry), simulation_(system, registry), touching_(system) {
         plan_.name = system.name;
         plan_.velocities = system.system->n();
-        plan_.constraints = system.system->m();
+        plan_.constraints = system.system->constraint_rows();
     }
 
     SystemPlan make() {
@@ -184,13 +184,19 @@ private:
     }
 
     void constraints() {
-        if (plan_.constraints > 0) {
-            keep(fmt::format("{} rows of joints and motors", plan_.constraints),
+        if (const auto rows = system_.system->m(); rows > 0) {
+            keep(fmt::format("{} rows of joints and motors", rows),
                  fmt::format("{}, in {} that are solved apart", counted(system_.joints.size(), "joint", "joints"),
                              counted(static_cast<std::size_t>(plan_.parts), "part", "parts")));
         } else {
             leave("bilateral constraints", "the system has no joint with rows");
         }
+        if (const auto redundant = plan_.constraints - system_.system->m(); redundant > 0)
+            leave(counted(static_cast<std::size_t>(redundant), "row of joints and motors", "rows of joints and motors"),
+                  fmt::format("others imply them in every configuration, their reactions are reported as 0: of {}",
+                              some_of(system_.system->joints_with_rows_left_out())));
+        if (const std::string start = simulation_.start(); !start.empty())
+            keep("assembly at the start", fmt::format("{} to fit joints and motors", start));
         if (has_limits()) {
             needs_ |= DELASSUS_CAN_NONNEGATIVE;
             keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");

@@ -60,6 +60,13 @@ void require_usable(const SolverEffort& effort) {
                                       effort.worst_miss));
 }
 
+std::string describe(const Assembly& change) {
+    return fmt::format(
+        "bodies were moved by up to {:.3g} m and {:.3g} rad, and their velocities changed by up to {:.3g} "
+        "m/s and {:.3g} rad/s",
+        change.displacement, change.rotation, change.velocity, change.angular_velocity);
+}
+
 }  // namespace
 
 Simulation::Simulation(SceneSystem& system, const Registry& registry)
@@ -70,9 +77,8 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         SolverConfig solver = system.solver;
         if (solver.name.empty()) solver.name = auto_name;
         check_solver(registry, solver);
-        timestepper_ = make_timestepper(system.integrator, *system.system, system.integrator_options);
-        if (system.control)
-            control_ = std::make_unique<AdaptiveStepping>(*system.system, *timestepper_, *system.control);
+        assembly_ = system.system->assemble();
+        make_method();
         if (system.sleeping) {
             require_sleeping(system);
             if (control_)
@@ -86,7 +92,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         throw Unsupported(fmt::format("system \"{}\": {}", system.name, error.what()));
     }
     now_.state = system.system->initial_state();
-    constraint_.resize(static_cast<std::size_t>(system.system->m()));
+    constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
     measure(now_.state, now_.step);
     now_.totals.start_energy = now_.totals.energy = record_.energy;
@@ -96,6 +102,25 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
 
 Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
+
+void Simulation::make_method() {
+    control_.reset();
+    timestepper_ = make_timestepper(system_->integrator, *system_->system, system_->integrator_options);
+    if (system_->control)
+        control_ = std::make_unique<AdaptiveStepping>(*system_->system, *timestepper_, *system_->control);
+}
+
+void Simulation::renew_rows(State& state) {
+    /// MultibodySystem::renew_rows() does nothing in other steps, as long as nothing has drifted further.
+    constexpr std::int64_t every = 10;
+    constexpr double drifted = 1e-4;
+    MultibodySystem& mechanics = *system_->system;
+    if (mechanics.m() == mechanics.constraint_rows() || (now_.step % every != 0 && record_.drift < drifted)) return;
+    if (!mechanics.renew_rows(state, now_.step)) return;
+    const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
+    make_method();
+    if (control_) control_->load(control);
+}
 
 bool Simulation::finished() const {
     // The last of steps that are chosen ends at `end` itself.
@@ -124,7 +149,7 @@ void Simulation::measure(const State& state, std::int64_t step) {
     const auto momentum = mechanics.momentum(state);
     record_.momentum = momentum[0];
     record_.angular_momentum = momentum[1];
-    if (!constraint_.empty()) mechanics.constraint(state, constraint_.data());
+    if (!constraint_.empty()) mechanics.all_constraints(state, constraint_.data());
     record_.drift = 0.0;
     for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
     record_.sleeping = sleeping_ ? sleeping_->count() : 0;
@@ -159,6 +184,11 @@ const StepRecord& Simulation::step() {
         return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
     };
     State next = now_.state;
+    try {
+        renew_rows(next);
+    } catch (const StepFailure& error) {
+        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+    }
     const std::vector<double> memory = timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
     const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
@@ -228,6 +258,8 @@ const StepRecord& Simulation::step() {
         if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
     }
     std::swap(report_, next_report_);
+    if (const MultibodySystem& mechanics = *system_->system; mechanics.m() < mechanics.constraint_rows())
+        report_.step.multipliers = mechanics.all_multipliers(report_.step.multipliers);
     return record_;
 }
 
@@ -251,17 +283,39 @@ std::vector<ContactRecord> Simulation::contacts() const {
 std::vector<std::string> Simulation::warnings() const {
     /// Of what can have moved: a growth that a plot would show.
     constexpr double visible_share = 0.05;
+    /// Of the size of a mechanism or its speed: more than coordinates of few digits explain.
+    constexpr double large_assembly = 1e-3;
     std::vector<std::string> sentences;
     if (const auto& totals = now_.totals; totals.growth_share > visible_share)
         sentences.push_back(
             fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
                         "moved, though nothing supplies any: the steps are long for {}",
                         system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    if (std::max(assembly_.position_share, assembly_.velocity_share) > large_assembly)
+        sentences.push_back(
+            fmt::format("system \"{}\": the start does not fit the joints and motors and was changed: {}",
+                        system_->name, describe(assembly_)));
     return sentences;
+}
+
+std::string Simulation::start() const {
+    /// Below this share of size and speed, nobody needs to know.
+    constexpr double rounding_of_assembly = 1e-9;
+    if (std::max(assembly_.position_share, assembly_.velocity_share_of_all) <= rounding_of_assembly) return {};
+    return describe(assembly_);
 }
 
 SimulationState Simulation::save() const {
     SimulationState result = now_;
+    const MultibodySystem& mechanics = *system_->system;
+    const auto& kept = mechanics.kept_rows();
+    result.rows_left_out.clear();
+    auto next = kept.begin();
+    for (std::int32_t row = 0; row < mechanics.constraint_rows(); ++row)
+        if (next != kept.end() && *next == row)
+            ++next;
+        else
+            result.rows_left_out.push_back(row);
     result.memory = timestepper_->save();
     if (control_) result.control = control_->save();
     if (sleeping_) result.sleeping = sleeping_->save();
@@ -274,12 +328,24 @@ void Simulation::load(SimulationState state) {
             "the checkpoint of system \"{}\" has {} positions and {} velocities; the system "
             "has {} and {}",
             system_->name, state.state.q.size(), state.state.v.size(), now_.state.q.size(), now_.state.v.size()));
-    timestepper_->restart();
+    std::vector<std::int32_t> kept;
+    auto left_out = state.rows_left_out.begin();
+    for (std::int32_t row = 0; row < system_->system->constraint_rows(); ++row)
+        if (left_out != state.rows_left_out.end() && *left_out == row)
+            ++left_out;
+        else
+            kept.push_back(row);
+    if (left_out != state.rows_left_out.end())
+        throw InputError(fmt::format("the checkpoint of system \"{}\" leaves out rows that the system does not have",
+                                     system_->name));
+    system_->system->keep_rows(kept);
+    make_method();
     timestepper_->load(state.memory);
     if (control_) control_->load(state.control);
     if (sleeping_) sleeping_->load(state.sleeping);
     now_ = std::move(state);
     now_.memory.clear();
+    now_.rows_left_out.clear();
     now_.control.clear();
     now_.sleeping.clear();
     record_ = {};

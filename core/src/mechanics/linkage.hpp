@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bodies that joints connect, taken as one piece: its assembly, and the rows that others imply.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "delassus/multibody.hpp"
+#include "mechanics/model.hpp"
+
+namespace delassus::mechanics {
+
+/// Moving bodies that joints connect with each other, over any number of joints, and all rows of these joints. Rows are
+/// numbered within the linkage here; numbers() gives their numbers in the whole system.
+class Linkage {
+public:
+    /// The linkages of a system. bodies and joints outlive them.
+    static std::vector<Linkage> of(const std::vector<Body>& bodies, const std::vector<Joint>& joints,
+                                   const Placements& at);
+
+    [[nodiscard]] const std::vector<std::int32_t>& numbers() const { return numbers_; }
+    /// Whether rows can repeat each other: a tree of joints has independent ones.
+    [[nodiscard]] bool has_loops() const { return has_loops_; }
+    /// Diameter of the joints and mass centres at t = 0, at least that of a body's inertia, m.
+    [[nodiscard]] double size() const { return size_; }
+    [[nodiscard]] const std::string& joint_of(std::size_t row) const { return rows_[row].joint->parameters.name; }
+
+    /// The largest of a body: m and rad, or m/s and rad/s.
+    struct Largest {
+        double linear = 0.0, angular = 0.0;
+        void include(const Vector3d& line, const Vector3d& turn);
+    };
+    [[nodiscard]] Largest displacement(const State& from, const State& to) const;
+    [[nodiscard]] Largest velocity_change(const State& from, const State& to) const;
+    [[nodiscard]] Largest speed(const State& state) const;
+
+    /// Of the worst of some rows: |C|/size or |C| of an angle; or |Ċ|/size in 1/s, and as a share of the largest sum of
+    /// |terms| of a row's Ċ.
+    struct Residual {
+        double value = 0.0;
+        std::size_t row = 0;
+        double share = 0.0;
+    };
+    [[nodiscard]] Residual residual(const State& state, const std::vector<std::size_t>& rows) const;
+    [[nodiscard]] Residual rate_residual(const State& state, const std::vector<std::size_t>& rows) const;
+    /// Whether a residual is rounding. A speed is where it moves nothing in a second.
+    [[nodiscard]] bool is_rounding(const Residual& position) const;
+    [[nodiscard]] static bool is_rounding_of_rates(const Residual& rate);
+
+    /// If rows are far from holding, state ← positions at which all of them nearly do, so that it can be seen which
+    /// ones imply others.
+    void approach(State& state) const;
+    /// state ← the nearest positions, in the mass metric, at which these rows hold. The residual that is left.
+    Residual assemble_positions(State& state, const std::vector<std::size_t>& rows) const;
+    /// state ← the nearest velocities, in the mass metric, at which the rates of these rows vanish.
+    Residual assemble_velocities(State& state, const std::vector<std::size_t>& rows) const;
+
+    /// Independent rows that imply the others, ascending, at a state at which the scleronomic rows hold. All rows if
+    /// those of the linkage are independent in general, or too many to tell.
+    [[nodiscard]] std::vector<std::size_t> independent_rows(const State& state) const;
+    /// Whether other rows are by far better to keep at this state, and which.
+    [[nodiscard]] bool better_rows(const State& state, std::vector<std::size_t>& kept) const;
+    /// Independent rows at this state alone, to the relative threshold.
+    [[nodiscard]] std::vector<std::size_t> rows_by_rank(const State& state, double threshold) const;
+
+private:
+    static constexpr std::size_t most_dense_rows = 500;
+
+    /// A row of a joint; `row` is null for that of a gear.
+    struct RowOfJoint {
+        const Joint* joint;
+        const Row* row;
+        bool driven;  // depends on time
+        bool length;  // in m, else rad
+    };
+    enum class Metric { Mass, Length };
+    struct Values;
+    struct Rank;
+
+    Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& joints, std::vector<BodyIndex> members,
+            const std::vector<std::int32_t>& own_joints, std::shared_ptr<Placements> at);
+    void place(const State& state) const;
+    /// C, C_t and C_q of rows, C and C_q of an angle that is driven far from where it is as that angle.
+    void evaluate(const State& state, const std::vector<std::size_t>& rows, Values& values) const;
+    [[nodiscard]] double unit_of(std::size_t row) const { return rows_[row].length ? size_ : 1.0; }
+    /// C_q over the unit lengths of the metric.
+    [[nodiscard]] Eigen::SparseMatrix<double, Eigen::RowMajor> scaled(const Values& values, Metric metric) const;
+    [[nodiscard]] Eigen::VectorXd unscaled(const Eigen::VectorXd& change, Metric metric) const;
+    /// The shortest change in the metric with C_q change = −value; directions below the threshold are left alone.
+    [[nodiscard]] Eigen::VectorXd shortest(const Values& values, const Eigen::VectorXd& value, Metric metric,
+                                           double threshold) const;
+    void increment(State& state, const Eigen::VectorXd& change) const;
+    /// Gauss–Newton iterations, at most so many.
+    Residual settle(State& state, const std::vector<std::size_t>& rows, Metric metric, double threshold,
+                    int iterations) const;
+    [[nodiscard]] Rank rank_at(const State& state, const std::vector<std::size_t>& rows, double threshold,
+                               bool motions = false) const;
+    /// state ← moved along a free motion by a finite amount. False if there is none that leads away.
+    bool move(State& state, std::uint32_t seed) const;
+
+    const std::vector<Body>* bodies_;
+    std::vector<BodyIndex> members_;
+    std::vector<RowOfJoint> rows_;
+    std::vector<std::int32_t> numbers_;
+    std::vector<std::size_t> all_, scleronomic_;
+    bool has_loops_ = false;
+    std::vector<double> arms_;         // of members: the farthest joint from the mass centre, or the radius of inertia
+    double size_ = 0.0, reach_ = 0.0;  // reach: largest coordinate
+    std::shared_ptr<Placements> at_;   // of all linkages; columns: within each. Work space of the call that runs
+};
+
+}  // namespace delassus::mechanics

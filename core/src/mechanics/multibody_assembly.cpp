@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A consistent start, and which rows of joints are kept.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "delassus/error.hpp"
+#include "delassus/timestepper.hpp"
+#include "mechanics/multibody_implementation.hpp"
+
+namespace delassus {
+
+using mechanics::Linkage;
+
+namespace {
+
+/// Rows that are left out may miss by this much: in sizes of their linkage, or in rad. Geometries of six digits stay
+/// well below it.
+constexpr double most_drift = 1e-3;
+
+/// Rows whose dependence has ended where they have drifted.
+constexpr double dependent_after_drift = 1e-2;
+
+/// Ten for a spatial loop; so many that looking costs no more than proportional to the rows where there are many.
+std::int64_t steps_between_looks(const Linkage& linkage) {
+    const auto rows = static_cast<std::int64_t>(linkage.numbers().size());
+    return 10 * (1 + rows * rows / 2000);
+}
+
+/// What assembly must reach.
+constexpr double assembled_position = 1e-9, assembled_velocity = 1e-7;
+
+}  // namespace
+
+std::vector<std::size_t> MultibodySystem::Implementation::kept_of(const Linkage& linkage) const {
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < linkage.numbers().size(); ++i)
+        if (place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] >= 0) rows.push_back(i);
+    return rows;
+}
+
+std::vector<std::size_t> MultibodySystem::Implementation::left_out_of(const Linkage& linkage) const {
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < linkage.numbers().size(); ++i)
+        if (place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] < 0) rows.push_back(i);
+    return rows;
+}
+
+void MultibodySystem::Implementation::keep_of(const Linkage& linkage, const std::vector<std::size_t>& rows) {
+    for (const auto number : linkage.numbers()) place_of_row[static_cast<std::size_t>(number)] = -1;
+    for (const auto row : rows) place_of_row[static_cast<std::size_t>(linkage.numbers()[row])] = 0;
+    number_rows();
+}
+
+void MultibodySystem::Implementation::number_rows() {
+    kept_rows.clear();
+    for (std::size_t row = 0; row < place_of_row.size(); ++row) {
+        if (place_of_row[row] < 0) continue;
+        place_of_row[row] = static_cast<std::int32_t>(kept_rows.size());
+        kept_rows.push_back(static_cast<std::int32_t>(row));
+    }
+}
+
+void MultibodySystem::Implementation::assemble(const Linkage& linkage, const State& given, State& state,
+                                               Assembly& done) const {
+    const auto rows = kept_of(linkage);
+    if (!linkage.is_rounding(linkage.residual(state, rows))) {
+        const auto left = linkage.assemble_positions(state, rows);
+        if (!(left.value <= assembled_position))
+            throw InputError(fmt::format(
+                "the joints do not fit together at t = {:.9g} s: the bodies were moved by up to {:.3g} m and {:.3g} "
+                "rad, "
+                "and \"{}\" still misses by {:.3g} of the mechanism's size of {:.3g} m (or in rad)",
+                state.t, linkage.displacement(given, state).linear, linkage.displacement(given, state).angular,
+                linkage.joint_of(left.row), left.value, linkage.size()));
+    }
+    if (!Linkage::is_rounding_of_rates(linkage.rate_residual(state, rows))) {
+        const auto left = linkage.assemble_velocities(state, rows);
+        if (!(left.share <= assembled_velocity))
+            throw InputError(
+                fmt::format("no velocities fit the joints and motors at t = {:.9g} s: \"{}\" misses by {:.3g} of what "
+                            "adds up in it; the mechanism cannot move that way from there",
+                            state.t, linkage.joint_of(left.row), left.share));
+    }
+    const auto moved = linkage.displacement(given, state), faster = linkage.velocity_change(given, state);
+    const auto before = linkage.speed(given), after = linkage.speed(state);
+    done.displacement = std::max(done.displacement, moved.linear);
+    done.rotation = std::max(done.rotation, moved.angular);
+    done.velocity = std::max(done.velocity, faster.linear);
+    done.angular_velocity = std::max(done.angular_velocity, faster.angular);
+    done.position_share = std::max({done.position_share, moved.linear / linkage.size(), moved.angular});
+    const auto size_of = [&](const Linkage::Largest& one) {
+        return std::max(one.linear, linkage.size() * one.angular);
+    };
+    const double fastest = std::max(size_of(before), size_of(after));
+    if (!(fastest > 0.0)) return;
+    const double share = size_of(faster) / fastest;
+    done.velocity_share_of_all = std::max(done.velocity_share_of_all, share);
+    if (size_of(before) > 0.0) done.velocity_share = std::max(done.velocity_share, share);
+}
+
+const Assembly& MultibodySystem::assemble() {
+    auto& self = *implementation_;
+    self.must_be_finished();
+    if (self.assembly) {
+        keep_rows(self.first_kept_rows);
+        return *self.assembly;
+    }
+    const State given = initial_state();
+    State state = given;
+    Assembly done;
+    for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {
+        linkage.approach(state);
+        const auto rows = linkage.independent_rows(state);
+        const bool leaves_out_rows = rows.size() < linkage.numbers().size();
+        if (leaves_out_rows) self.keep_of(linkage, rows);
+        self.assemble(linkage, given, state, done);
+        if (!leaves_out_rows) continue;
+        const auto left = linkage.residual(state, self.left_out_of(linkage));
+        if (left.value > most_drift)
+            throw InputError(fmt::format(
+                "the joints do not fit together at t = 0: \"{}\" repeats what others do, and misses by {:.3g} of the "
+                "mechanism's size of {:.3g} m (or in rad) where they hold",
+                linkage.joint_of(left.row), left.value, linkage.size()));
+        self.redundant.push_back(std::move(linkage));
+    }
+    self.first_kept_rows = self.kept_rows;
+    self.assembled = std::move(state);
+    return self.assembly.emplace(done);
+}
+
+std::int32_t MultibodySystem::constraint_rows() const {
+    implementation_->must_be_finished();
+    return static_cast<std::int32_t>(implementation_->place_of_row.size());
+}
+
+const std::vector<std::int32_t>& MultibodySystem::kept_rows() const {
+    return implementation_->kept_rows;
+}
+
+void MultibodySystem::keep_rows(const std::vector<std::int32_t>& rows) {
+    auto& self = *implementation_;
+    self.must_be_finished();
+    const bool ascend = std::adjacent_find(rows.begin(), rows.end(), std::greater_equal<>()) == rows.end();
+    if (!rows.empty() && (!ascend || rows.front() < 0 || rows.back() >= constraint_rows()))
+        throw InputError(fmt::format("rows that are kept must ascend from 0 to {} at most", constraint_rows() - 1));
+    std::fill(self.place_of_row.begin(), self.place_of_row.end(), -1);
+    for (const auto row : rows) self.place_of_row[static_cast<std::size_t>(row)] = 0;
+    self.number_rows();
+}
+
+bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
+    auto& self = *implementation_;
+    bool renewed = false;
+    for (const auto& linkage : self.redundant) {
+        auto rows = self.kept_of(linkage);
+        const auto drift = linkage.residual(state, self.left_out_of(linkage));
+        // A method whose steps are long opens all joints alike.
+        const bool drifted = drift.value > most_drift && drift.value > 10.0 * linkage.residual(state, rows).value;
+        if (drifted) {
+            auto needed = linkage.rows_by_rank(state, dependent_after_drift);
+            if (needed.size() <= rows.size())
+                throw StepFailure(fmt::format(
+                    "\"{}\" repeated what other joints or motors do, and contradicts them now by {:.3g} of the "
+                    "mechanism's size of {:.3g} m (or in rad)",
+                    linkage.joint_of(drift.row), drift.value, linkage.size()));
+            rows = std::move(needed);
+        } else if (step % steps_between_looks(linkage) != 0 || !linkage.better_rows(state, rows)) {
+            continue;
+        }
+        self.keep_of(linkage, rows);
+        Assembly done;
+        try {
+            self.assemble(linkage, State(state), state, done);
+        } catch (const InputError& error) {
+            throw StepFailure(error.what());
+        }
+        renewed = true;
+    }
+    return renewed;
+}
+
+std::vector<double> MultibodySystem::all_multipliers(const std::vector<double>& kept) const {
+    const auto& self = *implementation_;
+    std::vector<double> all(self.place_of_row.size(), 0.0);
+    for (std::size_t i = 0; i < std::min(kept.size(), self.kept_rows.size()); ++i)
+        all[static_cast<std::size_t>(self.kept_rows[i])] = kept[i];
+    return all;
+}
+
+std::vector<std::string> MultibodySystem::joints_with_rows_left_out() const {
+    const auto& self = *implementation_;
+    std::vector<std::string> names;
+    for (const auto& joint : self.joints)
+        for (std::int32_t i = 0; i < joint.row_count(); ++i)
+            if (self.place_of(joint, static_cast<std::size_t>(i)) < 0) {
+                names.push_back(joint.parameters.name);
+                break;
+            }
+    return names;
+}
+
+}  // namespace delassus

@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Mechanisms with redundant joints, written with few digits, against their closed forms.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "delassus/error.hpp"
+#include "delassus/plan.hpp"
+#include "support/scenes.hpp"
+
+namespace delassus::tests::overconstrained_test {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Isometry3d;
+using Eigen::Translation3d;
+using Eigen::Vector3d;
+
+const std::vector<std::string> implicit_methods = {"hht",         "newmark",        "generalized_alpha",
+                                                   "trapezoidal", "euler_implicit", "euler_implicit_linearized"};
+
+/// "[x, y, z]" with so many digits after the point.
+std::string text(const Vector3d& v, int digits) {
+    return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", v[0], digits, v[1], digits, v[2], digits);
+}
+
+Vector3d position(const Running& run, const std::string& body) {
+    const auto p = run.pose(body).position;
+    return {p[0], p[1], p[2]};
+}
+
+std::string head(const std::string& method, double step, double end, const std::string& gravity = "[0, 0, 0]") {
+    return fmt::format("gravity: {}\nstep: {}\nend: {}\nintegrator: {}\n", gravity, step, end, method);
+}
+
+std::string body(const std::string& name, const Vector3d& at, int digits) {
+    return fmt::format("- {{name: {}, mass: 1.3, inertia: {{xx: 0.05, yy: 0.06, zz: 0.07}}, position: {}}}\n", name,
+                       text(at, digits));
+}
+
+std::string revolute(const std::string& name, const std::string& bodies, const Vector3d& point, const Vector3d& axis,
+                     int digits) {
+    return fmt::format("- {{name: {}, kind: revolute, {}, point: {}, axis: {}}}\n", name, bodies, text(point, digits),
+                       text(axis, digits));
+}
+
+std::int32_t left_out(const Running& run) {
+    return run.system().constraint_rows() - run.system().m();
+}
+
+/// Steps to the end; every solve must reach its tolerance. Calls check after each step.
+template <class Check>
+void finish(Running& run, Check&& check) {
+    while (!run.simulation.finished()) {
+        run.simulation.step();
+        check();
+    }
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0) << run.simulation.totals().first_unsolved;
+}
+
+// ---- Bennett's linkage ----
+//
+// Four bars of lengths a, b, a, b and twists α, β, α, β with a / sin α = b / sin β. Its joint angles obey
+// θ₃ = −θ₁, θ₄ = −θ₂ and tan(θ₁/2) tan(θ₂/2) = sin((β + α)/2) / sin((β − α)/2) (Bennett 1903; with the frames of
+// Denavit and Hartenberg, Rz(θ) Tx(length) Rx(twist) from joint to joint).
+
+struct Bennett {
+    double a = 0.8, b = 1.1, alpha = 0.5, beta = std::asin(b * std::sin(alpha) / a);
+    double start = 1.2;  // θ₁ at t = 0
+
+    static Isometry3d link(double theta, double length, double twist) {
+        return AngleAxisd(theta, Vector3d::UnitZ()) * Translation3d(length, 0.0, 0.0) *
+               AngleAxisd(twist, Vector3d::UnitX());
+    }
+    /// Frames of the joints 1 to 4.
+    [[nodiscard]] std::array<Isometry3d, 4> joints(double theta1) const {
+        const double constant = std::sin(0.5 * (beta + alpha)) / std::sin(0.5 * (beta - alpha));
+        const double theta2 = 2.0 * std::atan(constant / std::tan(0.5 * theta1));
+        std::array<Isometry3d, 4> frames;
+        frames[0] = Isometry3d::Identity();
+        frames[1] = frames[0] * link(theta1, a, alpha);
+        frames[2] = frames[1] * link(theta2, b, beta);
+        frames[3] = frames[2] * link(-theta1, a, alpha);
+        return frames;
+    }
+    /// The middle of the bar from joint k to the next, k = 0, 1, 2.
+    [[nodiscard]] Vector3d middle(double theta1, std::size_t k) const {
+        const auto frames = joints(theta1);
+        return 0.5 * (frames[k].translation() + frames[k + 1].translation());
+    }
+    [[nodiscard]] std::string scene(int digits, const std::string& motion, const std::string& first_lines) const {
+        const auto frames = joints(start);
+        std::string yaml = first_lines + "bodies:\n";
+        for (std::size_t k = 0; k < 3; ++k) yaml += body(fmt::format("bar_{}", k), middle(start, k), digits);
+        yaml += "joints:\n";
+        const std::array<std::string, 4> bodies = {"second: bar_0", "first: bar_0, second: bar_1",
+                                                   "first: bar_1, second: bar_2", "second: bar_2"};
+        for (std::size_t k = 0; k < 4; ++k)
+            yaml += revolute(fmt::format("joint_{}", k), bodies[k], frames[k].translation(), frames[k].linear().col(2),
+                             digits);
+        return yaml + "motors:\n- {name: drive, joint: joint_0, motion: {" + motion + "}}\n";
+    }
+};
+
+constexpr const char* swinging =
+    "sine: {amplitude: 0.7, frequency: 0.4, phase: -1.5707963267948966, offset: 0.7}";  // 0.7 (1 − cos(0.8 π t))
+
+struct Case {
+    std::string method;
+    int digits;
+};
+
+void PrintTo(const Case& one, std::ostream* out) {
+    *out << one.method << "_" << one.digits;
+}
+
+class BennettLinkage : public testing::TestWithParam<Case> {};
+
+TEST_P(BennettLinkage, FollowsItsClosedForm) {
+    const auto& [method, digits] = GetParam();
+    const Bennett bennett;
+    const double step = 0.00137;
+    Running run(parse_scene(bennett.scene(digits, swinging, head(method, step, 1.0)), "bennett"));
+    EXPECT_EQ(left_out(run), 3);  // 4 · 5 rows and the motor's; 18 velocities
+    double worst = 0.0;
+    finish(run, [&] {
+        const double t = run.simulation.state().t;
+        const double theta = bennett.start + 0.7 * (1.0 - std::cos(0.8 * std::numbers::pi * t));
+        for (std::size_t k = 0; k < 3; ++k)
+            worst = std::max(worst, (position(run, fmt::format("bar_{}", k)) - bennett.middle(theta, k)).norm());
+    });
+    // Constraints hold at the end of a step, to h² with the linearised method. Motion magnifies what digits are
+    // missing.
+    const double of_method = method == "euler_implicit_linearized" ? 2e-5 : 1e-9;
+    EXPECT_LT(worst, of_method + 20.0 * std::pow(10.0, -digits));
+}
+
+std::vector<Case> all_cases() {
+    std::vector<Case> cases;
+    for (const auto& method : implicit_methods)
+        for (const int digits : {6, 8, 9, 12, 16}) cases.push_back({method, digits});
+    return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(Overconstrained, BennettLinkage, testing::ValuesIn(all_cases()),
+                         [](const auto& one) { return fmt::format("{}_{}", one.param.method, one.param.digits); });
+
+TEST(Overconstrained, BennettLinkageTakesTheMotorsSpeedAtTheStart) {
+    const Bennett bennett;
+    Running run(parse_scene(bennett.scene(6, "linear: {start: 0, rate: 0.9}", head("hht", 0.001, 0.3)), "bennett"));
+    const double small = 1e-6;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vector3d v = (bennett.middle(bennett.start + small, k) - bennett.middle(bennett.start - small, k)) *
+                           (0.9 / (2.0 * small));
+        const auto got = run.velocities(fmt::format("bar_{}", k))[0];
+        EXPECT_LT((Vector3d(got[0], got[1], got[2]) - v).norm(), 2e-5) << k;
+    }
+    EXPECT_NE(run.simulation.start().find("velocities changed"), std::string::npos);
+    EXPECT_TRUE(run.simulation.warnings().empty());  // bodies at rest that a motor drives are no mistake
+    finish(run, [] {});
+}
+
+TEST(Overconstrained, AStartFarFromTheMotorsAngleIsAssembled) {
+    const Bennett bennett;
+    for (const double angle : {0.6, 1.6, -2.2, 2.9}) {
+        const auto motion = fmt::format("linear: {{start: {}, rate: 0}}", angle);
+        Running run(parse_scene(bennett.scene(8, motion, head("newmark", 0.001, 0.05)), "bennett"));
+        for (std::size_t k = 0; k < 3; ++k)
+            EXPECT_LT((position(run, fmt::format("bar_{}", k)) - bennett.middle(bennett.start + angle, k)).norm(), 2e-5)
+                << k << " at " << angle;
+        ASSERT_EQ(run.simulation.warnings().size(), 1U);
+        EXPECT_NE(run.simulation.warnings()[0].find("does not fit"), std::string::npos);
+        finish(run, [] {});
+    }
+}
+
+// Rows that are good to keep at the start are not so half a turn later.
+TEST(Overconstrained, ATurningBennettLinkageChangesTheRowsItKeeps) {
+    const Bennett bennett;
+    for (const auto* method : {"hht", "euler_implicit_linearized"}) {
+        Running run(
+            parse_scene(bennett.scene(6, "linear: {start: 0, rate: 1.7}", head(method, 0.002, 4.0)), "bennett"));
+        const auto first = run.system().kept_rows();
+        bool changed = false;
+        double worst = 0.0;
+        finish(run, [&] {
+            changed = changed || run.system().kept_rows() != first;
+            const double theta = bennett.start + 1.7 * run.simulation.state().t;
+            worst = std::max(worst, (position(run, "bar_1") - bennett.middle(theta, 1)).norm());
+        });
+        EXPECT_TRUE(changed) << method;
+        EXPECT_LT(worst, 2e-4) << method;
+        Simulation again(run.scene.systems[0], registry());
+        EXPECT_EQ(run.system().kept_rows(), first);  // a new run begins with those of the start
+    }
+}
+
+TEST(Overconstrained, GoesOnWithTheRowsOfItsCheckpoint) {
+    const auto scene = [] {
+        return parse_scene(Bennett().scene(6, "linear: {start: 0, rate: 1.7}", head("hht", 0.002, 4.0)), "bennett");
+    };
+    Running whole(scene()), resumed(scene());
+    while (whole.simulation.state().t < 1.5) whole.simulation.step();
+    EXPECT_NE(whole.system().kept_rows(), resumed.system().kept_rows());
+    resumed.simulation.load(whole.simulation.save());
+    EXPECT_EQ(whole.system().kept_rows(), resumed.system().kept_rows());
+    for (int i = 0; i < 300; ++i) {
+        whole.simulation.step();
+        resumed.simulation.step();
+    }
+    EXPECT_EQ(whole.simulation.state().q, resumed.simulation.state().q);
+    EXPECT_EQ(whole.simulation.state().v, resumed.simulation.state().v);
+}
+
+TEST(Overconstrained, ReactionsKeepTheirLayout) {
+    Running run(parse_scene(Bennett().scene(8, swinging, head("hht", 0.001, 0.1)), "bennett"));
+    run.finish();
+    const auto& lambda = run.simulation.report().multipliers;
+    ASSERT_EQ(lambda.size(), 21U);
+    const auto& kept = run.system().kept_rows();
+    for (std::int32_t row = 0; row < 21; ++row)
+        EXPECT_EQ(lambda[static_cast<std::size_t>(row)] != 0.0, std::binary_search(kept.begin(), kept.end(), row))
+            << row;
+}
+
+TEST(Overconstrained, PlanSaysHowManyRowsAreLeftOut) {
+    Scene scene = parse_scene(Bennett().scene(6, swinging, head("hht", 0.001, 0.1)), "bennett");
+    const auto plan = make_plan(scene, registry()).at(0);
+    EXPECT_EQ(plan.constraints, 21);
+    const bool said = std::any_of(plan.left_out.begin(), plan.left_out.end(), [](const PlanLine& line) {
+        return line.what == "3 rows of joints and motors" && line.reason.find("imply") != std::string::npos;
+    });
+    EXPECT_TRUE(said);
+}
+
+TEST(Overconstrained, WorksWithNothingLeftOutAndAdaptiveSteps) {
+    SceneOverrides everything, chosen;
+    everything.leave_out = false;
+    chosen.tolerance = 1e-6;
+    for (const auto& overrides : {everything, chosen}) {
+        const Bennett bennett;
+        Running run(
+            parse_scene(bennett.scene(6, swinging, head("generalized_alpha", 0.001, 0.2)), "bennett", overrides));
+        finish(run, [] {});
+        const double theta = bennett.start + 0.7 * (1.0 - std::cos(0.8 * std::numbers::pi * 0.2));
+        EXPECT_LT((position(run, "bar_1") - bennett.middle(theta, 1)).norm(), 2e-5);
+    }
+}
+
+// ---- Cardan's joint ----
+//
+// Two shafts at an angle β: tan θ_out = cos β tan θ_in, angles from where the input's arm of the cross is normal to
+// both shafts. Two bearings and a universal joint hold one freedom by 14 rows of 12 velocities.
+
+class CardanJoint : public testing::TestWithParam<std::string> {};
+
+TEST_P(CardanJoint, FollowsItsClosedForm) {
+    const double beta = 0.55, rate = 2.7;
+    const Vector3d shaft(std::cos(beta), std::sin(beta), 0.0), cross(-std::sin(beta), std::cos(beta), 0.0);
+    constexpr int digits = 16;
+    std::string yaml = head(GetParam(), 0.00137, 0.9) + "bodies:\n";
+    yaml +=
+        "- {name: input, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, position: [-0.4, 0, 0], angular_velocity: " +
+        text({rate, 0.0, 0.0}, digits) + "}\n";
+    yaml += "- {name: output, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, position: " + text(0.4 * shaft, digits) +
+            ", angular_velocity: " + text(rate * std::cos(beta) * shaft, digits) + "}\n";
+    yaml += "joints:\n" + revolute("in", "second: input", {-0.4, 0.0, 0.0}, Vector3d::UnitX(), digits) +
+            revolute("out", "second: output", 0.4 * shaft, shaft, digits);
+    yaml +=
+        "- {name: cross, kind: universal, first: input, second: output, point: [0, 0, 0], axis: [0, 0, 1], "
+        "second_axis: " +
+        text(cross, digits) + "}\n";
+    yaml += fmt::format("motors:\n- {{name: drive, joint: in, motion: {{linear: {{start: 0, rate: {}}}}}}}\n", rate);
+    Running run(parse_scene(yaml, "cardan"));
+    EXPECT_EQ(left_out(run), 3);
+    EXPECT_EQ(run.simulation.start(), "");  // the velocities were consistent
+    double worst = 0.0;
+    finish(run, [&] {
+        const double theta = rate * run.simulation.state().t;
+        // The direction of the output's arm of the cross, turned by ψ about the shaft.
+        const Vector3d arm =
+            (std::cos(theta) * cross + std::cos(beta) * std::sin(theta) * Vector3d::UnitZ()).normalized();
+        const auto q = run.pose("output").orientation;
+        const Vector3d got = Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * cross;
+        worst = std::max(worst, (got - arm).norm());
+    });
+    EXPECT_LT(worst, GetParam() == "euler_implicit_linearized" ? 5e-5 : 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(Overconstrained, CardanJoint, testing::ValuesIn(implicit_methods),
+                         [](const auto& one) { return one.param; });
+
+// ---- Other mechanisms with few digits ----
+
+TEST(Overconstrained, PlanarFourBarInSpaceKeepsItsEnergy) {
+    const Vector3d a(0.0, 0.0, 0.0), b(0.1234, 0.3871, 0.0), c(0.9017, 0.6543, 0.0), d(0.8521, 0.0, 0.0);
+    for (const auto& method : {"hht", "generalized_alpha", "euler_implicit", "euler_implicit_linearized"}) {
+        std::string yaml = head(method, 0.00137, 0.5, "[0, -9.81, 0]") + "bodies:\n" + body("crank", 0.5 * (a + b), 4) +
+                           body("coupler", 0.5 * (b + c), 4) + body("rocker", 0.5 * (c + d), 4) + "joints:\n" +
+                           revolute("a", "second: crank", a, Vector3d::UnitZ(), 4) +
+                           revolute("b", "first: crank, second: coupler", b, Vector3d::UnitZ(), 4) +
+                           revolute("c", "first: coupler, second: rocker", c, Vector3d::UnitZ(), 4) +
+                           revolute("d", "second: rocker", d, Vector3d::UnitZ(), 4);
+        Running run(parse_scene(yaml, "four-bar"));
+        EXPECT_EQ(left_out(run), 3);
+        EXPECT_EQ(run.simulation.start(), "");
+        double above = 0.0;
+        finish(run, [&] { above = std::max(above, std::abs(position(run, "coupler")[2])); });
+        EXPECT_LT(above, 1e-9) << method;
+        EXPECT_LT(run.simulation.totals().worst_drift, 1e-4) << method;
+        // Methods of second order keep it; Euler's loses some of the 4 J that move.
+        const bool second = std::string(method).find("euler") == std::string::npos;
+        EXPECT_LT(std::abs(run.simulation.totals().energy - run.simulation.totals().start_energy), second ? 0.01 : 0.3)
+            << method;
+    }
+}
+
+// A plate on two pairs of hinged legs, in two planes that are not parallel: it moves along the line of the planes.
+TEST(Overconstrained, SarrusLinkageMovesAlongALine) {
+    const double angle = 1.1;
+    const Vector3d up = Vector3d::UnitZ(), first(1.0, 0.0, 0.0), second(std::cos(angle), std::sin(angle), 0.0);
+    for (const auto& method : implicit_methods) {
+        std::string bodies = "bodies:\n" + body("plate", 0.8 * up, 5), joints = "joints:\n";
+        for (const auto& [name, out] : {std::pair{"x", first}, std::pair{"s", second}}) {
+            const std::string lower = fmt::format("lower_{}", name), upper = fmt::format("upper_{}", name);
+            const Vector3d axis = up.cross(out), foot = 0.35 * out, knee = 0.65 * out + 0.4 * up, top = foot + 0.8 * up;
+            bodies += body(lower, 0.5 * (foot + knee), 5) + body(upper, 0.5 * (knee + top), 5);
+            joints += revolute(lower + "_foot", "second: " + lower, foot, axis, 5) +
+                      revolute(lower + "_knee", "first: " + lower + ", second: " + upper, knee, axis, 5) +
+                      revolute(upper + "_top", "first: " + upper + ", second: plate", top, axis, 5);
+        }
+        Running run(parse_scene(head(method, 0.00137, 0.25, "[0, 0, -9.81]") + bodies + joints, "sarrus"));
+        EXPECT_EQ(left_out(run), 1);  // 30 rows, 30 velocities, one freedom
+        double aside = 0.0;
+        finish(run, [&] { aside = std::max(aside, std::hypot(position(run, "plate")[0], position(run, "plate")[1])); });
+        EXPECT_LT(aside, method == "euler_implicit_linearized" ? 1e-4 : 1e-7) << method;
+        EXPECT_LT(position(run, "plate")[2], 0.75) << method;
+    }
+}
+
+// Each arm has two bushings on its axis, as a drawing has them.
+TEST(Overconstrained, DoubleWishboneMoves) {
+    const auto scene = [](const std::string& method, bool both) {
+        const Vector3d along = Vector3d::UnitX();
+        std::string yaml = head(method, 0.00137, 0.3, "[0, 0, -9.81]") + "bodies:\n" +
+                           body("lower", {0.0123, 0.4512, 0.2011}, 4) + body("upper", {-0.0211, 0.5034, 0.5123}, 4) +
+                           body("knuckle", {0.0042, 0.7211, 0.3512}, 4) + "joints:\n";
+        const auto arm = [&](const std::string& name, const Vector3d& middle) {
+            yaml += revolute(name + "_front", "second: " + name, middle - 0.15 * along, along, 4);
+            if (both) yaml += revolute(name + "_rear", "second: " + name, middle + 0.15 * along, along, 4);
+        };
+        arm("lower", {0.0123, 0.2411, 0.2134});
+        arm("upper", {-0.0211, 0.3124, 0.4987});
+        yaml +=
+            "- {name: ball_1, kind: spherical, first: lower, second: knuckle, point: [0.0101, 0.7013, 0.1923]}\n"
+            "- {name: ball_2, kind: spherical, first: upper, second: knuckle, point: [-0.0149, 0.6712, 0.5251]}\n"
+            "- {name: tie_rod, kind: distance, second: knuckle, point: [0.1312, 0.2711, 0.2713], second_point: "
+            "[0.1213, 0.6914, 0.2611]}\n"
+            "springs:\n- {name: coil, second: lower, first_point: [0.0123, 0.4011, 0.6512], second_point: [0.0123, "
+            "0.5217, 0.1987], stiffness: 2500, damping: 120}\n";
+        return yaml;
+    };
+    for (const auto& method : {"hht", "euler_implicit_linearized"}) {
+        Running twice(parse_scene(scene(method, true), "wishbone")),
+            once(parse_scene(scene(method, false), "wishbone"));
+        EXPECT_EQ(left_out(twice), 10);
+        EXPECT_EQ(left_out(once), 0);
+        finish(twice, [] {});
+        finish(once, [] {});
+        EXPECT_LT((position(twice, "knuckle") - position(once, "knuckle")).norm(), 1e-4) << method;
+        EXPECT_GT(std::abs(position(once, "knuckle")[2] - 0.3512), 1e-3) << method;
+    }
+}
+
+// Flat, its rows depend on each other once more than elsewhere.
+TEST(Overconstrained, AFlatParallelogramLosesNoRowThatItNeeds) {
+    const Vector3d a(0.0, 0.0, 0.0), b(0.3, 0.0, 0.0), c(1.1, 0.0, 0.0), d(0.8, 0.0, 0.0), z = Vector3d::UnitZ();
+    const std::string yaml =
+        head("euler_implicit_linearized", 0.001, 0.01) + "bodies:\n" + body("one", 0.5 * (a + b), 4) +
+        body("two", 0.5 * (b + c), 4) + body("three", 0.5 * (c + d), 4) + "joints:\n" +
+        revolute("a", "second: one", a, z, 4) + revolute("b", "first: one, second: two", b, z, 4) +
+        revolute("c", "first: two, second: three", c, z, 4) + revolute("d", "second: three", d, z, 4);
+    Running run(parse_scene(yaml, "flat"));
+    EXPECT_EQ(left_out(run), 3);
+}
+
+TEST(Overconstrained, MotorsThatContradictEachOtherAreNamed) {
+    const auto scene = [](const std::string& second) {
+        std::string yaml = Bennett().scene(8, swinging, head("hht", 0.001, 1.0));
+        return yaml + "- {name: other, joint: joint_1, motion: {" + second + "}}\n";
+    };
+    Running run(parse_scene(scene("linear: {start: 0, rate: 0}"), "motors"));
+    EXPECT_EQ(left_out(run), 4);
+    try {
+        run.finish();
+        FAIL() << "the motors cannot both have their way";
+    } catch (const StepFailure& error) {
+        EXPECT_NE(std::string(error.what()).find("contradicts them now"), std::string::npos) << error.what();
+    }
+    Scene contradictory = parse_scene(scene("linear: {start: 0.5, rate: 0}"), "motors");
+    EXPECT_THROW(Simulation(contradictory.systems[0], registry()), InputError);
+}
+
+TEST(Overconstrained, ConsistentStartsKeepTheirBits) {
+    for (const auto* name : {"bricard", "four_bar", "squeezer", "slider_crank", "pendulum", "governor", "chain_1000"}) {
+        Scene scene = read_scene(example_scene(name));
+        MultibodySystem& system = *scene.systems[0].system;
+        const State before = system.initial_state();
+        const Assembly& done = system.assemble();
+        const State after = system.initial_state();
+        EXPECT_EQ(done.displacement, 0.0) << name;
+        EXPECT_TRUE(before.q == after.q) << name;
+        EXPECT_EQ(done.velocity_share_of_all, 0.0) << name;
+        EXPECT_TRUE(before.v == after.v) << name;
+    }
+}
+
+}  // namespace
+}  // namespace delassus::tests::overconstrained_test
