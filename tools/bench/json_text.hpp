@@ -10,6 +10,7 @@
 namespace delassus::bench {
 
 using Json = nlohmann::ordered_json;
+using delassus::json_text;  // beside those of this folder
 
 /// The inverse of json_number(): null is NaN.
 inline double number_of(const Json& json) {
