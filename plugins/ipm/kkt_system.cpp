@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "kkt_system.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+
+#include "delassus/sdk/dense_algebra.hpp"
 
 namespace delassus::ipm {
 
@@ -99,7 +100,7 @@ void KktSystem::assemble(const sdk::Vector& theta) {
                 Eigen::Matrix3d block = Eigen::Matrix3d::Identity();
                 block.topLeftCorner(rows, rows) = E;
                 for (int i = 0; i < rows; ++i) block(i, i) += theta[groups_[g].first + i] + delta_;
-                const Eigen::Matrix3d inverse = block.llt().solve(Eigen::Matrix3d::Identity());
+                const Eigen::Matrix3d inverse = sdk::inverse_of_definite(block);
                 for (int i = 0; i < rows; ++i)
                     for (int j = 0; j < rows; ++j) t_[3 * g + i][j] = inverse(i, j);
             }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "preconditioner.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "delassus/sdk/dense_algebra.hpp"
 
 namespace delassus_minres {
 
@@ -105,12 +106,10 @@ void Preconditioner::factorize_blocks(const ProblemView& problem) {
         const double* entries = definite_ ? N_.block(c) : nullptr;
         if (!entries) continue;  // a large block keeps its diagonal
         const Eigen::Map<const Eigen::MatrixXd> block(entries, cone.rows, cone.rows);
-        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(block);
-        const double largest = eigen.eigenvalues().maxCoeff();
-        if (eigen.info() != Eigen::Success || !(largest > 0.0)) continue;
-        const Vector inverse = eigen.eigenvalues().cwiseMax(kBlockFloor * largest).cwiseInverse();
-        blocks_.push_back(
-            {cone.first_row, eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose()});
+        const delassus::sdk::SymmetricEigen eigen(block);
+        const double largest = eigen.values().maxCoeff();
+        if (!eigen.found() || !(largest > 0.0)) continue;
+        blocks_.push_back({cone.first_row, eigen.with(eigen.values().cwiseMax(kBlockFloor * largest).cwiseInverse())});
     }
 }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "schur.hpp"
 
-#include <Eigen/Cholesky>
-
+#include "delassus/sdk/dense_algebra.hpp"
 #include "delassus/sdk/saddle_point.hpp"
 
 namespace delassus::petsc {
@@ -32,10 +31,8 @@ SparseRows SchurMatrix::inverse(const ProblemView& problem) const {
                 for (sdk::SparseRowsView::InnerIterator entry(problem.H, index[i]); entry; ++entry)
                     block(static_cast<Eigen::Index>(i), position[static_cast<std::size_t>(entry.col())]) =
                         entry.value();
-            const Eigen::LLT<Eigen::MatrixXd> factor(block);
-            if (factor.info() != Eigen::Success)
+            if (!sdk::invert_definite(block))
                 throw sdk::NumericalFailure("block " + std::to_string(k) + " of H is not positive definite");
-            block = factor.solve(Eigen::MatrixXd::Identity(block.rows(), block.cols()));
             for (std::size_t i = 0; i < index.size(); ++i)
                 for (std::size_t j = 0; j < index.size(); ++j)
                     entries.emplace_back(index[i], index[j],

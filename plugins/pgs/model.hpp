@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "delassus/sdk/delassus_operator.hpp"
+#include "delassus/sdk/dense_algebra.hpp"
 #include "delassus/sdk/team.hpp"
 #include "sweep.hpp"
 #include "sweep_order.hpp"
@@ -342,11 +343,10 @@ private:
     }
 
     void append_pseudo_inverse(const Eigen::MatrixXd& M) {
-        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(M);
-        const double threshold = 1e-12 * std::max(0.0, solver.eigenvalues()[M.rows() - 1]);
-        const Eigen::VectorXd inverse =
-            solver.eigenvalues().unaryExpr([threshold](double value) { return value > threshold ? 1.0 / value : 0.0; });
-        const Eigen::MatrixXd result = solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
+        const sdk::SymmetricEigen eigen(M);
+        const double threshold = 1e-12 * std::max(0.0, eigen.values()[M.rows() - 1]);
+        const Eigen::MatrixXd result = eigen.with(
+            eigen.values().unaryExpr([threshold](double value) { return value > threshold ? 1.0 / value : 0.0; }));
         local_.inverse.insert(local_.inverse.end(), result.data(), result.data() + result.size());
     }
 

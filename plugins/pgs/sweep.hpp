@@ -86,12 +86,12 @@ template <int Rows>
 }
 
 /// The new λ of a block from its velocities u.
-template <int Rows, Local Choice>
+template <int Rows>
 inline void local_step(const LocalProblems& problems, const LocalBlock& local, const SweepRule& rule, const double* u,
                        double* lambda) {
     if constexpr (Rows == 2 || Rows == 3) {
         if (local.kind == LocalBlock::Kind::Friction) {
-            if constexpr (Choice == Local::Diagonal) {
+            if (rule.local == Local::Diagonal) {
                 diagonal_contact_step<Rows>(local, rule, u, lambda);
             } else {
                 exact_contact_step<Rows>(problems, local, rule, u, lambda);
@@ -118,7 +118,7 @@ inline void local_step(const LocalProblems& problems, const LocalBlock& local, c
 /// Visits the blocks first … last − 1. lambda and offset: by the rows of `rows`.
 ///   OnVelocities: z and next have the entries of v̂; Gauss–Seidel passes one array for both, Jacobi reads z and adds to
 ///   next (a copy of z on entry). Otherwise z is λ itself and next where new values go; lambda is not used.
-template <bool OnVelocities, int Width, Local Choice>
+template <bool OnVelocities, int Width>
 void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
                   const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
     constexpr std::size_t ahead = 256, line = 8;  // doubles: coefficients are fetched this far ahead
@@ -136,7 +136,7 @@ void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t las
             sdk::multiply_group<Rows, Width>(value, start, block.chunks, z, offset + block.first, u);
             const double* old = (OnVelocities ? lambda : z) + block.first;
             for (int i = 0; i < Rows; ++i) fresh[i] = old[i];
-            local_step<Rows, Choice>(problems, local, rule, u, fresh);
+            local_step<Rows>(problems, local, rule, u, fresh);
             if constexpr (OnVelocities) {
                 for (int i = 0; i < Rows; ++i) {
                     delta[i] = fresh[i] - lambda[block.first + i];
@@ -150,17 +150,12 @@ void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t las
     }
 }
 
-/// visit_blocks with the width and the local solver chosen at run time.
+/// visit_blocks with the width chosen at run time.
 template <bool OnVelocities>
 void visit(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
            const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
     sdk::with_width(rows.width(), [&]<int Width>() {
-        if (rule.local == Local::Diagonal) {
-            visit_blocks<OnVelocities, Width, Local::Diagonal>(rows, first, last, problems, rule, offset, z, next,
-                                                               lambda);
-        } else {
-            visit_blocks<OnVelocities, Width, Local::Exact>(rows, first, last, problems, rule, offset, z, next, lambda);
-        }
+        visit_blocks<OnVelocities, Width>(rows, first, last, problems, rule, offset, z, next, lambda);
     });
 }
 

@@ -129,7 +129,7 @@ Json analyse_scaling(const Rows& rows, const std::map<std::string, const Json*>&
                            {"law", row->at("law")},
                            {"solver", row->at("label")},
                            {"tolerance", row->at("tolerance")}};
-        const std::string key = head.dump();
+        const std::string key = json_text(head);
         if (!families.contains(key)) order.push_back(key);
         auto& [row_head, series] = families[key];
         row_head = head;
@@ -170,7 +170,7 @@ Json analyse_orders(const std::vector<Json>& simulations, const std::vector<Json
         if (!solved(row)) continue;
         const Json head = {
             {"scene", row.at("scene")}, {"timestepper", row.at("timestepper")}, {"solver", row.at("solver")}};
-        const std::string key = head.dump();
+        const std::string key = json_text(head);
         if (!groups.contains(key)) order.push_back(key);
         groups[key].first = head;
         groups[key].second[row.at("step").get<double>()] = &row;

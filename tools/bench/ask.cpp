@@ -23,7 +23,7 @@ public:
         rest_ += piece;
         std::size_t begin = 0;
         for (std::size_t end; (end = rest_.find('\n', begin)) != std::string::npos; begin = end + 1) {
-            const Json line = Json::parse(rest_.substr(begin, end - begin), nullptr, false);
+            const Json line = try_parse_ordered_json(std::string_view(rest_).substr(begin, end - begin));
             // Anything else comes from a plugin that found our channel: the row must not depend on it.
             if (line.is_object() && line.contains("event")) on_line_(line);
         }
@@ -43,7 +43,7 @@ ChildResult ask(const WorkerSettings& worker, const Json& request, const std::fu
     ChildSettings child;
     child.program = worker.command;
     child.arguments = {"worker"};
-    child.input = text_of(request);
+    child.input = json_text(request);
     // One core, one thread: the libraries behind some plugins would otherwise start threads that share that core.
     child.environment = {{"OMP_NUM_THREADS", "1"}, {"OPENBLAS_NUM_THREADS", "1"}, {"MKL_NUM_THREADS", "1"}};
     const auto cores = allowed_cores();

@@ -27,7 +27,9 @@ Json thinned(const Json& samples) {
 
 /// The rows, curves thinned and kept only at the tightest tolerance that each solver was run to on each problem.
 std::vector<Json> page_rows(std::vector<Json> rows) {
-    const auto run_of = [](const Json& row) { return Json{row.at("problem"), row.at("law"), row.at("label")}.dump(); };
+    const auto run_of = [](const Json& row) {
+        return json_text(Json{row.at("problem"), row.at("law"), row.at("label")});
+    };
     std::map<std::string, double> tightest;
     for (const Json& row : rows) {
         if (row.contains("skipped_after")) continue;
@@ -61,7 +63,7 @@ std::string bench_page(const ResultSet& results, const Json& analysis) {
                        {"cells", results.cells},
                        {"missing", results.missing},
                        {"analysis", analysis}};
-    return html_page(page_parts(), "bench.html", text_of(page));
+    return html_page(page_parts(), "bench.html", json_text(page));
 }
 
 }  // namespace delassus::bench

@@ -20,7 +20,7 @@ public:
     void send(const char* event, Json fields = Json::object()) const {
         Json line = {{"event", event}};
         line.update(fields);
-        write_all(text_of(line) + "\n");
+        write_all(json_text(line) + "\n");
     }
 
     /// The event "failed" of a worker whose memory does not suffice; needs none itself.

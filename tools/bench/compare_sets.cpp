@@ -22,18 +22,19 @@ void check_comparable(const ResultSet& before, const ResultSet& after, bool any_
             throw InputError(
                 fmt::format("the sets come from different machines ({} {} and {}), so ratios of their times say "
                             "nothing about a change; --any-machine compares them anyway",
-                            what, a.at("machine").at(what).dump(), b.at("machine").at(what).dump()));
+                            what, json_text(a.at("machine").at(what)), json_text(b.at("machine").at(what))));
     for (const char* what : {"time_limit", "memory_limit", "max_iterations"})
         if (a.at("settings").at(what) != b.at("settings").at(what))
             throw InputError(fmt::format("the sets have different limits ({} {} and {}), so they cannot be compared",
-                                         what, a.at("settings").at(what).dump(), b.at("settings").at(what).dump()));
+                                         what, json_text(a.at("settings").at(what)),
+                                         json_text(b.at("settings").at(what))));
 }
 
 /// The key by which two runs are the same, whatever the code.
 std::string identity(const Json& row) {
     if (row.at("kind") == "solve")
-        return Json{row.at("problem"), row.at("law"), row.at("label"), row.at("tolerance")}.dump();
-    return Json{row.at("scene"), row.at("timestepper"), row.at("step"), row.at("solver")}.dump();
+        return json_text(Json{row.at("problem"), row.at("law"), row.at("label"), row.at("tolerance")});
+    return json_text(Json{row.at("scene"), row.at("timestepper"), row.at("step"), row.at("solver")});
 }
 
 std::vector<double> seconds_of(const Json& row) {

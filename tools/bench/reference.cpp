@@ -84,7 +84,7 @@ private:
 /// The row and the place of a reference that is in the cache, or nothing. A damaged one counts as absent.
 std::optional<Json> cached_row(const fs::path& file) {
     if (!fs::exists(file)) return std::nullopt;
-    Json row = Json::parse(read_file(file), nullptr, false);
+    Json row = try_parse_ordered_json(read_file(file));
     if (!row.is_object() || !row.contains("of")) return std::nullopt;
     row["cached"] = true;
     return row;
@@ -149,7 +149,7 @@ Reference find_reference(const WorkerSettings& worker, const SuiteReferences& re
     }
     make_folder(cache);
     const Solution solution = read_solution(first->solution, facts.n, facts.m);
-    write_solution(solution, text_of(row, 1) + "\n", folder);
+    write_solution(solution, json_text(row, 1) + "\n", folder);
     return {folder, row};
 }
 
@@ -193,7 +193,7 @@ Reference find_step_reference(const WorkerSettings& worker, const SuiteReference
     row["message"] = "";
     make_folder(cache);
     write_file_atomically(file, read_file(scratch.path() / "state.json"));
-    write_file_atomically(report, text_of(row, 1) + "\n");
+    write_file_atomically(report, json_text(row, 1) + "\n");
     return {file, row};
 }
 

@@ -29,8 +29,7 @@ StoredLines read_lines(const fs::path& file) {
     std::size_t begin = 0, number = 0;
     for (std::size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
         ++number;
-        Json row = Json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
-                               text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+        Json row = try_parse_ordered_json(std::string_view(text).substr(begin, end - begin));
         if (!row.is_object() || !row.contains("kind"))
             throw InputError(
                 fmt::format("{}, line {}: this is not a row of a benchmark's results", file.string(), number));
@@ -114,7 +113,7 @@ ResultsFile::ResultsFile(const fs::path& folder) : file_(folder / file_name) {
 }
 
 void ResultsFile::add(const Json& row) {
-    append_to_file(file_, text_of(row) + '\n');
+    append_to_file(file_, json_text(row) + '\n');
     note(row);
 }
 

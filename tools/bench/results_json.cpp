@@ -87,7 +87,7 @@ std::string json_text(const Comparison& comparison) {
                        {"interrupted", comparison.interrupted},
                        {"measures", answer_measures_json()},
                        {"problems", problems}};
-    return text_of(json, 1) + "\n";
+    return json_text(json, 1) + "\n";
 }
 
 }  // namespace delassus::bench

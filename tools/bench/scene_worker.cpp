@@ -305,7 +305,7 @@ void send_plan(const Channel& channel, const Json& request) {
                         {"end", end}};
     channel.send("scene", facts);
     const Registry registry = registry_of(request);
-    channel.send("plan", Json::parse(plan_json(file.filename().string(), make_plan(scene, registry))));
+    channel.send("plan", parse_ordered_json(plan_json(file.filename().string(), make_plan(scene, registry))));
 }
 
 void simulate(const Channel& channel, const Json& request) {
@@ -337,9 +337,9 @@ void simulate(const Channel& channel, const Json& request) {
         answer["watched"] = watched(run.watch, answer);
         if (!body.empty()) answer["watched"]["place"] = first.place(body);
         const bool complete = run.status == "finished" || run.status == "unsolved";
-        if (complete && !state_file.empty()) write_file_atomically(state_file, text_of(first.state()));
+        if (complete && !state_file.empty()) write_file_atomically(state_file, json_text(first.state()));
         if (const auto reference = request.at("reference").get<std::string>(); complete && !reference.empty())
-            answer["error"] = first.error(Json::parse(read_file(reference)));
+            answer["error"] = first.error(parse_ordered_json(read_file(reference)));
         channel.send("recorded", answer);
         if (!complete) return;
         for (int k = 0; k < request.at("repeats").get<int>() && !interrupted(); ++k) {

@@ -184,7 +184,7 @@ std::string leaving_out_text(const ResultSet& results) {
             return failed(run) ? run.at("cause").get<std::string>() : seconds_text(seconds);
         };
         const auto rows = [](const Json& run) {
-            return run.at("totals").contains("most_rows") ? run.at("totals").at("most_rows").dump() : "—";
+            return run.at("totals").contains("most_rows") ? json_text(run.at("totals").at("most_rows")) : "—";
         };
         const auto mebibytes = [](const Json& run) {
             return fmt::format("{:.1f}", run.at("peak_memory").get<double>() / 1048576.0);

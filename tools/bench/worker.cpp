@@ -209,7 +209,7 @@ int run_worker(const std::string& request_text, int descriptor) {
     const char* kind = "error";
     std::string message;
     try {
-        const Json request = Json::parse(request_text);
+        const Json request = parse_ordered_json(request_text);
         const std::string task = request.at("do");
         if (task == "describe") {
             send_facts(channel, read(request));

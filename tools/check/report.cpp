@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "check/conformance.hpp"
+#include "support/json.hpp"
 
 namespace delassus::check {
 
@@ -35,7 +34,7 @@ std::string to_json(const ConformanceReport& report) {
                                   {"verdict", result.verdict == Verdict::Failed ? "failed" : word_of(result.verdict)},
                                   {"detail", result.detail}});
     // What a plugin says may not be UTF-8.
-    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+    return json_text(json, 2) + "\n";
 }
 
 void print(const ConformanceReport& report) {

@@ -13,6 +13,7 @@
 #include "measuring.hpp"
 #include "process/child_process.hpp"
 #include "process/supervision.hpp"
+#include "support/json.hpp"
 
 namespace delassus::command {
 
@@ -84,7 +85,7 @@ int compare_results(const BenchArguments& arguments) {
     const auto comparison = bench::compare_sets(bench::read_results(arguments.before),
                                                 bench::read_results(arguments.after), arguments.any_machine);
     if (arguments.json) {
-        fmt::print("{}\n", bench::text_of(comparison, 1));
+        fmt::print("{}\n", json_text(comparison, 1));
     } else {
         fmt::print("A is {}, B is {}; ratios of setup and solve, below 1 where B is faster\n\n{}",
                    arguments.before.string(), arguments.after.string(), bench::compare_text(comparison));

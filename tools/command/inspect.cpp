@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "command.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/qualification.hpp"
 #include "delassus/rank.hpp"
+#include "support/json.hpp"
 
 namespace delassus::command {
 
@@ -132,7 +132,7 @@ int inspect(const InspectArguments& arguments) {
                      {"notes", problem.notes}};
         for (const auto& [kind, count] : cones) json["cones"][kind] = {{"blocks", count.blocks}, {"rows", count.rows}};
         if (qualification) json["qualification"] = json_of(problem, *qualification);
-        fmt::print("{}\n", json.dump(2));
+        fmt::print("{}\n", json_text(json, 2));
         return exit_solved;
     }
     fmt::print("{}\n", problem.name);

@@ -2,8 +2,6 @@
 // delassus plugins list | info | check | describe
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "check/conformance.hpp"
 #include "command.hpp"
 #include "delassus/config.hpp"
@@ -13,6 +11,7 @@
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"
+#include "support/json.hpp"
 
 namespace delassus::command {
 
@@ -87,7 +86,7 @@ int list(const PluginsArguments& arguments) {
     if (arguments.json) {
         Json json = {{"plugins", Json::array()}, {"rejected", Json::array()}, {"not_built", Json::array()}};
         for (const auto& plugin : registry.plugins()) {
-            Json row = Json::parse(sidecar_text(plugin));
+            Json row = parse_ordered_json(sidecar_text(plugin));
             row["path"] = plugin.library.string();
             json["plugins"].push_back(std::move(row));
         }
@@ -95,7 +94,7 @@ int list(const PluginsArguments& arguments) {
             json["rejected"].push_back({{"path", row.path.string()}, {"reason", row.reason}});
         for (const auto& row : registry.unbuilt())
             json["not_built"].push_back({{"name", row.name}, {"reason", row.reason}});
-        fmt::print("{}\n", json.dump(2));
+        fmt::print("{}\n", json_text(json, 2));
         return exit_solved;
     }
     for (const auto& plugin : registry.plugins())

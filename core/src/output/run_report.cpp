@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "output/run_report.hpp"
 
-#include <nlohmann/json.hpp>
 #include <type_traits>
 #include <variant>
 
 #include "simulation/step_columns.hpp"
+#include "support/json.hpp"
 #include "support/json_number.hpp"
 
 namespace delassus {
@@ -101,7 +101,7 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
         one["bodies"] = std::move(bodies);
         json["systems"].push_back(std::move(one));
     }
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return json_text(json, 2) + "\n";
 }
 
 }  // namespace delassus

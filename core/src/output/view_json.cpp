@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "delassus/version.hpp"
+#include "support/json.hpp"
 
 namespace delassus {
 namespace {
@@ -148,7 +148,7 @@ std::string view_json(const RecordedRun& run) {
                  {"message", run.message},
                  {"systems", Json::array()}};
     for (const auto& system : run.systems) json["systems"].push_back(json_of(system));
-    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return json_text(json);
 }
 
 }  // namespace delassus

@@ -3,11 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "delassus/error.hpp"
 #include "output/view_json.hpp"
 #include "support/html_page.hpp"
+#include "support/json.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus {
@@ -27,7 +26,7 @@ RecordedRun read_run(const fs::path& folder, const RecordingLimits& limits) {
     run.status = "unfinished";
     if (fs::exists(report, error)) {
         try {
-            const auto json = nlohmann::json::parse(read_file(report));
+            const auto json = parse_json(read_file(report));
             run.title = json.at("title").get<std::string>();
             run.status = json.at("status").get<std::string>();
             run.message = json.at("message").get<std::string>();

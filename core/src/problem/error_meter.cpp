@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/residual.hpp"
 #include "delassus/sdk/saddle_point.hpp"
+#include "delassus/sdk/sparse_lu.hpp"
 #include "problem/dense_rows.hpp"
 #include "problem/prepared_problem.hpp"
 
@@ -42,17 +42,17 @@ Reference of_singular(const sdk::ProblemView& problem) {
 }
 
 Reference of_unsymmetric(const sdk::ProblemView& problem) {
-    const Eigen::SparseLU<sdk::SparseColumns> factor{sdk::SparseColumns(problem.H)};
-    if (factor.info() != Eigen::Success) return of_singular(problem);
+    sdk::SparseLu factor;
+    if (!factor.factorize(problem.H)) return of_singular(problem);
     Reference reference;
     reference.diagonal.setZero(problem.m);
     Vector row(problem.n);
     for (Eigen::Index i = 0; i < problem.m; ++i) {
         row = problem.D.row(i).transpose();
-        reference.diagonal[i] = row.dot(Vector(factor.solve(row)));
+        reference.diagonal[i] = row.dot(factor.solve(row));
     }
     add_compliance(problem, reference.diagonal);
-    reference.r = problem.D * Vector(factor.solve(problem.a)) + problem.b;
+    reference.r = problem.D * factor.solve(problem.a) + problem.b;
     return reference;
 }
 

@@ -7,11 +7,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "delassus/error.hpp"
 #include "problem/cone_kinds.hpp"
+#include "support/json.hpp"
 #include "support/nearest_name.hpp"
 
 namespace delassus {
@@ -179,7 +179,7 @@ OrderedJson parameter_json(std::span<const Cone> cones, std::size_t k) {
 ProblemJson parse_problem_json(std::string_view text, const std::string& file) {
     Json document;
     try {
-        document = Json::parse(text.begin(), text.end());
+        document = parse_json(text);
     } catch (const Json::exception& error) {
         // "[json.exception.parse_error.101] parse error at line 2, column 5: …": without the number of the exception.
         std::string reason = error.what();
@@ -281,7 +281,7 @@ std::string problem_json_text(const Problem& problem) {
     document["cones"] = std::move(runs);
     if (!problem.source.empty()) document["source"] = problem.source;
     if (!problem.notes.empty()) document["notes"] = problem.notes;
-    return document.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+    return json_text(document, 1) + "\n";
 }
 
 }  // namespace delassus

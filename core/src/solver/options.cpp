@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "delassus/error.hpp"
 #include "delassus/plugin_info.hpp"
+#include "support/json.hpp"
 #include "support/nearest_name.hpp"
 
 namespace delassus {
@@ -136,7 +136,7 @@ std::string options_schema(std::string_view solver, const std::vector<OptionInfo
                                            {"type", "object"},
                                            {"additionalProperties", false},
                                            {"properties", properties}};
-    return schema.dump(2) + "\n";
+    return json_text(schema, 2) + "\n";
 }
 
 }  // namespace delassus

@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "problem/need_of.hpp"
+#include "support/json.hpp"
 #include "support/nearest_name.hpp"
 #include "support/text_file.hpp"
 
@@ -86,7 +86,7 @@ bool RankingRule::matches(const RankedNeeds& asked) const {
 
 Ranking::Ranking(const std::filesystem::path& file) {
     try {
-        const nlohmann::json json = nlohmann::json::parse(read_file(file));
+        const nlohmann::json json = parse_json(read_file(file));
         check_keys(json, {"format", "made_by", "rules"}, "a ranking");
         if (json.at("format") != 1) throw InputError("its format is not 1");
         for (const auto& rule : json.at("rules")) rules_.push_back(read_rule(rule));

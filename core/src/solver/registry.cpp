@@ -8,13 +8,13 @@
 #include <cstdlib>
 #include <fstream>
 #include <new>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 #include <system_error>
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
+#include "support/json.hpp"
 #include "support/library_location.hpp"
 #include "support/nearest_name.hpp"
 
@@ -42,7 +42,9 @@ Registry::Registry(std::vector<fs::path> folders) : folders_(std::move(folders))
     std::sort(plugins_.begin(), plugins_.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
 
     std::ifstream left_out(folders_.back() / "not-built.list");
-    const auto json = nlohmann::json::parse(left_out, nullptr, false);
+    std::ostringstream text;
+    text << left_out.rdbuf();
+    const auto json = try_parse_ordered_json(text.str());
     if (!json.is_array()) return;
     for (const auto& row : json) unbuilt_.push_back({row.value("name", ""), row.value("reason", "")});
 }

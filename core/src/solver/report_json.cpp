@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <nlohmann/json.hpp>
 
 #include "delassus/solver.hpp"
 #include "problem/errors_json.hpp"
+#include "support/json.hpp"
 
 namespace delassus {
 
@@ -47,7 +47,7 @@ std::string to_json(const SolveReport& report) {
         for (const auto& sample : report.curve) curve.push_back({sample.iteration, sample.seconds, sample.natural});
         json["curve"] = {{"columns", {"iteration", "seconds", "natural"}}, {"samples", std::move(curve)}};
     }
-    return json.dump(2) + "\n";
+    return json_text(json, 2) + "\n";
 }
 
 }  // namespace delassus

@@ -4,12 +4,12 @@
 
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "delassus/error.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/plugin_info.hpp"
+#include "support/json.hpp"
 #include "support/json_number.hpp"
 
 namespace delassus {
@@ -68,7 +68,7 @@ std::string sidecar_text(const PluginInfo& info) {
                           {"flags", info.flags},
                           {"capabilities", capability_names(info.capabilities)},
                           {"options", options}};
-    return sidecar.dump(2) + "\n";
+    return json_text(sidecar, 2) + "\n";
 }
 
 PluginInfo read_sidecar(const std::filesystem::path& sidecar) {
@@ -77,7 +77,7 @@ PluginInfo read_sidecar(const std::filesystem::path& sidecar) {
     text << file.rdbuf();
     if (!file) throw PluginError(fmt::format("cannot read {}", sidecar.string()));
     try {
-        const Json json = Json::parse(text.str());
+        const Json json = parse_ordered_json(text.str());
         if (json.at("format") != sidecar_format || json.at("version") != sidecar_version)
             throw PluginError(
                 fmt::format("{} is not a plugin sidecar of version {}", sidecar.string(), sidecar_version));

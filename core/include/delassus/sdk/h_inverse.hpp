@@ -2,12 +2,9 @@
 // H⁻¹ for a symmetric positive definite H of any structure: diagonal, small blocks, or sparse (finite elements).
 #pragma once
 
-#include <Eigen/Cholesky>
-#include <algorithm>
-#include <cmath>
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "delassus/sdk/problem_view.hpp"
@@ -29,92 +26,16 @@ public:
 
     /// Reads the structure from the needs that the host derived. Throws std::invalid_argument unless H is definite.
     /// Where the pattern of a sparse H is that of the last call, its analysis is kept, whatever changed in D.
-    void analyze(const ProblemView& problem) {
-        n_ = problem.n;
-        if (problem.needs_any(DELASSUS_CAN_REDUCED) || n_ == 0) {
-            kind_ = Kind::None;
-        } else if (problem.needs_any(DELASSUS_CAN_H_DIAGONAL)) {
-            kind_ = Kind::Diagonal;
-        } else if (problem.needs_any(DELASSUS_CAN_H_BLOCKS)) {
-            kind_ = Kind::Blocks;
-        } else if (problem.needs_any(DELASSUS_CAN_H_DEFINITE)) {
-            kind_ = Kind::Sparse;
-            if (!sparse_) sparse_ = std::make_unique<SparseFactor>();
-            if (sparse_->analyze(columns_of(problem), n_)) ++analyses_;
-        } else {
-            throw std::invalid_argument("H must be symmetric positive definite for this method");
-        }
-        start_.assign(problem.h_block_start.begin(), problem.h_block_start.end());
-        index_.assign(problem.h_block_index.begin(), problem.h_block_index.end());
-    }
+    void analyze(const ProblemView& problem);
 
     /// Throws NumericalFailure if H is not positive definite.
-    void factorize(const ProblemView& problem) {
-        smallest_relative_pivot_ = 1.0;
-        switch (kind_) {
-            case Kind::None:
-                return;
-            case Kind::Diagonal:
-                root_.setZero(n_);
-                for (Eigen::Index i = 0; i < n_; ++i)
-                    for (SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
-                        if (entry.col() == i) root_[i] = entry.value();
-                if (!(root_.minCoeff() > 0.0)) throw NumericalFailure("H has a diagonal entry that is not positive");
-                inverse_ = root_.cwiseInverse();
-                root_ = root_.cwiseSqrt();
-                return;
-            case Kind::Blocks:
-                factorize_blocks(problem);
-                break;
-            case Kind::Sparse:
-                if (!sparse_->factorize(columns_of(problem)))
-                    throw NumericalFailure("the Cholesky factorisation of H failed: H is not positive definite");
-                measure_sparse_pivots(problem);
-                break;
-        }
-        ++factorizations_;
-    }
+    void factorize(const ProblemView& problem);
 
     /// v ← H⁻¹ v; n entries.
-    void apply(Vector& v) const {
-        switch (kind_) {
-            case Kind::None:
-                return;
-            case Kind::Diagonal:
-                v.array() *= inverse_.array();
-                return;
-            case Kind::Blocks:
-                apply_blocks(v);
-                return;
-            case Kind::Sparse:
-                sparse_->solve(v);
-                return;
-        }
-    }
+    void apply(Vector& v) const;
 
     /// Sparse columns of Z = L⁻¹ P Dᵀ (n × m, in the order of the factor's own rows): D H⁻¹ Dᵀ = Zᵀ Z.
-    [[nodiscard]] SparseColumns half_solved(const SparseRowsView& D) const {
-        SparseColumns Z(n_, D.rows());
-        std::vector<Eigen::Triplet<double, std::int32_t>> entries;
-        const auto put = [&](Eigen::Index i, Eigen::Index row, double value) {
-            if (value != 0.0) entries.emplace_back(static_cast<std::int32_t>(i), static_cast<std::int32_t>(row), value);
-        };
-        if (kind_ == Kind::Sparse) {
-            sparse_->half_solve(D, sparse_->reach(D),
-                                [&](Eigen::Index first, std::span<const std::int32_t> rows, const auto& panel) {
-                                    for (Eigen::Index j = 0; j < panel.cols(); ++j)
-                                        for (Eigen::Index i = 0; i < panel.rows(); ++i)
-                                            put(first + i, rows[static_cast<std::size_t>(j)], panel(i, j));
-                                });
-        } else {
-            for_each_half_solved_row(D,
-                                     [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
-                                         for (const auto i : reach) put(i, row, work[i]);
-                                     });
-        }
-        Z.setFromTriplets(entries.begin(), entries.end());
-        return Z;
-    }
+    [[nodiscard]] SparseColumns half_solved(const SparseRowsView& D) const;
 
     /// Visits L⁻¹ P Dᵀ row by row of D without storing it, where H is diagonal or of blocks: visit(row, reach, work),
     /// where work (n) is zero but for the indices in reach.
@@ -149,114 +70,22 @@ private:
     static constexpr int largest_block = 16;
     using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, largest_block, largest_block>;
 
-    // H is symmetric, so its compressed rows are its compressed columns.
-    static Eigen::Map<const SparseColumns> columns_of(const ProblemView& problem) {
-        const delassus_matrix& H = problem.raw->H;
-        return {H.rows, H.columns, H.entries, H.row_start, H.column, H.value};
-    }
+    static Eigen::Map<const SparseColumns> columns_of(const ProblemView& problem);
 
     [[nodiscard]] std::size_t block_count() const { return start_.empty() ? 0 : start_.size() - 1; }
 
-    void factorize_blocks(const ProblemView& problem) {
-        position_.resize(static_cast<std::size_t>(n_));
-        block_of_.resize(static_cast<std::size_t>(n_));
-        offset_.resize(block_count() + 1);
-        offset_[0] = 0;
-        for (std::size_t k = 0; k < block_count(); ++k) {
-            const auto size = static_cast<std::size_t>(start_[k + 1] - start_[k]);
-            offset_[k + 1] = offset_[k] + size * size;
-            for (std::size_t i = 0; i < size; ++i) {
-                position_[static_cast<std::size_t>(index_[static_cast<std::size_t>(start_[k]) + i])] =
-                    static_cast<std::int32_t>(i);
-                block_of_[static_cast<std::size_t>(index_[static_cast<std::size_t>(start_[k]) + i])] =
-                    static_cast<std::int32_t>(k);
-            }
-        }
-        inverse_.resize(static_cast<Eigen::Index>(offset_.back()));
-        root_.resize(static_cast<Eigen::Index>(offset_.back()));
-        Block block, inverse_of_root;
-        for (std::size_t k = 0; k < block_count(); ++k) {
-            const Eigen::Index size = start_[k + 1] - start_[k];
-            if (size > largest_block) throw std::invalid_argument("a block of H is larger than the host allows");
-            block.setZero(size, size);
-            for (Eigen::Index i = 0; i < size; ++i) {
-                for (SparseRowsView::InnerIterator entry(problem.H, index_[static_cast<std::size_t>(start_[k] + i)]);
-                     entry; ++entry)
-                    block(i, position_[static_cast<std::size_t>(entry.col())]) = entry.value();
-            }
-            const Eigen::LLT<Block> factor(block);
-            if (factor.info() != Eigen::Success)
-                throw NumericalFailure("block " + std::to_string(k) + " of H is not positive definite");
-            for (Eigen::Index i = 0; i < size; ++i) record_pivot(factor.matrixLLT()(i, i), block(i, i));
-            const auto offset = static_cast<Eigen::Index>(offset_[k]);
-            inverse_of_root.setIdentity(size, size);
-            factor.matrixL().solveInPlace(inverse_of_root);
-            Eigen::Map<Eigen::MatrixXd>(root_.data() + offset, size, size) = inverse_of_root;
-            Eigen::Map<Eigen::MatrixXd>(inverse_.data() + offset, size, size).noalias() =
-                inverse_of_root.transpose().lazyProduct(inverse_of_root);
-        }
-    }
+    void factorize_blocks(const ProblemView& problem);
 
     void record_pivot(double root, double diagonal) {
         smallest_relative_pivot_ = std::min(smallest_relative_pivot_, root * root / diagonal);
     }
 
-    void measure_sparse_pivots(const ProblemView& problem) {
-        const Vector root = sparse_->diagonal();
-        for (Eigen::Index i = 0; i < n_; ++i)
-            for (SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
-                if (entry.col() == i) record_pivot(root[i], entry.value());
-    }
+    void measure_sparse_pivots(const ProblemView& problem);
 
-    void apply_blocks(Vector& v) const {
-        Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, largest_block, 1> gathered;
-        for (std::size_t k = 0; k < block_count(); ++k) {
-            const Eigen::Index size = start_[k + 1] - start_[k];
-            const std::int32_t* index = index_.data() + start_[k];
-            gathered.resize(size);
-            for (Eigen::Index i = 0; i < size; ++i) gathered[i] = v[index[i]];
-            const Eigen::Map<const Eigen::MatrixXd> inverse(inverse_.data() + offset_[k], size, size);
-            for (Eigen::Index i = 0; i < size; ++i) v[index[i]] = inverse.col(i).dot(gathered);
-        }
-    }
+    void apply_blocks(Vector& v) const;
 
-    // One row of D through L⁻¹: leaves the result in work and the touched indices in reach.
     void half_solve_row(const SparseRowsView& D, Eigen::Index row, Vector& work, std::vector<std::int32_t>& reach,
-                        std::vector<std::int32_t>& mark) const {
-        reach.clear();
-        const auto stamp = static_cast<std::int32_t>(row);
-        const auto touch = [&](std::int32_t i) {
-            if (mark[static_cast<std::size_t>(i)] == stamp) return false;
-            mark[static_cast<std::size_t>(i)] = stamp;
-            reach.push_back(i);
-            return true;
-        };
-        switch (kind_) {
-            case Kind::None:
-                return;
-            case Kind::Diagonal:
-                for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
-                    touch(static_cast<std::int32_t>(entry.col()));
-                    work[entry.col()] = entry.value() / root_[entry.col()];
-                }
-                return;
-            case Kind::Blocks:
-                for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry) {
-                    const auto j = static_cast<std::size_t>(entry.col());
-                    const auto k = static_cast<std::size_t>(block_of_[j]);
-                    const Eigen::Index size = start_[k + 1] - start_[k];
-                    const Eigen::Map<const Eigen::MatrixXd> inverse_of_root(root_.data() + offset_[k], size, size);
-                    for (Eigen::Index i = position_[j]; i < size; ++i) {
-                        const std::int32_t target = index_[static_cast<std::size_t>(start_[k] + i)];
-                        touch(target);
-                        work[target] += inverse_of_root(i, position_[j]) * entry.value();
-                    }
-                }
-                return;
-            case Kind::Sparse:
-                throw std::logic_error("a sparse factor solves for all rows of D together");
-        }
-    }
+                        std::vector<std::int32_t>& mark) const;
 
     Kind kind_ = Kind::None;
     Eigen::Index n_ = 0;
@@ -272,3 +101,7 @@ private:
 };
 
 }  // namespace delassus::sdk
+
+#ifndef DELASSUS_SDK_COMPILED
+#include "delassus/sdk/h_inverse_bodies.hpp"
+#endif

@@ -2,7 +2,6 @@
 // The bookkeeping that iterative solvers share: the stop, progress, the best iterate, stall detection.
 #pragma once
 
-#include <cmath>
 #include <limits>
 #include <string>
 
@@ -19,30 +18,7 @@ public:
     Monitor(const Request& request, std::int64_t stall_window) : request_(request), stall_window_(stall_window) {}
 
     /// True: stop now. x may be null. Iteration 0 is the starting point.
-    [[nodiscard]] bool check(std::int64_t iteration, const double* x, const Vector& lambda, double residual) {
-        outcome_.iterations = iteration;
-        if (!std::isfinite(residual)) {
-            outcome_.message = "the iterates stopped being finite";
-            return finish(DELASSUS_NUMERICAL_FAILURE);
-        }
-        if (residual < outcome_.residual || std::isnan(outcome_.residual)) {
-            outcome_.residual = residual;
-            best_ = lambda;
-        }
-        if (residual < 0.99 * milestone_) {
-            milestone_ = residual;
-            milestone_iteration_ = iteration;
-        }
-        if (const auto answer = request_.progress(iteration, x, lambda.data()); answer != DELASSUS_CONTINUE)
-            return finish(status_of(answer));
-        if (residual <= aim * request_.tolerance()) return finish(DELASSUS_SOLVED);
-        if (iteration >= request_.max_iterations()) return finish(DELASSUS_ITERATION_LIMIT);
-        if (stall_window_ > 0 && iteration - milestone_iteration_ > stall_window_) {
-            outcome_.message = "no progress for " + std::to_string(stall_window_) + " iterations";
-            return finish(DELASSUS_STALLED);
-        }
-        return false;
-    }
+    [[nodiscard]] bool check(std::int64_t iteration, const double* x, const Vector& lambda, double residual);
 
     /// The iterate with the smallest residual that check() has seen; m.
     [[nodiscard]] const Vector& best() const { return best_; }
@@ -68,3 +44,7 @@ private:
 };
 
 }  // namespace delassus::sdk
+
+#ifndef DELASSUS_SDK_COMPILED
+#include "delassus/sdk/monitor_bodies.hpp"
+#endif

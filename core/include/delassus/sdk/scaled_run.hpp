@@ -2,7 +2,6 @@
 // One solve by a method that works on a ScaledProblem: starting point, stop, claim, result.
 #pragma once
 
-#include <cmath>
 #include <string>
 #include <utility>
 
@@ -20,30 +19,14 @@ public:
         : problem_(problem), scaled_(scaled), request_(request), monitor_(request, stall_window) {}
 
     /// The projected starting point: the given reactions (m, the problem's units) or zero.
-    [[nodiscard]] Vector start(const MutableVectorView& lambda) {
-        Vector scaled = Vector::Zero(problem_.m);
-        if (request_.warm_start() && lambda.allFinite()) scaled = lambda.array() / scaled_.scaling().array();
-        scaled_.project(scaled);
-        return scaled;
-    }
+    [[nodiscard]] Vector start(const MutableVectorView& lambda);
 
     /// Judges the iterate λ̂ with its û; true: stop now. Each call after the first counts as an iteration. A claim of
     /// convergence rests on û computed anew; where it fails, stale() tells the caller to renew its û.
-    [[nodiscard]] bool check(const Vector& lambda, const Vector& velocity) {
-        lambda_ = lambda.array() * scaled_.scaling().array();
-        return judge(scaled_.natural(lambda, velocity));
-    }
+    [[nodiscard]] bool check(const Vector& lambda, const Vector& velocity);
 
     /// The same for a caller that has put the iterate's λ = P λ̂ into unscaled() and knows its natural error.
-    [[nodiscard]] bool judge(double residual) {
-        stale_ = false;
-        if (residual <= Monitor::aim * request_.tolerance()) {
-            residual = scaled_.measured(problem_, lambda_, x_);
-            stale_ = residual > Monitor::aim * request_.tolerance();
-        }
-        latest_ = residual;
-        return monitor_.check(iteration_++, nullptr, lambda_, residual);
-    }
+    [[nodiscard]] bool judge(double residual);
     [[nodiscard]] Vector& unscaled() { return lambda_; }
 
     /// Counts a product with N that made no new iterate; true: stop now.
@@ -61,15 +44,7 @@ public:
     [[nodiscard]] std::int64_t iteration() const { return iteration_; }
 
     /// Leaves the best iterate in x (n) and lambda (m), and says how the solve ended.
-    [[nodiscard]] Outcome finish(MutableVectorView x, MutableVectorView lambda) {
-        if (monitor_.best().size() == problem_.m && monitor_.best().allFinite()) {
-            lambda = monitor_.best();
-        } else {
-            lambda.setZero();
-        }
-        x = scaled_.unscaled().velocity(problem_, lambda);
-        return monitor_.outcome();
-    }
+    [[nodiscard]] Outcome finish(MutableVectorView x, MutableVectorView lambda);
 
 private:
     const ProblemView& problem_;
@@ -83,3 +58,7 @@ private:
 };
 
 }  // namespace delassus::sdk
+
+#ifndef DELASSUS_SDK_COMPILED
+#include "delassus/sdk/scaled_run_bodies.hpp"
+#endif

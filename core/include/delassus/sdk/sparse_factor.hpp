@@ -130,7 +130,6 @@ private:
 
 }  // namespace delassus::sdk
 
-// Compiling these takes seconds. A project of many files compiles them in one, and the others with this macro.
-#ifndef DELASSUS_SPARSE_FACTOR_COMPILED
+#ifndef DELASSUS_SDK_COMPILED
 #include "delassus/sdk/sparse_factor_bodies.hpp"
 #endif

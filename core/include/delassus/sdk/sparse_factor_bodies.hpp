@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The functions of sdk/sparse_factor.hpp: inline, or compiled once where DELASSUS_SPARSE_FACTOR_COMPILED is defined.
+// The functions of sdk/sparse_factor.hpp (sdk/compiled_once.hpp).
 #pragma once
 
 #include <Eigen/OrderingMethods>
@@ -7,22 +7,17 @@
 #include <numeric>
 #include <utility>
 
+#include "delassus/sdk/compiled_once.hpp"
 #include "delassus/sdk/dissection.hpp"
 #include "delassus/sdk/sparse_factor.hpp"
-
-#ifdef DELASSUS_SPARSE_FACTOR_COMPILED
-#define DELASSUS_SPARSE_FACTOR_INLINE
-#else
-#define DELASSUS_SPARSE_FACTOR_INLINE inline
-#endif
 
 namespace delassus::sdk {
 
 /// The strict lower triangle of the matrix with its rows and columns at new positions, in no order within a row or
 /// column.
-DELASSUS_SPARSE_FACTOR_INLINE SparseFactor::Pattern SparseFactor::permute(const Eigen::Ref<const SparseColumns>& matrix,
-                                                                          const std::vector<std::int32_t>& position,
-                                                                          bool by_rows) {
+DELASSUS_SDK_FUNCTION SparseFactor::Pattern SparseFactor::permute(const Eigen::Ref<const SparseColumns>& matrix,
+                                                                  const std::vector<std::int32_t>& position,
+                                                                  bool by_rows) {
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     const auto visit = [&](auto&& take) {
         for (std::int32_t j = 0; j < matrix.cols(); ++j)
@@ -45,7 +40,7 @@ DELASSUS_SPARSE_FACTOR_INLINE SparseFactor::Pattern SparseFactor::permute(const 
 }
 
 /// The elimination tree (Liu 1986) of a matrix by the rows of its lower triangle: parent of each column, −1 at a root.
-DELASSUS_SPARSE_FACTOR_INLINE std::vector<std::int32_t> SparseFactor::elimination_tree(const Pattern& rows) {
+DELASSUS_SDK_FUNCTION std::vector<std::int32_t> SparseFactor::elimination_tree(const Pattern& rows) {
     const std::size_t n = rows.start.size() - 1;
     std::vector<std::int32_t> parent(n, -1), ancestor(n, -1);
     for (std::size_t row = 0; row < n; ++row) {
@@ -64,8 +59,7 @@ DELASSUS_SPARSE_FACTOR_INLINE std::vector<std::int32_t> SparseFactor::eliminatio
 }
 
 /// New positions in which children come right before their parents.
-DELASSUS_SPARSE_FACTOR_INLINE std::vector<std::int32_t> SparseFactor::postorder(
-    const std::vector<std::int32_t>& parent) {
+DELASSUS_SDK_FUNCTION std::vector<std::int32_t> SparseFactor::postorder(const std::vector<std::int32_t>& parent) {
     const auto n = static_cast<std::int32_t>(parent.size());
     std::vector<std::int32_t> first_child(parent.size(), -1), sibling(parent.size(), -1), position(parent.size());
     for (std::int32_t j = n - 1; j >= 0; --j) {
@@ -94,7 +88,7 @@ DELASSUS_SPARSE_FACTOR_INLINE std::vector<std::int32_t> SparseFactor::postorder(
 }
 
 /// New positions by approximate minimum degree.
-DELASSUS_SPARSE_FACTOR_INLINE std::vector<std::int32_t> SparseFactor::minimum_degree(
+DELASSUS_SDK_FUNCTION std::vector<std::int32_t> SparseFactor::minimum_degree(
     const Eigen::Ref<const SparseColumns>& matrix) {
     std::vector<std::int32_t> position(static_cast<std::size_t>(matrix.rows()));
     if (position.empty()) return position;
@@ -105,16 +99,15 @@ DELASSUS_SPARSE_FACTOR_INLINE std::vector<std::int32_t> SparseFactor::minimum_de
     return position;
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE bool SparseFactor::has_analyzed(const Eigen::Ref<const SparseColumns>& matrix,
-                                                              Eigen::Index positive) const {
+DELASSUS_SDK_FUNCTION bool SparseFactor::has_analyzed(const Eigen::Ref<const SparseColumns>& matrix,
+                                                      Eigen::Index positive) const {
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     return size_ == matrix.rows() && positive_ == positive &&
            std::equal(analyzed_start_.begin(), analyzed_start_.end(), start, start + matrix.cols() + 1) &&
            std::equal(analyzed_row_.begin(), analyzed_row_.end(), row, row + matrix.nonZeros());
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix,
-                                                         Eigen::Index positive) {
+DELASSUS_SDK_FUNCTION bool SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive) {
     constexpr Eigen::Index smallest_to_dissect = 1000;
     constexpr double least_flops_for_blas = 5e7;  // some 5 ms of Eigen
     if (has_analyzed(matrix, positive)) return false;
@@ -134,8 +127,8 @@ DELASSUS_SPARSE_FACTOR_INLINE bool SparseFactor::analyze(const Eigen::Ref<const 
     return true;
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix,
-                                                         Eigen::Index positive, std::vector<std::int32_t> position) {
+DELASSUS_SDK_FUNCTION void SparseFactor::analyze(const Eigen::Ref<const SparseColumns>& matrix, Eigen::Index positive,
+                                                 std::vector<std::int32_t> position) {
     size_ = matrix.rows();
     positive_ = positive;
     const auto n = static_cast<std::size_t>(size_);
@@ -152,7 +145,7 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::analyze(const Eigen::Ref<const 
 // A column of L has the rows of the matrix's column and those of its children in the elimination tree: of the runs of
 // columns so far whose first row below is this column. Where one run alone has it, and the matrix adds no row, the
 // column joins that run without a look at its rows.
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::find_supernodes(const Pattern& columns) {
+DELASSUS_SDK_FUNCTION void SparseFactor::find_supernodes(const Pattern& columns) {
     const auto n = static_cast<std::size_t>(size_);
     struct Run {
         std::int32_t first, columns;
@@ -241,7 +234,7 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::find_supernodes(const Pattern& 
     find_stacks();
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::find_stacks() {
+DELASSUS_SDK_FUNCTION void SparseFactor::find_stacks() {
     std::vector<std::vector<std::size_t>> children(nodes_.size());
     for (std::size_t s = 0; s < nodes_.size(); ++s)
         if (nodes_[s].parent >= 0) children[static_cast<std::size_t>(nodes_[s].parent)].push_back(s);
@@ -265,7 +258,7 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::find_stacks() {
     }
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& matrix) {
+DELASSUS_SDK_FUNCTION void SparseFactor::find_places(const Eigen::Ref<const SparseColumns>& matrix) {
     // The entries of the matrix by supernodes: their counts, then their places in L for the time being.
     const std::int32_t *start = matrix.outerIndexPtr(), *row = matrix.innerIndexPtr();
     const auto visit = [&](auto&& take) {
@@ -310,7 +303,7 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::find_places(const Eigen::Ref<co
     }
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
+DELASSUS_SDK_FUNCTION bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
     value_.assign(static_cast<std::size_t>(entries_), 0.0);
     for (std::size_t k = 0; k < 2; ++k) stack_[k].resize(stack_size_[k]);
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
@@ -328,13 +321,13 @@ DELASSUS_SPARSE_FACTOR_INLINE bool SparseFactor::factorize(const Eigen::Ref<cons
     return true;
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE DenseFront::Block SparseFactor::update_of(const Supernode& node) {
+DELASSUS_SDK_FUNCTION DenseFront::Block SparseFactor::update_of(const Supernode& node) {
     const Eigen::Index rest = node.height - node.columns;
     return {stack_[node.depth % 2].data() + node.update, rest, rest, Eigen::OuterStride<>(rest)};
 }
 
 // Adds the update of a supernode to its parent's front.
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::add_update(const Supernode& child) {
+DELASSUS_SDK_FUNCTION void SparseFactor::add_update(const Supernode& child) {
     const Supernode& parent = nodes_[static_cast<std::size_t>(child.parent)];
     const DenseFront::Block from = update_of(child);
     DenseFront::Block update = update_of(parent);
@@ -354,7 +347,7 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::add_update(const Supernode& chi
     }
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::solve(Vector& v) const {
+DELASSUS_SDK_FUNCTION void SparseFactor::solve(Vector& v) const {
     work_.resize(size_);
     for (Eigen::Index i = 0; i < size_; ++i) work_[position_[static_cast<std::size_t>(i)]] = v[i];
     for (const Supernode& node : nodes_) {
@@ -383,7 +376,7 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::solve(Vector& v) const {
     for (Eigen::Index i = 0; i < size_; ++i) v[i] = work_[position_[static_cast<std::size_t>(i)]];
 }
 
-DELASSUS_SPARSE_FACTOR_INLINE Vector SparseFactor::diagonal() const {
+DELASSUS_SDK_FUNCTION Vector SparseFactor::diagonal() const {
     Vector ordered(size_), result(size_);
     for (const Supernode& node : nodes_)
         ordered.segment(node.first, node.columns) =
@@ -393,7 +386,7 @@ DELASSUS_SPARSE_FACTOR_INLINE Vector SparseFactor::diagonal() const {
 }
 
 // A row of D reaches the supernodes of its columns and all their ancestors.
-DELASSUS_SPARSE_FACTOR_INLINE SparseFactor::Reach SparseFactor::reach(const SparseRowsView& D) const {
+DELASSUS_SDK_FUNCTION SparseFactor::Reach SparseFactor::reach(const SparseRowsView& D) const {
     Reach result;
     result.rows.resize(nodes_.size());
     std::vector<Eigen::Index> mark(nodes_.size(), -1);
@@ -418,8 +411,8 @@ DELASSUS_SPARSE_FACTOR_INLINE SparseFactor::Reach SparseFactor::reach(const Spar
 
 // As in factorize, with the rows of D for further rows of each front: the panel of a supernode is what D and its
 // children leave in its own columns, solved with L11; L21 times it goes to the parent. All products are of matrices.
-DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::half_solve(const SparseRowsView& D, const Reach& reach,
-                                                            const Visitor& visit) const {
+DELASSUS_SDK_FUNCTION void SparseFactor::half_solve(const SparseRowsView& D, const Reach& reach,
+                                                    const Visitor& visit) const {
     struct Item {
         std::int32_t row, column;
         double value;
@@ -469,5 +462,3 @@ DELASSUS_SPARSE_FACTOR_INLINE void SparseFactor::half_solve(const SparseRowsView
 }
 
 }  // namespace delassus::sdk
-
-#undef DELASSUS_SPARSE_FACTOR_INLINE

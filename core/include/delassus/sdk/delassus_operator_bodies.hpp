@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The functions of sdk/delassus_operator.hpp (sdk/compiled_once.hpp).
+#pragma once
+
+#include <span>
+
+#include "delassus/sdk/compiled_once.hpp"
+#include "delassus/sdk/delassus_operator.hpp"
+
+namespace delassus::sdk {
+
+DELASSUS_SDK_FUNCTION void DelassusOperator::factorize(const ProblemView& problem, bool will_form) {
+    inverse_.factorize(problem);
+    compute_blocks(problem, will_form);
+}
+
+DELASSUS_SDK_FUNCTION void DelassusOperator::apply(const ProblemView& problem, const Vector& lambda,
+                                                   Vector& result) const {
+    if (problem.n > 0) {
+        work_.noalias() = problem.D.transpose() * lambda;
+        inverse_.apply(work_);
+        result.noalias() = problem.D * work_;
+    } else {
+        result.setZero(problem.m);
+    }
+    if (problem.E.nonZeros() > 0) result.noalias() += problem.E * lambda;
+}
+
+DELASSUS_SDK_FUNCTION Vector DelassusOperator::free_velocity(const ProblemView& problem) const {
+    Vector r;
+    free_velocity(problem, r);
+    return r;
+}
+
+DELASSUS_SDK_FUNCTION void DelassusOperator::free_velocity(const ProblemView& problem, Vector& r) const {
+    r = problem.b;
+    if (problem.n > 0) {
+        work_ = problem.a;
+        inverse_.apply(work_);
+        r.noalias() += problem.D * work_;
+    }
+}
+
+DELASSUS_SDK_FUNCTION Vector DelassusOperator::velocity(const ProblemView& problem,
+                                                        const Eigen::Ref<const Vector>& lambda) const {
+    Vector x;
+    velocity(problem, lambda, x);
+    return x;
+}
+
+DELASSUS_SDK_FUNCTION void DelassusOperator::velocity(const ProblemView& problem,
+                                                      const Eigen::Ref<const Vector>& lambda, Vector& x) const {
+    x = problem.a;
+    if (problem.n > 0) {
+        x.noalias() += problem.D.transpose() * lambda;
+        inverse_.apply(x);
+    }
+}
+
+DELASSUS_SDK_FUNCTION SparseRows DelassusOperator::formed(const ProblemView& problem) const {
+    SparseRows N(problem.m, problem.m);
+    if (inertia_.rows() > 0) {
+        N = inertia_;
+    } else if (problem.n > 0) {
+        const SparseColumns Z = inverse_.half_solved(problem.D);
+        N = SparseColumns(Z.transpose() * Z);
+    }
+    if (problem.E.nonZeros() > 0) N += problem.E;
+    N.makeCompressed();
+    return N;
+}
+
+DELASSUS_SDK_FUNCTION void DelassusOperator::compute_blocks(const ProblemView& problem, bool will_form) {
+    if (inertia_.rows() > 0) inertia_.resize(0, 0);  // which allocates, even from nothing to nothing
+    diagonal_.setZero(problem.m);
+    block_offset_.assign(problem.cones.size(), -1);
+    std::ptrdiff_t size = 0;
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        if (problem.cones[c].rows > largest_block) continue;
+        block_offset_[c] = size;
+        size += static_cast<std::ptrdiff_t>(problem.cones[c].rows) * problem.cones[c].rows;
+    }
+    blocks_.assign(static_cast<std::size_t>(size), 0.0);
+    if (problem.n > 0 && inverse_.kind() == HInverse::Kind::Sparse) {
+        add_inertia_by_panels(problem, will_form);
+    } else if (problem.n > 0) {
+        add_inertia(problem);
+    }
+    if (problem.E.nonZeros() > 0) add_compliance(problem);
+}
+
+// D H⁻¹ Dᵀ = Σ ZᵀZ over the panels of Z: of all pairs of rows by dense products where most pairs couple, else of
+// those in one block.
+DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia_by_panels(const ProblemView& problem, bool will_form) {
+    const SparseFactor& factor = inverse_.sparse();
+    const SparseFactor::Reach reach = factor.reach(problem.D);
+    const bool all = will_form && problem.m <= most_rows_formed && problem.m * problem.m <= 4 * reach.coupled;
+    std::vector<std::size_t> cone_of(static_cast<std::size_t>(problem.m));
+    for (std::size_t c = 0; c < problem.cones.size(); ++c)
+        for (std::int32_t i = 0; i < problem.cones[c].rows; ++i)
+            cone_of[static_cast<std::size_t>(problem.cones[c].first_row + i)] = c;
+    Eigen::MatrixXd sum, product;
+    if (all) sum.setZero(problem.m, problem.m);
+    const auto add = [&](std::int32_t row, std::int32_t column, double value) {  // row ≥ column
+        if (all) sum(row, column) += value;
+        const std::size_t c = cone_of[static_cast<std::size_t>(column)];
+        const delassus_cone& cone = problem.cones[c];
+        if (row >= cone.first_row + cone.rows) return;
+        if (row == column) diagonal_[row] += value;
+        if (block_offset_[c] < 0) return;
+        double* block = blocks_.data() + block_offset_[c];
+        const std::int32_t i = row - cone.first_row, j = column - cone.first_row;
+        block[i * cone.rows + j] += value;
+        if (i != j) block[j * cone.rows + i] += value;
+    };
+    factor.half_solve(
+        problem.D, reach, [&](Eigen::Index, std::span<const std::int32_t> rows, const Eigen::MatrixXd& panel) {
+            if (all) {
+                product.setZero(panel.cols(), panel.cols());
+                product.selfadjointView<Eigen::Lower>().rankUpdate(panel.transpose());
+            }
+            for (std::size_t j = 0; j < rows.size(); ++j) {
+                const auto q = static_cast<Eigen::Index>(j);
+                const delassus_cone& cone = problem.cones[cone_of[static_cast<std::size_t>(rows[j])]];
+                for (std::size_t i = j; i < rows.size(); ++i) {
+                    const auto p = static_cast<Eigen::Index>(i);
+                    if (!all && (rows[i] >= cone.first_row + cone.rows || (i > j && cone.rows > largest_block))) break;
+                    add(rows[i], rows[j], all ? product(p, q) : panel.col(p).dot(panel.col(q)));
+                }
+            }
+        });
+    if (!all) return;
+    sum.triangularView<Eigen::StrictlyUpper>() = sum.transpose();
+    inertia_ = sum.sparseView();
+}
+
+// D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
+DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& problem) {
+    rows_.resize(largest_block);
+    std::size_t c = 0;
+    inverse_.for_each_half_solved_row(
+        problem.D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
+            while (row >= problem.cones[c].first_row + problem.cones[c].rows) ++c;
+            const delassus_cone& cone = problem.cones[c];
+            double square = 0.0;
+            for (const auto i : reach) square += work[i] * work[i];
+            diagonal_[row] += square;
+            if (block_offset_[c] < 0) return;
+            double* block = blocks_.data() + block_offset_[c];
+            const auto local = static_cast<std::size_t>(row - cone.first_row);
+            const auto width = static_cast<std::size_t>(cone.rows);
+            block[local * width + local] += square;
+            for (std::size_t other = 0; other < local; ++other) {
+                double product = 0.0;
+                for (const auto& [i, value] : rows_[other]) product += value * work[i];
+                block[local * width + other] += product;
+                block[other * width + local] += product;
+            }
+            auto& kept = rows_[local];
+            kept.clear();
+            for (const auto i : reach) kept.emplace_back(i, work[i]);
+        });
+}
+
+DELASSUS_SDK_FUNCTION void DelassusOperator::add_compliance(const ProblemView& problem) {
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        const delassus_cone& cone = problem.cones[c];
+        for (std::int32_t i = 0; i < cone.rows; ++i) {
+            for (SparseRowsView::InnerIterator entry(problem.E, cone.first_row + i); entry; ++entry) {
+                const Eigen::Index j = entry.col() - cone.first_row;
+                if (j < 0 || j >= cone.rows) continue;
+                if (i == j) diagonal_[entry.col()] += entry.value();
+                if (block_offset_[c] >= 0)
+                    blocks_[static_cast<std::size_t>(block_offset_[c] + static_cast<std::ptrdiff_t>(i) * cone.rows +
+                                                     j)] += entry.value();
+            }
+        }
+    }
+}
+
+}  // namespace delassus::sdk

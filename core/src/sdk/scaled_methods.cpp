@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Products by groups of rows, and the scaled problem: what some plugins use.
+#include "delassus/sdk/block_rows_bodies.hpp"
+#include "delassus/sdk/column_shares_bodies.hpp"
+#include "delassus/sdk/face_step_bodies.hpp"
+#include "delassus/sdk/scaled_problem_bodies.hpp"
+#include "delassus/sdk/scaled_run_bodies.hpp"
