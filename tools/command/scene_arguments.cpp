@@ -9,6 +9,8 @@ void add_scene_arguments(CLI::App& command, SceneArguments& arguments) {
     command.add_option("scene", arguments.file, "Scene file (YAML)")->required()->type_name("SCENE");
     command.add_option("--solver", arguments.solver, "Solver of every system in place of the file's")
         ->type_name("NAME[(KEY=VALUE,…)]");
+    command.add_option("--law", arguments.law, "Law of friction of every system: associated or coulomb")
+        ->type_name("LAW");
     command.add_option("--integrator", arguments.integrator, "Timestepper of every system in place of the file's")
         ->type_name("NAME[(KEY=VALUE,…)]");
     command.add_option("--set", arguments.settings, "Value of the file to change, e.g. bodies.ball.mass=2")
@@ -26,6 +28,7 @@ Scene read(const SceneArguments& arguments) {
     SceneOverrides overrides;
     for (const auto& setting : arguments.settings) overrides.values.push_back(parse_setting(setting));
     overrides.solver = arguments.solver;
+    if (!arguments.law.empty()) overrides.law = law_of(arguments.law);
     overrides.integrator = arguments.integrator;
     overrides.step = arguments.step;
     overrides.tolerance = arguments.tolerance;

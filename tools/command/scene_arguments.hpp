@@ -14,7 +14,7 @@ namespace delassus::command {
 
 struct SceneArguments {
     std::filesystem::path file;
-    std::string solver, integrator;
+    std::string solver, law, integrator;
     std::vector<std::string> settings;
     std::optional<double> step, tolerance, end;
     std::vector<std::filesystem::path> plugin_path;

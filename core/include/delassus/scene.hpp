@@ -100,6 +100,7 @@ struct SceneOverrides {
     std::vector<std::pair<std::string, std::string>> values;
     std::string solver;               ///< "name" or "name(key=value,…)" for every system; empty: the file's
     std::string integrator;           ///< likewise
+    std::optional<Law> law;           ///< of friction, for every system
     std::optional<double> step, end;  ///< s, for every system; a step takes the place of a tolerance
     std::optional<double> tolerance;  ///< for every system, in place of a fixed step
     std::optional<bool> leave_out;    ///< for every system

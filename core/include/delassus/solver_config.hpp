@@ -23,6 +23,9 @@ struct SolverConfig {
     std::optional<std::int64_t> max_iterations;
     std::optional<double> time_limit;  ///< seconds
     std::optional<Law> law;
+    /// Iterations to be done in each step of a simulation, whatever error they leave: the cheap mode. The error is
+    /// measured and reported, and a step that misses no limit but this one counts as solved. Needs a plugin's name.
+    std::optional<std::int64_t> sweeps;
 
     /// The default settings, overridden by what is given here.
     [[nodiscard]] DELASSUS_API SolveSettings settings() const;

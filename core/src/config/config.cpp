@@ -38,6 +38,11 @@ SolverConfig read_solver(const Source& source, const YAML::Node& node) {
                [&](const YAML::Node& n) {
                    solver.max_iterations = value<std::int64_t>(source, n, "max_iterations", "an integer");
                }},
+              {"sweeps",
+               [&](const YAML::Node& n) {
+                   solver.sweeps = value<std::int64_t>(source, n, "sweeps", "an integer");
+                   if (*solver.sweeps < 1) source.refuse(n, "\"sweeps\" must be at least 1");
+               }},
               {"time_limit",
                [&](const YAML::Node& n) {
                    solver.time_limit = value<double>(source, n, "time_limit", "a number of seconds");
@@ -59,7 +64,11 @@ Config parse_config(const std::string& yaml, std::string_view where) {
         const YAML::Node root = YAML::Load(yaml);
         if (root.IsNull()) throw InputError(fmt::format("{} is empty; it must at least hold \"solver:\"", where));
         read_map(source, root, "the configuration",
-                 {{"solver", [&](const YAML::Node& n) { config.solver = read_solver(source, n); }},
+                 {{"solver",
+                   [&](const YAML::Node& n) {
+                       config.solver = read_solver(source, n);
+                       if (config.solver.sweeps) source.refuse(n, "\"sweeps\" is for the solvers of scenes");
+                   }},
                   {"plugin_path", [&](const YAML::Node& n) {
                        if (!n.IsSequence()) source.refuse(n, "\"plugin_path\" must be a list of folders");
                        for (const auto& folder : n)

@@ -171,7 +171,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     SolveSettings part_settings = settings;
     part_settings.tolerance = tolerance_for(prepared, columns);
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
-    const bool may_repeat = config.name != auto_name;
+    const bool may_repeat = config.name != auto_name && !config.sweeps;
     if (may_repeat && part_settings.warm_start) before = solution;
     SolveReport report = solver.solve(prepared, solution, part_settings);
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
@@ -179,7 +179,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     count(report);
     if (report.status != Status::Solved && may_repeat) solve_again(prepared, before, part_settings, solution, report);
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
-    if (report.status == Status::Solved) return true;
+    if (report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit)) return true;
     effort.worst_miss =
         std::max(effort.worst_miss, report.error.natural / std::max(part_settings.tolerance, rounding_limit));
     if (effort.unsolved.empty())
@@ -218,7 +218,7 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, co
 double StepSolver::Implementation::tolerance_for(const PreparedProblem& part,
                                                  std::span<const std::int32_t> columns) const {
     constexpr double share = 0.2, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
-    if (config.tolerance || method_error.empty()) return settings.tolerance;
+    if (config.tolerance || config.sweeps || method_error.empty()) return settings.tolerance;
     const Problem& problem = part.problem();
     double square = 0.0;
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {

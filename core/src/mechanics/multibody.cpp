@@ -302,8 +302,9 @@ void MultibodySystem::Implementation::find_bodies_alone(const MultibodySystem& s
     if (!gyroscopic) return;
     const State start = system.initial_state();
     MatrixAssembler matrix;
-    matrix.begin(std::max(n, m), n);
-    if (m > 0) system.add_constraint_jacobian(start, 0, matrix);
+    const std::int32_t rows = system.m();
+    matrix.begin(std::max(n, rows), n);
+    if (rows > 0) system.add_constraint_jacobian(start, 0, matrix);
     system.add_stiffness(start, 1.0, Tangent::Exact, matrix);
     system.add_damping(start, 1.0, Tangent::Exact, matrix);
     std::vector<bool> held(static_cast<std::size_t>(n), false);

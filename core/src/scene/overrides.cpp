@@ -71,6 +71,16 @@ void set_value(Source& source, YAML::Node root, const std::string& path, const s
                         source.comes_from(entry.first, place);
                 return;
             }
+            // solver.tolerance=1e-4 where the file names no solver, or says solver: pgs.
+            const YAML::Node known = std::as_const(node)[step];
+            const bool absent = !known.IsDefined() && (step == "solver" || step == "limits" || step == "options");
+            const bool short_form = known.IsDefined() && known.IsScalar() && (step == "solver" || step == "integrator");
+            if (absent || short_form) {
+                YAML::Node section(YAML::NodeType::Map);
+                if (short_form) section["name"] = known.Scalar();
+                source.comes_from(section, place);
+                node[step] = section;
+            }
             const YAML::Node next = std::as_const(node)[step];
             if (!next.IsDefined())
                 throw InputError(fmt::format("{}: there is no key \"{}\"{}", place, step, choices(node, step)));

@@ -44,6 +44,7 @@ void apply(const SceneOverrides& overrides, SceneSystem& system) {
         system.solver.name = chosen.name;
         for (const auto& [key, text] : chosen.options) system.solver.options.insert_or_assign(key, text);
     }
+    if (overrides.law) system.solver.law = overrides.law;
     if (!overrides.integrator.empty()) {
         const auto [name, options] = parse_name_with_options(overrides.integrator, "integrator");
         if (name != system.integrator) system.integrator_options.clear();
@@ -77,7 +78,8 @@ std::string canonical_text(const YAML::Node& root, const SceneOverrides& overrid
     copy.remove("title");
     if (copy["systems"].IsDefined())
         for (auto entry : copy["systems"]) entry.second.remove("end");
-    return fmt::format("{}\nsolver {}\nintegrator {}\n", YAML::Dump(copy), overrides.solver, overrides.integrator);
+    return fmt::format("{}\nsolver {}\nintegrator {}\n{}", YAML::Dump(copy), overrides.solver, overrides.integrator,
+                       overrides.law ? fmt::format("law {}\n", name_of(*overrides.law)) : "");
 }
 
 }  // namespace

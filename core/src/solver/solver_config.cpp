@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <limits>
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
@@ -17,6 +18,10 @@ SolveSettings SolverConfig::settings() const {
     if (tolerance) settings.tolerance = *tolerance;
     if (max_iterations) settings.max_iterations = *max_iterations;
     if (time_limit) settings.time_limit = *time_limit;
+    if (sweeps) {
+        settings.max_iterations = *sweeps;
+        settings.tolerance = std::numeric_limits<double>::min();
+    }
     return settings;
 }
 
@@ -53,6 +58,12 @@ PluginInfo solver_info(const Registry& registry, const std::string& name) {
 }
 
 void check_solver(const Registry& registry, const SolverConfig& config) {
+    if (config.sweeps && config.name == auto_name)
+        throw InputError("\"sweeps\" needs the name of a solver that iterates, e.g. {name: pgs, sweeps: 20}");
+    if (config.sweeps && (config.tolerance || config.max_iterations))
+        throw InputError(
+            "\"sweeps\" does so many iterations whatever error they leave: give no \"tolerance\" and no "
+            "\"max_iterations\" beside it");
     OptionTexts options = config.options;
     const FinishOptions finish = take_finish(options);
     if (!finish.solver.empty()) check_solver(registry, parse_solver(finish.solver));

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Plain scenes with nothing chosen, against what is known in closed form.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "delassus/error.hpp"
+#include "support/scenes.hpp"
+
+namespace delassus::tests::defaults_test {
+namespace {
+
+using Eigen::Vector3d;
+
+Running run_of(const std::string& text) {
+    return Running(parse_scene(text, "test.yaml"));
+}
+
+// ---- Time ----
+
+TEST(Defaults, TimesAreMultiplesOfTheStep) {
+    auto run = run_of(
+        "step: 0.0002\nend: 0.3\nbodies:\n"
+        "- {name: bob, mass: 1, inertia: {xx: 1e-3, yy: 1e-3, zz: 1e-3}, position: [-1, 0, 0]}\n"
+        "joints:\n- {name: hinge, kind: revolute, second: bob, point: [0, 0, 0], axis: [0, 1, 0]}\n");
+    while (!run.simulation.finished()) {
+        const StepRecord& record = run.simulation.step();
+        ASSERT_EQ(record.h, 0.0002);
+        ASSERT_EQ(record.t, record.step == 1500 ? 0.3 : static_cast<double>(record.step) * 0.0002);
+    }
+    EXPECT_EQ(run.simulation.record().step, 1500);
+}
+
+TEST(Defaults, NoStepIsShorterThanHalfOfTheStep) {
+    for (const double end : {0.01, 0.010001, 0.0107, 0.01349, 0.0135, 0.01999}) {
+        auto run = run_of(fmt::format("step: 0.001\nend: {}\nbodies: [{{name: b, mass: 1}}]\n", end));
+        double sum = 0.0;
+        while (!run.simulation.finished()) {
+            const double h = run.simulation.step().h;
+            EXPECT_GE(h, 0.0005 * (1.0 - 1e-9)) << end;
+            EXPECT_LE(h, 0.001) << end;
+            sum += h;
+        }
+        EXPECT_EQ(run.simulation.state().t, end);
+        EXPECT_NEAR(sum, end, 1e-15);
+    }
+}
+
+// ---- Contact ----
+
+TEST(Defaults, WhatPenetratesIsPushedApartSlowly) {
+    auto run = run_of(
+        "step: 0.0002\nend: 0.5\nbodies:\n- {name: ground, fixed: true, shapes: [{plane: {}}]}\n"
+        "- {name: ball, mass: 1, position: [0, 0, 0.0999], shapes: [{sphere: {radius: 0.1}}]}\n");
+    double highest = 0.0, fastest = 0.0;
+    while (!run.simulation.finished()) {
+        run.simulation.step();
+        highest = std::max(highest, run.pose("ball").position[2]);
+        fastest = std::max(fastest, std::abs(run.velocities("ball")[0][2]));
+    }
+    EXPECT_LE(fastest, 0.01 * std::sqrt(9.81 * 0.1) * (1.0 + 1e-9));
+    // With that speed it rises by 5e-6 m at most.
+    EXPECT_LE(highest, 0.1 + 6e-6);
+    EXPECT_NEAR(run.pose("ball").position[2], 0.1, 1e-9);
+    EXPECT_TRUE(run.simulation.warnings().empty());
+}
+
+/// A ball of radius 0.1 m at 1 m/s down and `slide` m/s along x, a height above the ground that puts the impact at any
+/// phase of a step; returns its velocity after the impact.
+Vector3d after_impact(const std::string& law, double slide, double phase, double friction) {
+    constexpr double step = 1e-3, restitution = 0.6;
+    auto run = run_of(fmt::format(
+        "gravity: [0, 0, 0]\nstep: {}\nend: 0.1\nenvelope: 0.01\nmaterials: {{s: {{friction: {}, restitution: {}}}}}\n"
+        "{}bodies:\n- {{name: g, fixed: true, shapes: [{{plane: {{}}, material: s}}]}}\n"
+        "- {{name: b, mass: 1, position: [0, 0, {:.17g}], velocity: [{}, 0, -1], shapes: [{{sphere: {{radius: 0.1}}, "
+        "material: s}}]}}\n",
+        step, friction, restitution, law.empty() ? "" : "solver: {law: " + law + "}\n", 0.15 + phase * step, slide));
+    run.finish();
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+    const Vector3 v = run.velocities("b")[0];
+    return {v[0], v[1], v[2]};
+}
+
+TEST(Defaults, RestitutionIsMetAtAnyPhaseOfTheStep) {
+    for (const char* law : {"", "coulomb"})
+        for (const double phase : {0.0, 0.13, 0.35, 0.5, 0.6, 0.77, 0.99}) {
+            SCOPED_TRACE(fmt::format("{} {}", law, phase));
+            // Friction stops the sliding: 5/7 of the speed stays (a solid sphere, 2/5 m r²).
+            const Vector3d rolls = after_impact(law, 1.0, phase, 0.5);
+            EXPECT_NEAR(rolls[2], 0.6, 6e-4);
+            EXPECT_NEAR(rolls[0], 5.0 / 7.0, 1e-3);
+            // It does not: the impulse of friction is μ (1 + e) m u.
+            const Vector3d slides = after_impact(law, 10.0, phase, 0.5);
+            EXPECT_NEAR(slides[2], 0.6, 6e-4);
+            EXPECT_NEAR(slides[0], 10.0 - 0.5 * 1.6, 1e-3);
+        }
+}
+
+std::string brick_stack(int layers) {
+    std::string text =
+        "step: 0.00271\nend: 0.2\nmaterials: {m: {friction: 0.6}}\nbodies:\n"
+        "- {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n";
+    for (int layer = 0; layer < layers; ++layer)
+        for (int k = 0; k < 3 - layer % 2; ++k)
+            text += fmt::format(
+                "- {{name: b{}_{}, density: 1800, position: [{}, 0.013, {}], shapes: [{{box: {{size: [0.25, 0.12, "
+                "0.1]}}, "
+                "material: m}}]}}\n",
+                layer, k, 0.25 * k + 0.125 * (layer % 2), 0.05 + 0.1 * layer);
+    return text;
+}
+
+TEST(Defaults, AWallAtRestKeepsItsRowsAndCostsNothing) {
+    auto run = run_of(brick_stack(5));
+    std::vector<double> first;
+    double largest = 0.0;
+    run.simulation.solver().on_problem = [&](const Problem& problem) {
+        if (first.empty()) first = problem.D.value;
+        ASSERT_EQ(problem.D.value.size(), first.size());
+        for (std::size_t i = 0; i < first.size(); ++i)
+            largest = std::max(largest, std::abs(problem.D.value[i] - first[i]));
+    };
+    int busy = 0, steps = 0;
+    while (!run.simulation.finished()) {
+        busy += run.simulation.step().solver_iterations > 0 ? 1 : 0;
+        ++steps;
+    }
+    EXPECT_LT(largest, 1e-9);
+    EXPECT_LE(10 * busy, steps);
+    EXPECT_NEAR(run.pose("b4_1").position[2], 0.45, 1e-9);
+    EXPECT_NEAR(run.pose("b4_1").position[0], 0.25, 1e-9);
+}
+
+// ---- Spin ----
+
+/// Energy and momentum in space of a free body with the moments (1, 2, 3) kg m².
+struct Spin {
+    double energy;
+    Vector3d momentum;
+};
+Spin spin_of(const Running& run) {
+    const auto [w, x, y, z] = run.pose("b").orientation;
+    const Vector3 omega = run.velocities("b")[1];
+    const Vector3d local(1.0 * omega[0], 2.0 * omega[1], 3.0 * omega[2]);
+    return {0.5 * Vector3d(omega.data()).dot(local), Eigen::Quaterniond(w, x, y, z) * local};
+}
+
+TEST(Defaults, AFreeBodyKeepsEnergyAndMomentum) {
+    for (const double step : {0.01, 0.137, 1.3}) {
+        auto run = run_of(
+            fmt::format("gravity: [0, 0, -9.81]\nstep: {}\nend: 60\nbodies:\n- {{name: b, mass: 1.7, inertia: {{xx: 1, "
+                        "yy: 2, zz: 3}}, angular_velocity: [0.3, 2.0, 0.4]}}\n",
+                        step));
+        const Spin start = spin_of(run);
+        run.finish();
+        const Spin end = spin_of(run);
+        EXPECT_NEAR(end.energy, start.energy, 1e-11 * start.energy) << step;
+        EXPECT_LT((end.momentum - start.momentum).norm(), 1e-11 * start.momentum.norm()) << step;
+    }
+}
+
+// A symmetric body precesses in its own frame with Ω = ω_z (J_z − J_x)/J_x; the rule is of order 2.
+TEST(Defaults, ASpinningBodyPrecessesWithOrderTwo) {
+    const auto error = [](double step) {
+        auto run = run_of(fmt::format(
+            "gravity: [0, 0, 0]\nstep: {}\nend: 1\nbodies:\n- {{name: b, mass: 1, inertia: {{xx: 2, yy: 2, zz: 3}}, "
+            "angular_velocity: [0.7, 0, 5]}}\n",
+            step));
+        run.finish();
+        const double angle = 5.0 * (3.0 - 2.0) / 2.0;
+        const Vector3 omega = run.velocities("b")[1];
+        return std::hypot(omega[0] - 0.7 * std::cos(angle), omega[1] - 0.7 * std::sin(angle));
+    };
+    const double ratio = error(0.02) / error(0.01);
+    EXPECT_NEAR(std::log2(ratio), 2.0, 0.02);
+}
+
+// ---- Solvers ----
+
+TEST(Defaults, AMissedToleranceIsRepeatedByAuto) {
+    const std::string text = brick_stack(4);
+    auto run = run_of("solver: {name: pgs, max_iterations: 2}\n" + text);
+    run.finish();
+    EXPECT_GT(run.simulation.totals().repeated_solves, 0);
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+    EXPECT_NEAR(run.pose("b3_1").position[2], 0.35, 1e-9);
+}
+
+TEST(Defaults, AnInelasticImpactUnderCoulombsLawDoesNotBounce) {
+    auto run = run_of(
+        "gravity: [0, 0, 0]\nstep: 0.001\nend: 0.12\nsolver: {name: ssn, law: coulomb}\n"
+        "materials: {s: {friction: 0.3, restitution: 0}}\nbodies:\n"
+        "- {name: g, fixed: true, shapes: [{plane: {}, material: s}]}\n"
+        "- {name: b, mass: 1, position: [0, 0, 0.20087875], velocity: [1, 0, -1], shapes: [{sphere: {radius: 0.1}, "
+        "material: s}]}\n");
+    run.finish();
+    const Vector3 v = run.velocities("b")[0];
+    EXPECT_NEAR(v[2], 0.0, 1e-7);
+    EXPECT_NEAR(v[0], 5.0 / 7.0, 1e-3);  // μ m u = 0.3 is more than the 2/7 that stops the sliding
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+}
+
+// ---- Chosen steps ----
+
+// A spring of 100 N/m pulls a block of 1 kg over the ground: x = x_e + (0.5 − x_e) cos 10t with x_e = μ m g/k.
+TEST(Defaults, SlidingUnderAToleranceTakesFewSteps) {
+    auto run = run_of(
+        "tolerance: {absolute: 1.0e-3}\nstep: {smallest: 1.0e-7, largest: 0.02}\nend: 0.1\n"
+        "materials: {m: {friction: 0.2}}\nbodies:\n- {name: g, fixed: true, shapes: [{plane: {}, material: m}]}\n"
+        "- {name: b, mass: 1, position: [0.5, 0, 0.05], shapes: [{box: {size: [0.4, 0.4, 0.1]}, material: m}]}\n"
+        "springs:\n- {name: s, second: b, first_point: [-5, 0, 0.05], stiffness: 100, rest_length: 5}\n");
+    run.finish();
+    EXPECT_LT(run.simulation.record().step, 200);
+    EXPECT_GE(run.simulation.totals().smallest_step, 1e-7);
+    const double rest = 0.2 * 9.81 / 100.0;
+    EXPECT_NEAR(run.pose("b").position[0], rest + (0.5 - rest) * std::cos(1.0), 0.02);
+    EXPECT_NEAR(run.pose("b").position[2], 0.05, 1e-4);
+}
+
+TEST(Defaults, MethodsWhoseReactionsDoNotDecayAreRefused) {
+    const std::string pendulum =
+        "bodies:\n- {name: bob, mass: 1, position: [-1, 0, 0]}\n"
+        "joints:\n- {name: hinge, kind: revolute, second: bob, point: [0, 0, 0], axis: [0, 1, 0]}\n";
+    const auto refusal = [](const std::string& text) {
+        try {
+            static_cast<void>(run_of(text));
+        } catch (const Unsupported& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(
+        refusal("step: 0.01\nend: 1\nintegrator: {name: newmark, options: {gamma: 0.5, beta: 0.1666667}}\n" + pendulum)
+            .find("factor 3.73"),
+        std::string::npos);
+    EXPECT_NE(refusal("tolerance: 1e-3\nend: 1\nintegrator: trapezoidal\n" + pendulum).find("take hht"),
+              std::string::npos);
+    EXPECT_EQ(refusal("tolerance: 1e-3\nend: 1\nintegrator: hht\n" + pendulum), "");
+    EXPECT_EQ(refusal("step: 0.01\nend: 1\nintegrator: trapezoidal\n" + pendulum), "");
+}
+
+}  // namespace
+}  // namespace delassus::tests::defaults_test
