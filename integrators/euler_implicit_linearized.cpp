@@ -2,6 +2,7 @@
 // The linearised implicit Euler method for differential variational inequalities (seed eq. 123, 148): one linear or
 // cone problem a step, contacts and impacts included. Order 1.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -43,11 +44,11 @@ namespace {
 // Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻. The associated
 // law asks for u_n + b ≥ μ |u_t| where Coulomb's has u_n + b ≥ 0: a contact would act, and slow the approach, before it
 // closes; it would push apart what leaves; and a body that slides after the impact would leave faster than e u_n⁻. So
-// contacts with e > 0 take De Saxcé's term s = μ |u_t| into b, by which both laws agree: with the speed before the step
-// where they approach or leave, and where they close with the speed after it, by the iteration s ← μ |u_t⁺(s)|, until s
-// moves by less than 10⁻⁴ of the speed of the approach. Contacts that rest on each other keep the associated law, under
-// which a sliding one floats at the height h μ |u_t|. Where steps are chosen by their error that height would jump with
-// h: all contacts that pushed then take s of the speed after the step, to 10⁻⁶ of the speed that they slide with.
+// contacts with e > 0 take De Saxcé's term s = μ |u_t| into b, by which both laws agree: with the speed before the
+// step, or where they close with the speed after it, by the iteration s ← μ |u_t⁺(s)|, until s moves by less than 10⁻⁴
+// of the speed of the approach. Contacts with e = 0 keep the associated law, under which a sliding one floats at the
+// height h μ |u_t|. Where steps are chosen by their error that height would jump with h: all contacts that pushed then
+// take s of the speed after the step, to 10⁻⁶ of the speed that they slide with.
 //
 // How far f(q⁺, v⁺, t⁺) is from the linear model is measured after the step (dynamics/linearization.hpp).
 class EulerImplicitLinearized : public Timestepper {
@@ -76,15 +77,17 @@ public:
         last_h_ = 0.0;
         before_.clear();
         change_.clear();
+        for (auto& jump : jumps_) jump.clear();
     }
 
-    // h, which of the following there are (bits), the multipliers, the velocities at the beginning of the last step,
-    // their change in the step before it, and the impulses of unilateral blocks.
+    // h, how many of the following there are, the multipliers, what is remembered of velocities, and the impulses of
+    // unilateral blocks.
     std::vector<double> save() const override {
-        std::vector<double> memory = {last_h_, (multipliers_.empty() ? 0.0 : 1.0) + (before_.empty() ? 0.0 : 2.0) +
-                                                   (change_.empty() ? 0.0 : 4.0)};
-        for (const auto* part : {&multipliers_, &before_, &change_})
-            memory.insert(memory.end(), part->begin(), part->end());
+        double known = 0.0;
+        for (const auto* part : remembered()) known += part->empty() ? 0.0 : 1.0;
+        std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0, known};
+        memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
+        for (const auto* part : remembered()) memory.insert(memory.end(), part->begin(), part->end());
         kept_.append_to(memory);
         return memory;
     }
@@ -97,13 +100,12 @@ public:
             rest = rest.subspan(count);
             return std::vector<double>(taken.begin(), taken.end());
         };
-        const std::vector<double> head = take(2);
+        const std::vector<double> head = take(3);
         last_h_ = head[0];
-        const auto present = static_cast<unsigned>(head[1]);
-        const auto n = static_cast<std::size_t>(n_);
-        if (present & 1U) multipliers_ = take(static_cast<std::size_t>(m_));
-        if (present & 2U) before_ = take(n);
-        if (present & 4U) change_ = take(n);
+        if (head[1] != 0.0) multipliers_ = take(static_cast<std::size_t>(m_));
+        double known = head[2];
+        for (auto* part : {&before_, &change_, &jumps_[0], &jumps_[1]})
+            if (known-- > 0.0) *part = take(static_cast<std::size_t>(n_));
         kept_.load(rest);
     }
 
@@ -141,22 +143,36 @@ private:
         report.multipliers = multipliers_;
     }
 
+    /// What is remembered of velocities, in the order in which it becomes known.
+    [[nodiscard]] std::array<const std::vector<double>*, 4> remembered() const {
+        return {&before_, &change_, &jumps_[0], &jumps_[1]};
+    }
+
     // The error of a step in the velocities, ½ h² v̈ for implicit Euler, is about half of the second difference of the
-    // velocities: what the last steps show of it is taken for this one. Of chosen sizes of steps nothing is said: there
-    // the solver must not disturb the estimate.
+    // velocities: what the last steps show of it is taken for this one. A single impact shows in two differences, and
+    // the steps after it are smooth: so the least of three counts. Of steps of chosen sizes nothing is said: there the
+    // solver must not disturb the estimate.
     void estimate_error(const State& state, StepSolver& solver) {
         const auto n = static_cast<std::size_t>(n_);
         solver.method_error = {};
-        if (before_.size() == n && !follows_sliding_) {
-            const bool known = change_.size() == n;
-            change_.resize(n);
-            error_.resize(n);
+        if (follows_sliding_) return;
+        if (!change_.empty()) {
+            jumps_[2].swap(jumps_[1]);
+            jumps_[1].swap(jumps_[0]);
+            jumps_[0].resize(n);
             for (std::size_t i = 0; i < n; ++i) {
                 const double change = state.v[i] - before_[i];
-                error_[i] = 0.5 * std::abs(change - change_[i]);
+                jumps_[0][i] = 0.5 * std::abs(change - change_[i]);
                 change_[i] = change;
             }
-            if (known) solver.method_error = error_;
+            if (!jumps_[2].empty()) {
+                error_.resize(n);
+                for (std::size_t i = 0; i < n; ++i) error_[i] = std::min({jumps_[0][i], jumps_[1][i], jumps_[2][i]});
+                solver.method_error = error_;
+            }
+        } else if (!before_.empty()) {
+            change_.resize(n);
+            for (std::size_t i = 0; i < n; ++i) change_[i] = state.v[i] - before_[i];
         }
         before_ = state.v;
     }
@@ -350,11 +366,10 @@ private:
         if (closes) b = rate + block.restitution * block.speed;
         const double friction = block.cone.parameters[0];
         if (coulomb_ || friction == 0.0 || block.cone.rows != 3) return;
-        if (pushed && !closes && !follows_sliding_) return;
         const auto normal_row = static_cast<std::size_t>(m_ + row);
         if (closes) {
             sliding_.push_back({normal_row, friction, 1e-4 * -block.speed, b, 0.0});
-        } else if (pushed) {
+        } else if (pushed && follows_sliding_) {
             const double speed = sliding_speed(normal_row, state.v);
             sliding_.push_back({normal_row, friction, 1e-6 * speed, b, friction * speed});
             b += sliding_.back().term;
@@ -431,7 +446,9 @@ private:
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
     std::vector<double> after_, delta_, impulse_, force_;
-    std::vector<double> before_, change_;  // of the velocities, see save()
+    // The velocities at the beginning of the last step, their last change, and half of the last three changes of that.
+    std::vector<double> before_, change_;
+    std::array<std::vector<double>, 3> jumps_;
     std::vector<double> error_;
     double last_h_ = 0.0;
     KeptImpulses kept_;

@@ -38,7 +38,8 @@ TEST(Defaults, TimesAreMultiplesOfTheStep) {
 
 TEST(Defaults, NoStepIsShorterThanHalfOfTheStep) {
     for (const double end : {0.01, 0.010001, 0.0107, 0.01349, 0.0135, 0.01999}) {
-        auto run = run_of(fmt::format("step: 0.001\nend: {}\nbodies: [{{name: b, mass: 1}}]\n", end));
+        auto run = run_of(fmt::format(
+            "step: 0.001\nend: {}\nbodies: [{{name: b, mass: 1, inertia: {{xx: 1, yy: 1, zz: 1}}}}]\n", end));
         double sum = 0.0;
         while (!run.simulation.finished()) {
             const double h = run.simulation.step().h;
@@ -224,7 +225,7 @@ TEST(Defaults, SlidingUnderAToleranceTakesFewSteps) {
 
 TEST(Defaults, MethodsWhoseReactionsDoNotDecayAreRefused) {
     const std::string pendulum =
-        "bodies:\n- {name: bob, mass: 1, position: [-1, 0, 0]}\n"
+        "bodies:\n- {name: bob, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}, position: [-1, 0, 0]}\n"
         "joints:\n- {name: hinge, kind: revolute, second: bob, point: [0, 0, 0], axis: [0, 1, 0]}\n";
     const auto refusal = [](const std::string& text) {
         try {
