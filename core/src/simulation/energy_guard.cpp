@@ -21,6 +21,14 @@ EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
     mechanics.multiply_mass(start, 1.0, fall.data(), momentum.data());
     fall_ = 0.0;
     for (std::size_t i = 0; i < n; ++i) fall_ += 2.0 * fall[i] * momentum[i];
+    // Digits of the positions: all entries move by 1e-10 of the largest coordinate.
+    double largest = 0.0;
+    for (const double value : start.q) largest = std::max(largest, std::abs(value));
+    std::fill(fall.begin(), fall.end(), 1e-10 * largest);
+    std::fill(momentum.begin(), momentum.end(), 0.0);
+    mechanics.multiply_mass(start, 1.0, fall.data(), momentum.data());
+    digits_ = 0.0;
+    for (std::size_t i = 0; i < n; ++i) digits_ += std::abs(fall[i] * momentum[i]);
 }
 
 bool EnergyGuard::watches(const SimulationTotals& totals) const {
@@ -29,7 +37,8 @@ bool EnergyGuard::watches(const SimulationTotals& totals) const {
 
 double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) const {
     const double available = totals.start_kinetic + totals.potential_drop + totals.recovered;
-    const double floor = fall_ * longest_step * longest_step + 1e-10 * std::abs(totals.start_energy);
+    const double square = longest_step * longest_step;
+    const double floor = fall_ * square + digits_ / square + 1e-10 * std::abs(totals.start_energy);
     return std::max(available, floor);
 }
 

@@ -15,9 +15,9 @@ struct SimulationTotals;
 //
 // is the most that there can have been up to now, W being what contacts gave by pushing apart what penetrated. Methods
 // err: a growth by some percent of A is an inaccuracy, one by A itself means that the motion is not that of the system.
-// The guard compares E − E₀ − W with limit · max(A, floor), where floor = ½ ‖2 h g‖²_M + 1e-10 |E₀|: a step cannot tell
-// a motion below a free fall over two steps from rest (a stiff part that starts off its equilibrium overshoots by about
-// that), and energies of far bodies are rounded.
+// The guard compares E − E₀ − W with limit · max(A, floor), where floor = ½ ‖2 h g‖²_M + ‖1e-10 q/h‖²_M + 1e-10 |E₀|: a
+// step cannot tell a motion below a free fall over two steps from rest (a stiff part that starts off its equilibrium
+// overshoots by about that), nor one by the last digits of the positions, and energies of far bodies are rounded.
 class EnergyGuard {
 public:
     /// system outlives it.
@@ -31,7 +31,8 @@ public:
 
 private:
     const SceneSystem* system_;
-    double fall_;  // ½ ‖2 g‖²_M, of a step of 1 s
+    double fall_;    // ½ ‖2 g‖²_M, of a step of 1 s
+    double digits_;  // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
 };
 
 }  // namespace delassus
