@@ -217,7 +217,7 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, co
 
 double StepSolver::Implementation::tolerance_for(const PreparedProblem& part,
                                                  std::span<const std::int32_t> columns) const {
-    constexpr double share = 0.2, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
+    constexpr double share = 0.5, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
     if (config.tolerance || config.sweeps || method_error.empty()) return settings.tolerance;
     const Problem& problem = part.problem();
     double square = 0.0;
