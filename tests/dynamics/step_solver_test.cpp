@@ -136,13 +136,13 @@ TEST_F(StepSolverTest, ChoosesBySolversThatCan) {
     ASSERT_TRUE(solver.solve(generate_chain({}), solution, false));
     EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod"}));
     ASSERT_TRUE(solver.solve(generate_box_stack({}), solution, false));
-    EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"apgd", "cholmod"}));
+    EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod", "ipm"}));
     StepSolver wrong(registry, config("cholmod"));
     EXPECT_THROW(wrong.solve(generate_box_stack({}), solution, false), Unsupported);
 }
 
 TEST_F(StepSolverTest, SaysWhatItDidNotSolve) {
-    auto chosen = config("apgd");
+    auto chosen = config("auto");
     chosen.max_iterations = 2;
     StepSolver solver(registry, chosen);
     Solution solution;

@@ -82,7 +82,7 @@ TEST_P(FrictionLaws, SlidingDown) {
     } else {
         // M v̇ = h f + impulses over all steps: μ (v_n at the end) less than without the artefact, v_n = h μ a.
         EXPECT_NEAR(speed_[0], v - mu * speed_[2], 1e-8);
-        EXPECT_NEAR(height_, h * mu * speed_[0], 1e-10);
+        EXPECT_NEAR(height_, h * mu * speed_[0], 1e-9);  // gaps have a resolution of 1e-9 of the size
     }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "generate/bodies.hpp"
 
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -63,6 +64,20 @@ void Assembly::point_row(std::int32_t a, const Vector3d& s_a, std::int32_t b, co
     row({b, direction, s_b.cross(direction)}, {a, -direction, -s_a.cross(direction)}, offset, compliance);
 }
 
+namespace {
+
+/// Two unit vectors that are an orthonormal frame with a unit vector, from the axis with the smallest component. Not
+/// the frames of scenes: generated problems stay what they were.
+std::array<Vector3d, 2> across(const Vector3d& direction) {
+    int least = 0;
+    for (int i = 1; i < 3; ++i)
+        if (std::abs(direction[i]) < std::abs(direction[least])) least = i;
+    const Vector3d first = (Vector3d::Unit(least) - direction[least] * direction).normalized();
+    return {first, direction.cross(first)};
+}
+
+}  // namespace
+
 // The gap after the step is Φ + h n · (ṗ_b − ṗ_a) ≥ 0; divided by h, u_n = n · (ṗ_b − ṗ_a) + Φ/h ≥ 0. The impulse on b
 // is λ_n n + λ_t1 t₁ + λ_t2 t₂, which Dᵀ λ adds to its momentum, with the opposite sign to that of a.
 void Assembly::contact(std::int32_t a, std::int32_t b, const Vector3d& point, const Vector3d& normal, double gap,
@@ -74,10 +89,7 @@ void Assembly::contact(std::int32_t a, std::int32_t b, const Vector3d& point, co
         cones_.push_back(Cone::nonnegative(1));
         return;
     }
-    Vector3d first, second;
-    tangents(normal, first, second);
-    point_row(a, s_a, b, s_b, first, 0.0, 0.0);
-    point_row(a, s_a, b, s_b, second, 0.0, 0.0);
+    for (const Vector3d& tangent : across(normal)) point_row(a, s_a, b, s_b, tangent, 0.0, 0.0);
     cones_.push_back(Cone::friction(mu));
 }
 
@@ -101,9 +113,7 @@ void Assembly::spherical_joint(std::int32_t a, const Vector3d& point_a, std::int
 //     C = (p · z, q · z),    d(p · z)/dt = (ω_b × p) · z + p · (ω_a × z) = (p × z) · (ω_b − ω_a)
 void Assembly::hinge_axis(std::int32_t a, const Vector3d& axis_a, std::int32_t b, const Vector3d& axis_b) {
     const Vector3d z = a == kWorld ? axis_a : Vector3d(body(a).orientation * axis_a);
-    Vector3d across[2];
-    tangents(axis_b, across[0], across[1]);
-    for (const Vector3d& across_b : across) {
+    for (const Vector3d& across_b : across(axis_b)) {
         const Vector3d p = b == kWorld ? across_b : Vector3d(body(b).orientation * across_b);
         const Vector3d direction = p.cross(z);
         row({b, Vector3d::Zero(), direction}, {a, Vector3d::Zero(), -direction}, p.dot(z) / settings_.step, 0.0);

@@ -65,7 +65,7 @@ private:
     [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h) const;
     void extrapolate(const State& whole, State& halves) const;
     /// A step from the state in which a contact closes.
-    [[nodiscard]] AdaptiveStepReport take_impact(State& state, double end, StepSolver& solver);
+    [[nodiscard]] AdaptiveStepReport take_impact(State& state, double h, double end, StepSolver& solver);
     [[nodiscard]] double impact_step() const;
     [[nodiscard]] double power() const;
     [[nodiscard]] double growth(bool shrunk) const;

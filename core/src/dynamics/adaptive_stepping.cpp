@@ -181,10 +181,10 @@ AdaptiveStepping::Trial AdaptiveStepping::until_impact(const State& begin, doubl
     return best;
 }
 
-AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double end, StepSolver& solver) {
+AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double h, double end, StepSolver& solver) {
     restore(memory_);
     const double remaining = end - state.t;
-    report_.h = remaining < impact_step() + control_.smallest ? remaining : impact_step();
+    report_.h = remaining < h + control_.smallest ? remaining : h;
     report_.impact = true;
     const std::int32_t iterations = report_.step.newton_iterations;
     report_.step = stepper_.step(state, report_.h, solver);
@@ -226,9 +226,12 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
             const double impact = impact_in(trial, h);
             if (impact > impact_step() && std::isfinite(impact)) {
                 trial = until_impact(state, impact, h, solver);
-                if (remaining - h < control_.smallest) h = 0.0;  // what would remain is no step
+                // What comes before the impact or what would remain is no step by itself.
+                if (h < control_.smallest || remaining - h < control_.smallest)
+                    return take_impact(state, h + impact_step(), end, solver);
+            } else if (impact <= impact_step()) {
+                return take_impact(state, impact_step(), end, solver);
             }
-            if (impact <= impact_step() || h < control_.smallest) return take_impact(state, end, solver);
         } catch (const StepFailure& error) {
             if (smallest) throw;
             failure = error.what();

@@ -60,6 +60,9 @@ struct StepSolver::Implementation {
     void solve_again(const PreparedProblem& prepared, const Solution& first, SolveSettings again, Solution& solution,
                      SolveReport& report);
     void count(const SolveReport& report);
+    /// Whether the velocities without reactions vanish in rounding, so that no reactions are the answer: what recovers
+    /// a penetration at constant speed is such a case. Errors relative to them say nothing. solution: that answer then.
+    static bool moves_freely(const PreparedProblem& part, Solution& solution);
 
     /// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
     static constexpr double rounding_limit = 1e-8;
@@ -177,6 +180,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     ++effort.plugin_solves;
     count(report);
+    if (report.status != Status::Solved && moves_freely(prepared, solution)) report.status = Status::Solved;
     if (report.status != Status::Solved && may_repeat) solve_again(prepared, before, part_settings, solution, report);
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
     if (report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit)) return true;
@@ -187,6 +191,20 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
                         report.error.natural, report.message.empty() ? "" : ": ", report.message);
     return false;
+}
+
+bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solution& solution) {
+    const Structure structure = part.structure();
+    if (structure != Structure::Diagonal && structure != Structure::Blocks && structure != Structure::Definite)
+        return false;
+    Solution free;
+    free.lambda.assign(solution.lambda.size(), 0.0);
+    part.meter().velocity_of(free.lambda, free.x);
+    const Errors error = part.meter().measure(free.x, free.lambda);
+    constexpr double no_digits = 1e-3;  // of rounding: what is measured has three digits at most
+    if (!(error.rounding > no_digits && error.natural <= 32.0 * error.rounding)) return false;
+    solution = std::move(free);
+    return true;
 }
 
 void StepSolver::Implementation::count(const SolveReport& report) {

@@ -194,10 +194,9 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
             rows.end_block(Cone::nonnegative(1), key, material.restitution);
             continue;
         }
-        Vector3d t1, t2;
-        tangents(normal, t1, t2);
-        for (const Vector3d* tangent : {&t1, &t2}) {
-            put_row(*tangent);
+        const mechanics::Matrix3d frame = contact_frame(normal);
+        for (int k = 1; k < 3; ++k) {
+            put_row(frame.col(k));
             rows.end_row();
         }
         rows.end_block(Cone::friction(material.friction), key, material.restitution);

@@ -23,12 +23,6 @@ inline Eigen::Vector3d normal_to(const Eigen::Vector3d& direction) {
     return (Eigen::Vector3d::Unit(axis) - direction[axis] * direction).normalized();
 }
 
-/// Two unit vectors t₁, t₂ with t₁ × t₂ = normal.
-inline void tangents(const Eigen::Vector3d& normal, Eigen::Vector3d& first, Eigen::Vector3d& second) {
-    first = normal_to(normal);
-    second = normal.cross(first);
-}
-
 /// The rotation whose columns are a contact's directions: the normal, then its tangents. Three rows of a contact give
 /// R r in space, and Rᵀ of a vector in space gives them back.
 inline Eigen::Matrix3d contact_frame(const Eigen::Vector3d& normal) {
