@@ -184,8 +184,8 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     if (report.status != Status::Solved && may_repeat) solve_again(prepared, before, part_settings, solution, report);
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
     if (report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit)) return true;
-    effort.worst_miss =
-        std::max(effort.worst_miss, report.error.natural / std::max(part_settings.tolerance, rounding_limit));
+    effort.worst_miss = std::max(effort.worst_miss, std::max(report.error.natural, report.error.balance) /
+                                                        std::max(part_settings.tolerance, rounding_limit));
     if (effort.unsolved.empty())
         effort.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
