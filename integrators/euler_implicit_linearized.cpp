@@ -64,7 +64,6 @@ public:
           blocks_(system.constraint_blocks()),
           n_(system.n()),
           m_(system.m()) {
-        after_.resize(static_cast<std::size_t>(m_));
         delta_.resize(static_cast<std::size_t>(n_));
     }
 
@@ -303,7 +302,7 @@ private:
         force_.assign(static_cast<std::size_t>(n_), 0.0);
         system_.add_force(end_, h, force_.data());
         if (!spins_.empty()) {  // their torques count for nothing here: they are not part of the linear model
-            system_.free_spins(end_, h, end_spins_);
+            system_.free_spins(end_, 0.0, end_spins_);  // for the torques at the end alone
             for (std::size_t k = 0; k < spins_.size(); ++k)
                 for (std::int32_t i = 0; i < 3; ++i)
                     force_[spins_[k].column + i] += spins_[k].impulse[i] - h * end_spins_[k].torque[i];
@@ -320,10 +319,8 @@ private:
         if (m_ == 0) return;
         D_.begin(m_, n_);
         system_.add_constraint_jacobian(end_, 0, D_);
-        system_.constraint(end_, after_.data());
-        for (std::int32_t i = 0; i < m_; ++i) {
-            problem_.b[i] = after_[i] / h;
-        }
+        system_.constraint(end_, problem_.b.data());
+        for (std::int32_t i = 0; i < m_; ++i) problem_.b[i] /= h;
         D_.finish_into(problem_.D);
     }
 
@@ -459,7 +456,7 @@ private:
     std::int32_t n_, m_;
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
-    std::vector<double> after_, delta_, impulse_, force_;
+    std::vector<double> delta_, impulse_, force_;
     // The velocities at the beginning of the last step, their last change, and half of the last three changes of that.
     std::vector<double> before_, change_;
     std::array<std::vector<double>, 3> jumps_;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "delassus/sdk/h_inverse.hpp"
+#include "delassus/sdk/saddle_point.hpp"
 
 namespace delassus_cholmod {
 
@@ -48,18 +49,12 @@ void ShiftedFactor::factorize(const ProblemView& problem) {
 }
 
 void ShiftedFactor::scale_mass(const ProblemView& problem) {
-    Vector diagonal = Vector::Zero(problem.n);
-    for (Eigen::Index i = 0; i < problem.n; ++i)
-        for (SparseRowsView::InnerIterator entry(problem.H, i); entry; ++entry)
-            if (entry.col() == i) diagonal[i] = std::abs(entry.value());
-    const auto positive = (diagonal.array() > 0.0).count();
-    const double mean = positive > 0 ? diagonal.sum() / static_cast<double>(positive) : 1.0;
+    const Vector diagonal = delassus::sdk::magnitude_of_diagonal(problem);
     system_.R.resize(problem.n);
     stand_in_.resize(problem.n);
     for (Eigen::Index i = 0; i < problem.n; ++i) {
-        const double value = diagonal[i] > 0.0 ? diagonal[i] : mean;
-        stand_in_[i] = 1.0 / value;
-        system_.R[i] = inverse_root_power_of_two(value);
+        stand_in_[i] = 1.0 / diagonal[i];
+        system_.R[i] = inverse_root_power_of_two(diagonal[i]);
     }
     system_.H = SparseRows(problem.H);
     for (Eigen::Index j = 0; j < problem.n; ++j)

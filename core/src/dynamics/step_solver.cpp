@@ -180,10 +180,13 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     ++effort.plugin_solves;
     count(report);
-    if (report.status != Status::Solved && moves_freely(prepared, solution)) report.status = Status::Solved;
-    if (report.status != Status::Solved && may_repeat) solve_again(prepared, before, part_settings, solution, report);
+    const auto done = [&] {
+        return report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit);
+    };
+    if (!done() && moves_freely(prepared, solution)) return true;
+    if (!done() && may_repeat) solve_again(prepared, before, part_settings, solution, report);
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
-    if (report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit)) return true;
+    if (done()) return true;
     effort.worst_miss = std::max(effort.worst_miss, std::max(report.error.natural, report.error.balance) /
                                                         std::max(part_settings.tolerance, rounding_limit));
     if (effort.unsolved.empty())

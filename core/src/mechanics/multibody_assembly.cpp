@@ -33,17 +33,10 @@ constexpr double assembled_position = 1e-9, assembled_velocity = 1e-7;
 
 }  // namespace
 
-std::vector<std::size_t> MultibodySystem::Implementation::kept_of(const Linkage& linkage) const {
+std::vector<std::size_t> MultibodySystem::Implementation::rows_of(const Linkage& linkage, bool kept) const {
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < linkage.numbers().size(); ++i)
-        if (place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] >= 0) rows.push_back(i);
-    return rows;
-}
-
-std::vector<std::size_t> MultibodySystem::Implementation::left_out_of(const Linkage& linkage) const {
-    std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < linkage.numbers().size(); ++i)
-        if (place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] < 0) rows.push_back(i);
+        if ((place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] >= 0) == kept) rows.push_back(i);
     return rows;
 }
 
@@ -64,14 +57,13 @@ void MultibodySystem::Implementation::number_rows() {
 
 void MultibodySystem::Implementation::assemble(const Linkage& linkage, const State& given, State& state,
                                                Assembly& done) const {
-    const auto rows = kept_of(linkage);
+    const auto rows = rows_of(linkage, true);
     if (!linkage.is_rounding(linkage.residual(state, rows))) {
         const auto left = linkage.assemble_positions(state, rows);
         if (!(left.value <= assembled_position))
             throw InputError(fmt::format(
                 "the joints do not fit together at t = {:.9g} s: the bodies were moved by up to {:.3g} m and {:.3g} "
-                "rad, "
-                "and \"{}\" still misses by {:.3g} of the mechanism's size of {:.3g} m (or in rad)",
+                "rad, and \"{}\" still misses by {:.3g} of the mechanism's size of {:.3g} m (or in rad)",
                 state.t, linkage.displacement(given, state).linear, linkage.displacement(given, state).angular,
                 linkage.joint_of(left.row), left.value, linkage.size()));
     }
@@ -117,7 +109,7 @@ const Assembly& MultibodySystem::assemble() {
         if (leaves_out_rows) self.keep_of(linkage, rows);
         self.assemble(linkage, given, state, done);
         if (!leaves_out_rows) continue;
-        const auto left = linkage.residual(state, self.left_out_of(linkage));
+        const auto left = linkage.residual(state, self.rows_of(linkage, false));
         if (left.value > most_drift)
             throw InputError(fmt::format(
                 "the joints do not fit together at t = 0: \"{}\" repeats what others do, and misses by {:.3g} of the "
@@ -154,8 +146,8 @@ bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
     auto& self = *implementation_;
     bool renewed = false;
     for (const auto& linkage : self.redundant) {
-        auto rows = self.kept_of(linkage);
-        const auto drift = linkage.residual(state, self.left_out_of(linkage));
+        auto rows = self.rows_of(linkage, true);
+        const auto drift = linkage.residual(state, self.rows_of(linkage, false));
         // A method whose steps are long opens all joints alike.
         const bool drifted = drift.value > most_drift && drift.value > 10.0 * linkage.residual(state, rows).value;
         if (drifted) {

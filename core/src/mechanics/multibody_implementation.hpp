@@ -101,9 +101,8 @@ struct MultibodySystem::Implementation {
         for (const auto& joint : joints)
             if (const auto place = joint.gear ? place_of(joint, 0) : -1; place >= 0) visit(place, *joint.gear);
     }
-    /// The rows of a linkage that are kept, numbered within it.
-    [[nodiscard]] std::vector<std::size_t> kept_of(const mechanics::Linkage& linkage) const;
-    [[nodiscard]] std::vector<std::size_t> left_out_of(const mechanics::Linkage& linkage) const;
+    /// The rows of a linkage that are kept, or those that are left out, numbered within it.
+    [[nodiscard]] std::vector<std::size_t> rows_of(const mechanics::Linkage& linkage, bool kept) const;
     /// Keeps these rows of a linkage, and all others as they are.
     void keep_of(const mechanics::Linkage& linkage, const std::vector<std::size_t>& rows);
     void number_rows();

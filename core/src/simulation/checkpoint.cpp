@@ -6,13 +6,13 @@
 #include <array>
 #include <bit>
 #include <charconv>
-#include <nlohmann/json.hpp>
 #include <type_traits>
 #include <variant>
 
 #include "delassus/error.hpp"
 #include "simulation/step_columns.hpp"
 #include "support/atomic_file.hpp"
+#include "support/json.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus {
@@ -120,13 +120,13 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)}});
     }
-    write_file_atomically(file, json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+    write_file_atomically(file, json_text(json, 1) + "\n");
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& file) {
     const std::string text = read_file(file);
     try {
-        const Json json = Json::parse(text);
+        const Json json = parse_ordered_json(text);
         if (json.at("format") != format) throw InputError("it is not a checkpoint of Delassus");
         const int written = json.at("version");
         if (written != version && written != 2) throw InputError("it was written by another version of Delassus");

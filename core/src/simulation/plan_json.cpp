@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "simulation/plan_json.hpp"
 
-#include <nlohmann/json.hpp>
+#include "support/json.hpp"
 
 namespace delassus {
 namespace {
@@ -28,7 +28,7 @@ std::string plan_json(std::string_view scene, const std::vector<SystemPlan>& pla
                                    {"solvers", one.solvers},
                                    {"later_solvers", one.later_solvers},
                                    {"libraries", one.libraries}});
-    return json.dump(2, ' ', false, Json::error_handler_t::replace);
+    return json_text(json, 2);
 }
 
 }  // namespace delassus

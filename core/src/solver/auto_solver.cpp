@@ -84,8 +84,8 @@ public:
         const std::uint64_t needs = needs_of(problem, {});
         const RankingRule& rule = rule_of(problem, settings);
         StageRunner runner(problem, solution, settings, report);
-        bool done = chosen_.simulation && runner.solved_at_start();
-        if (done) return runner.error();
+        if (chosen_.simulation && runner.solved_at_start()) return runner.error();
+        bool done = false;
         for (const auto& ranked : rule.stages) {
             Solver* solver = usable(ranked, runner.problem_of(ranked.stage));
             if (!solver) continue;

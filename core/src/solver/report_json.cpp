@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-
 #include "delassus/solver.hpp"
 #include "problem/errors_json.hpp"
 #include "support/json.hpp"
