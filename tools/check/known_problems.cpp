@@ -166,6 +166,8 @@ void add_box(std::vector<KnownProblem>& list) {
         known("box_definite", definite_chain(),
               SparseMatrix::from_triplets(5, 20, {{0, 0, 1}, {1, 3, 1}, {1, 4, -1}, {2, 8, 1}, {3, 11, 2}, {4, 19, 1}}),
               {}, cones, lambda, u));
+    list.push_back(known("box_compliance", diagonal({1, 2, 1, 3, 1}), identity(5), diagonal({1, 0.5, 2, 1, 0.25}),
+                         cones, lambda, u));
     list.push_back(reduced("box_reduced", chain(-1, Numbers(5, 3.0), -1), cones, lambda, u));
 }
 
