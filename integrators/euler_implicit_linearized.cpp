@@ -377,7 +377,7 @@ private:
         if (closes) b = rate + block.restitution * block.speed;
         const double friction = block.cone.parameters[0];
         if (coulomb_ || friction == 0.0 || block.cone.rows != 3) return;
-        const auto normal_row = static_cast<std::size_t>(m_ + row);
+        const auto normal_row = static_cast<std::size_t>(m_) + static_cast<std::size_t>(row);
         if (closes) {
             sliding_.push_back({normal_row, friction, 1e-4 * -block.speed, b, 0.0});
         } else if (pushed && follows_sliding_) {

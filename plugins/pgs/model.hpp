@@ -58,17 +58,19 @@ struct SweepState {
 
 class Model {
 public:
-    /// The operator is factorised. Throws std::length_error where N would be too large to form.
+    /// The operator is factorised; exact: one-contact problems are solved. Throws std::length_error where N would be
+    /// too large to form.
     void build(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, bool on_velocities, bool jacobi,
-               Ordering ordering) {
+               bool exact, Ordering ordering) {
         on_velocities_ = on_velocities;
         states_ = on_velocities ? problem.n + problem.m : problem.m;
         if (!on_velocities) check_size(problem);
-        const sdk::SparseRows matrix = on_velocities ? whitened_jacobian(problem, N.inverse()) : N.formed(problem);
+        const sdk::SparseRows formed = on_velocities ? sdk::SparseRows() : N.formed(problem);
         std::vector<Block> blocks = blocks_of(problem.cones);
         std::vector<sdk::RowGroup> groups;
         for (const Block& block : blocks) groups.push_back(block.rows);
-        rows_ = sdk::BlockRows(matrix, groups, nullptr, nullptr);
+        rows_ = on_velocities ? sdk::BlockRows(whitened_jacobian(problem, N), groups, nullptr, nullptr)
+                              : sdk::BlockRows(formed, groups, nullptr, nullptr);
         order_ = SweepOrder::make(rows_, ordering, on_velocities);
         blocks_.clear();
         row_.clear();
@@ -77,7 +79,7 @@ public:
             for (std::int32_t i = 0; i < blocks_.back().rows.rows; ++i) row_.push_back(blocks_.back().rows.first + i);
         }
         if (ordering != Ordering::Given || on_velocities) rows_ = rows_.reordered(order_.block, on_velocities);
-        build_local_problems(problem, jacobi);
+        build_local_problems(problem, N, jacobi, exact);
     }
 
     /// μ and bounds, and what the sweep starts from; call it at each solve.
@@ -202,30 +204,19 @@ private:
     // D̂ = D L⁻ᵀ with H = L Lᵀ, m × (n + m): with v̂ = Lᵀv, D v = D̂ v̂ and an impulse changes v̂ by D̂ᵀδ, so that the
     // sweep needs one set of rows instead of D and H⁻¹Dᵀ. A diagonal compliance is one more velocity of its own for
     // each row: √E_ii in column n + i adds E_ii to N_ii.
-    static sdk::SparseRows whitened_jacobian(const sdk::ProblemView& problem, const sdk::HInverse& inverse) {
-        std::vector<std::int32_t> start = {0}, column;
-        std::vector<double> value;
-        std::vector<std::int32_t> sorted;
-        inverse.for_each_half_solved_row(
-            problem.D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const sdk::Vector& work) {
-                sorted = reach;
-                std::sort(sorted.begin(), sorted.end());
-                for (const auto j : sorted)
-                    if (work[j] != 0.0) {
-                        column.push_back(j);
-                        value.push_back(work[j]);
-                    }
-                double compliance = 0.0;
-                for (sdk::SparseRowsView::InnerIterator entry(problem.E, row); entry; ++entry)
-                    if (entry.col() == row) compliance = entry.value();
-                if (compliance > 0.0) {
-                    column.push_back(static_cast<std::int32_t>(problem.n + row));
-                    value.push_back(std::sqrt(compliance));
-                }
-                start.push_back(static_cast<std::int32_t>(column.size()));
-            });
-        return sdk::SparseRowsView(problem.m, problem.n + problem.m, static_cast<Eigen::Index>(value.size()),
-                                   start.data(), column.data(), value.data());
+    sdk::SparseRowsView whitened_jacobian(const sdk::ProblemView& problem, const sdk::DelassusOperator& N) {
+        if (problem.E.nonZeros() == 0) return N.whitened().view(states_);
+        const sdk::SparseRowsView without = N.whitened().view(problem.n);
+        with_compliance_.clear();
+        for (Eigen::Index row = 0; row < problem.m; ++row) {
+            for (sdk::SparseRowsView::InnerIterator entry(without, row); entry; ++entry)
+                with_compliance_.put(static_cast<std::int32_t>(entry.col()), entry.value());
+            const double compliance = problem.E.coeff(row, row);
+            if (compliance > 0.0)
+                with_compliance_.put(static_cast<std::int32_t>(problem.n + row), std::sqrt(compliance));
+            with_compliance_.end_row();
+        }
+        return with_compliance_.view(states_);
     }
 
     // L⁻¹a: a half solve with a as the single row of a matrix.
@@ -263,18 +254,26 @@ private:
                                     " entries, which is too many; a solver that only multiplies by N can take this");
     }
 
-    void build_local_problems(const sdk::ProblemView& problem, bool jacobi) {
+    void build_local_problems(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, bool jacobi,
+                              bool exact) {
         local_ = {};
         local_.block.resize(blocks_.size());
         const std::vector<double> sharing = jacobi && on_velocities_ ? sharing_of_columns() : std::vector<double>();
         Eigen::MatrixXd M;
         for (std::size_t k = 0; k < blocks_.size(); ++k) {
             const std::int32_t rows = blocks_[k].rows.rows;
-            block_matrix(rows_.groups()[k], jacobi, sharing, M);
+            if (jacobi) {
+                bounding_block(rows_.groups()[k], sharing, M);
+            } else if (rows > 1) {
+                M = Eigen::Map<const Eigen::MatrixXd>(N.block(static_cast<std::size_t>(blocks_[k].cone)), rows, rows);
+            } else {
+                M.setConstant(1, 1, N.diagonal()[blocks_[k].rows.first]);
+            }
             LocalBlock& local = local_.block[k];
             if (problem.cones[static_cast<std::size_t>(blocks_[k].cone)].kind == DELASSUS_CONE_FRICTION) {
                 local.kind = LocalBlock::Kind::Friction;
                 local.step = reciprocal(largest_eigenvalue(M));
+                if (!exact) continue;
                 local.matrix = static_cast<std::int32_t>(local_.contact.size());
                 local_.contact.emplace_back(rows, M.data());
             } else if (rows > 1) {
@@ -301,36 +300,25 @@ private:
         return sharing;
     }
 
-    // M_c. Gauss–Seidel: the diagonal block N_cc.
-    //
-    // Jacobi moves all blocks at once and needs blocks with N ≼ blockdiag(M_c), so that the sum of the local models
-    // bounds the objective. On velocities: if w_j blocks touch the entry j of v̂, then
+    // Gauss–Seidel takes the diagonal block N_cc for M_c. Jacobi moves all blocks at once and needs blocks with N ≼
+    // blockdiag(M_c), so that the sum of the local models bounds the objective. On velocities: if w_j blocks touch the
+    // entry j of v̂, then
     //     λᵀNλ = Σ_j (Σ_c (D̂_cᵀλ_c)_j)² ≤ Σ_j w_j Σ_c (D̂_cᵀλ_c)_j² = Σ_c λ_cᵀ (D̂_c W D̂_cᵀ) λ_c     (Cauchy–Schwarz).
     // On rows of N: N ≼ diag(Σ_j |N_ij|), as the difference is diagonally dominant.
-    void block_matrix(const sdk::BlockRows::Group& group, bool jacobi, const std::vector<double>& sharing,
-                      Eigen::MatrixXd& M) const {
+    void bounding_block(const sdk::BlockRows::Group& group, const std::vector<double>& sharing,
+                        Eigen::MatrixXd& M) const {
         M.setZero(group.rows, group.rows);
         for (int k = 0; k < group.chunks; ++k)
             for (int c = 0; c < rows_.width(); ++c) {
-                const std::int32_t column = rows_.starts(group)[k] + c;
-                if (on_velocities_) {
-                    const double weight = jacobi ? sharing[static_cast<std::size_t>(column)] : 1.0;
-                    for (int i = 0; i < group.rows; ++i)
-                        for (int j = 0; j < group.rows; ++j)
-                            M(i, j) += weight * rows_.chunk(group, k, i)[c] * rows_.chunk(group, k, j)[c];
+                if (!on_velocities_) {
+                    for (int i = 0; i < group.rows; ++i) M(i, i) += std::abs(rows_.chunk(group, k, i)[c]);
                     continue;
                 }
-                const std::int32_t j = column - group.first;
-                for (int i = 0; i < group.rows; ++i) {
-                    const double value = rows_.chunk(group, k, i)[c];
-                    if (jacobi) {
-                        M(i, i) += std::abs(value);
-                    } else if (j >= 0 && j < group.rows) {
-                        M(i, j) += value;
-                    }
-                }
+                const double weight = sharing[static_cast<std::size_t>(rows_.starts(group)[k] + c)];
+                for (int i = 0; i < group.rows; ++i)
+                    for (int j = 0; j < group.rows; ++j)
+                        M(i, j) += weight * rows_.chunk(group, k, i)[c] * rows_.chunk(group, k, j)[c];
             }
-        if (!on_velocities_) M = (0.5 * (M + M.transpose())).eval();
     }
 
     static double reciprocal(double value) { return value > 0.0 ? 1.0 / value : 0.0; }
@@ -350,6 +338,7 @@ private:
         local_.inverse.insert(local_.inverse.end(), result.data(), result.data() + result.size());
     }
 
+    sdk::CompressedRows with_compliance_;  // D̂ where there is E
     bool on_velocities_ = false;
     Eigen::Index states_ = 0;  // entries of z without padding
     sdk::BlockRows rows_;      // by visits; on velocities its rows are counted so too

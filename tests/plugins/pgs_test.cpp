@@ -151,7 +151,7 @@ void compare_forms(Problem problem, pgs::Local local) {
     pgs::SweepState state[2];
     sdk::Team alone(1);
     for (int form = 0; form < 2; ++form) {
-        models[form].build(view, N, form == 0, false, pgs::Ordering::Given);
+        models[form].build(view, N, form == 0, false, true, pgs::Ordering::Given);
         models[form].set_right_hand_side(view, N);
         models[form].state_of(sdk::Vector::Zero(view.m), state[form]);
     }
@@ -197,7 +197,7 @@ TEST(PgsSweep, JacobiBlocksBoundN) {
     const Eigen::MatrixXd dense = N.formed(view);
     for (const bool on_velocities : {true, false}) {
         pgs::Model model;
-        model.build(view, N, on_velocities, true, pgs::Ordering::Given);
+        model.build(view, N, on_velocities, true, true, pgs::Ordering::Given);
         Eigen::MatrixXd difference = -dense;
         for (std::size_t k = 0; k < model.blocks().size(); ++k) {
             const auto& block = model.blocks()[k].rows;
@@ -227,7 +227,7 @@ struct Swept {
         const sdk::ProblemView view(prepared.raw());
         N.analyze(view);
         N.factorize(view);
-        model.build(view, N, on_velocities, false, ordering);
+        model.build(view, N, on_velocities, false, true, ordering);
         model.set_right_hand_side(view, N);
         pgs::SweepState state;
         model.state_of(sdk::Vector::Zero(view.m), state);

@@ -297,7 +297,8 @@ void add_projected(std::vector<KnownProblem>& list) {
         Numbers masses;
         std::vector<Triplet> between;
         for (std::int32_t i = 0; i < m; ++i) {
-            masses.push_back(1.0 + i / rows);
+            const std::int32_t body = i / rows;
+            masses.push_back(1.0 + body);
             between.push_back({i, i, 1.0});
             if (i >= rows) between.push_back({i, i - rows, -0.5});
         }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <cerrno>
 #include <csignal>
@@ -33,6 +34,12 @@ std::vector<std::filesystem::path> absolute(std::vector<std::filesystem::path> f
 }
 
 namespace {
+
+/// Steps of a scene free arrays of megabytes and take them again: what was freed stays with the process.
+void keep_freed_memory() {
+    mallopt(M_MMAP_THRESHOLD, 64 << 20);
+    mallopt(M_TRIM_THRESHOLD, 512 << 20);
+}
 
 /// Throws Error unless everything printed has been written: standard output may be a file on a full disk.
 void flush_output() {
@@ -92,6 +99,7 @@ int main(int argc, char** argv) {
     using namespace delassus;
     using namespace delassus::command;
     prepare_for_out_of_memory(exit_bad_input);
+    keep_freed_memory();
     std::signal(SIGXFSZ, SIG_IGN);  // writing beyond the size limit then fails with a sentence
     try {
         return parse_and_run(argc, argv);

@@ -24,6 +24,7 @@ DELASSUS_SDK_FUNCTION BlockRows::BlockRows(const Matrix& matrix, std::span<const
                                            const double* right) {
     const std::vector<std::int32_t> columns = columns_of(matrix, groups);
     width_ = cheapest_width(columns, groups);
+    value_.reserve(static_cast<std::size_t>(matrix.nonZeros()));
     std::size_t at = 0;
     for (std::size_t k = 0; k < groups.size(); ++k) {
         Group& group = groups_[k];
@@ -105,7 +106,9 @@ DELASSUS_SDK_FUNCTION void BlockRows::transpose_multiply_add(const double* v, do
 // columns in place of chunks.
 DELASSUS_SDK_FUNCTION std::vector<std::int32_t> BlockRows::columns_of(const Matrix& matrix,
                                                                       std::span<const RowGroup> groups) {
+    groups_.reserve(groups.size());
     std::vector<std::int32_t> columns;
+    columns.reserve(static_cast<std::size_t>(matrix.nonZeros()));
     std::vector<std::size_t> last(static_cast<std::size_t>(matrix.cols()), 0);
     for (const RowGroup& rows : groups) {
         groups_.push_back({0, 0, rows.first, rows.rows, 0});

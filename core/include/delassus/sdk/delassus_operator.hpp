@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "delassus/sdk/h_inverse.hpp"
@@ -51,6 +50,9 @@ public:
 
     [[nodiscard]] const HInverse& inverse() const { return inverse_; }
 
+    /// W = D L⁻ᵀ with H = L Lᵀ, so that N = W Wᵀ + E, where H is diagonal or of blocks.
+    [[nodiscard]] const CompressedRows& whitened() const { return whitened_; }
+
 private:
     /// Rows up to which N of a sparse H is made beside its blocks, as a dense matrix at first.
     static constexpr Eigen::Index most_rows_formed = 4000;
@@ -65,7 +67,7 @@ private:
 
     HInverse inverse_;
     SparseRows inertia_;  // D H⁻¹ Dᵀ, where it was made with the blocks
-    std::vector<std::vector<std::pair<std::int32_t, double>>> rows_;  // of one block at a time
+    CompressedRows whitened_;
     Vector diagonal_;
     std::vector<double> blocks_;
     std::vector<std::ptrdiff_t> block_offset_;

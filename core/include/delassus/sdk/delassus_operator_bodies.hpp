@@ -2,6 +2,7 @@
 // The functions of sdk/delassus_operator.hpp (sdk/compiled_once.hpp).
 #pragma once
 
+#include <algorithm>
 #include <span>
 
 #include "delassus/sdk/compiled_once.hpp"
@@ -62,8 +63,13 @@ DELASSUS_SDK_FUNCTION SparseRows DelassusOperator::formed(const ProblemView& pro
     if (inertia_.rows() > 0) {
         N = inertia_;
     } else if (problem.n > 0) {
-        const SparseColumns Z = inverse_.half_solved(problem.D);
-        N = SparseColumns(Z.transpose() * Z);
+        if (inverse_.kind() == HInverse::Kind::Sparse) {
+            const SparseColumns Z = inverse_.half_solved(problem.D);
+            N = SparseColumns(Z.transpose() * Z);
+        } else {
+            const SparseRowsView W = whitened_.view(problem.n);
+            N = W * SparseColumns(W.transpose());
+        }
     }
     if (problem.E.nonZeros() > 0) N += problem.E;
     N.makeCompressed();
@@ -136,30 +142,44 @@ DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia_by_panels(const Problem
 
 // D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
 DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& problem) {
-    rows_.resize(largest_block);
-    std::size_t c = 0;
-    inverse_.for_each_half_solved_row(
-        problem.D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
-            while (row >= problem.cones[c].first_row + problem.cones[c].rows) ++c;
-            const delassus_cone& cone = problem.cones[c];
-            double square = 0.0;
-            for (const auto i : reach) square += work[i] * work[i];
-            diagonal_[row] += square;
-            if (block_offset_[c] < 0) return;
-            double* block = blocks_.data() + block_offset_[c];
-            const auto local = static_cast<std::size_t>(row - cone.first_row);
-            const auto width = static_cast<std::size_t>(cone.rows);
-            block[local * width + local] += square;
-            for (std::size_t other = 0; other < local; ++other) {
-                double product = 0.0;
-                for (const auto& [i, value] : rows_[other]) product += value * work[i];
-                block[local * width + other] += product;
-                block[other * width + local] += product;
+    inverse_.half_solve_rows(problem.D, whitened_);
+    const auto& [start, column, value] = whitened_;
+    // Rows of one contact mostly have the same columns.
+    const auto product = [&, columns = column.data(), values = value.data()](std::int32_t row, std::int32_t other) {
+        auto i = start[static_cast<std::size_t>(row)], k = start[static_cast<std::size_t>(other)];
+        const auto end = start[static_cast<std::size_t>(row) + 1], last = start[static_cast<std::size_t>(other) + 1];
+        double sum = 0.0;
+        if (end - i == last - k && std::equal(columns + i, columns + end, columns + k)) {
+            for (; i < end; ++i, ++k) sum += values[i] * values[k];
+            return sum;
+        }
+        while (i < end && k < last) {
+            if (columns[i] == columns[k]) {
+                sum += values[i++] * values[k++];
+            } else {
+                ++(columns[i] < columns[k] ? i : k);
             }
-            auto& kept = rows_[local];
-            kept.clear();
-            for (const auto i : reach) kept.emplace_back(i, work[i]);
-        });
+        }
+        return sum;
+    };
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        const std::int32_t first = problem.cones[c].first_row, rows = problem.cones[c].rows;
+        double* block = block_offset_[c] < 0 ? nullptr : blocks_.data() + block_offset_[c];
+        for (std::int32_t i = 0; i < rows; ++i) {
+            double square = 0.0;
+            for (auto e = start[static_cast<std::size_t>(first + i)];
+                 e < start[static_cast<std::size_t>(first + i) + 1]; ++e)
+                square += value[static_cast<std::size_t>(e)] * value[static_cast<std::size_t>(e)];
+            diagonal_[first + i] += square;
+            if (!block) continue;
+            block[i * rows + i] += square;
+            for (std::int32_t j = 0; j < i; ++j) {
+                const double entry = product(first + i, first + j);
+                block[i * rows + j] += entry;
+                block[j * rows + i] += entry;
+            }
+        }
+    }
 }
 
 DELASSUS_SDK_FUNCTION void DelassusOperator::add_compliance(const ProblemView& problem) {

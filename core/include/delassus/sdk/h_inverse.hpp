@@ -18,6 +18,32 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+/// Compressed rows whose memory serves again.
+struct CompressedRows {
+    std::vector<std::int32_t> start, column;  ///< columns ascend within a row
+    std::vector<double> value;
+
+    void clear() {
+        start.assign(1, 0);
+        column.clear();
+        value.clear();
+    }
+    void put(std::int32_t j, double entry) {
+        column.push_back(j);
+        value.push_back(entry);
+    }
+    void end_row() { start.push_back(static_cast<std::int32_t>(column.size())); }
+    /// As a matrix of so many columns; valid until the next change.
+    [[nodiscard]] SparseRowsView view(Eigen::Index columns) const {
+        return {static_cast<Eigen::Index>(start.size()) - 1,
+                columns,
+                static_cast<Eigen::Index>(value.size()),
+                start.data(),
+                column.data(),
+                value.data()};
+    }
+};
+
 /// Applies H⁻¹. With H = L Lᵀ (up to the permutation P of the sparse case), it also gives the columns of
 /// Z = L⁻¹ P Dᵀ, by which D H⁻¹ Dᵀ = Zᵀ Z.
 class HInverse {
@@ -34,8 +60,11 @@ public:
     /// v ← H⁻¹ v; n entries.
     void apply(Vector& v) const;
 
-    /// Sparse columns of Z = L⁻¹ P Dᵀ (n × m, in the order of the factor's own rows): D H⁻¹ Dᵀ = Zᵀ Z.
+    /// Sparse columns of Z = L⁻¹ P Dᵀ (n × m, in the order of the factor's own rows) of a sparse H: D H⁻¹ Dᵀ = Zᵀ Z.
     [[nodiscard]] SparseColumns half_solved(const SparseRowsView& D) const;
+
+    /// W ← Zᵀ = D L⁻ᵀ without its zeros, where H is diagonal or of blocks.
+    void half_solve_rows(const SparseRowsView& D, CompressedRows& W) const;
 
     /// Visits L⁻¹ P Dᵀ row by row of D without storing it, where H is diagonal or of blocks: visit(row, reach, work),
     /// where work (n) is zero but for the indices in reach.

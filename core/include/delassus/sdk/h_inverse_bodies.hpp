@@ -77,23 +77,38 @@ DELASSUS_SDK_FUNCTION void HInverse::apply(Vector& v) const {
 DELASSUS_SDK_FUNCTION SparseColumns HInverse::half_solved(const SparseRowsView& D) const {
     SparseColumns Z(n_, D.rows());
     std::vector<Eigen::Triplet<double, std::int32_t>> entries;
-    const auto put = [&](Eigen::Index i, Eigen::Index row, double value) {
-        if (value != 0.0) entries.emplace_back(static_cast<std::int32_t>(i), static_cast<std::int32_t>(row), value);
-    };
-    if (kind_ == Kind::Sparse) {
-        sparse_->half_solve(D, sparse_->reach(D),
-                            [&](Eigen::Index first, std::span<const std::int32_t> rows, const auto& panel) {
-                                for (Eigen::Index j = 0; j < panel.cols(); ++j)
-                                    for (Eigen::Index i = 0; i < panel.rows(); ++i)
-                                        put(first + i, rows[static_cast<std::size_t>(j)], panel(i, j));
-                            });
-    } else {
-        for_each_half_solved_row(D, [&](Eigen::Index row, const std::vector<std::int32_t>& reach, const Vector& work) {
-            for (const auto i : reach) put(i, row, work[i]);
-        });
-    }
+    sparse_->half_solve(D, sparse_->reach(D),
+                        [&](Eigen::Index first, std::span<const std::int32_t> rows, const auto& panel) {
+                            for (Eigen::Index j = 0; j < panel.cols(); ++j)
+                                for (Eigen::Index i = 0; i < panel.rows(); ++i)
+                                    if (panel(i, j) != 0.0)
+                                        entries.emplace_back(static_cast<std::int32_t>(first + i),
+                                                             rows[static_cast<std::size_t>(j)], panel(i, j));
+                        });
     Z.setFromTriplets(entries.begin(), entries.end());
     return Z;
+}
+
+DELASSUS_SDK_FUNCTION void HInverse::half_solve_rows(const SparseRowsView& D, CompressedRows& W) const {
+    W.clear();
+    W.start.reserve(static_cast<std::size_t>(D.rows()) + 1);
+    W.column.reserve(static_cast<std::size_t>(D.nonZeros()));
+    W.value.reserve(static_cast<std::size_t>(D.nonZeros()));
+    if (kind_ == Kind::Diagonal) {
+        for (Eigen::Index row = 0; row < D.rows(); ++row) {
+            for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry)
+                if (entry.value() != 0.0)
+                    W.put(static_cast<std::int32_t>(entry.col()), entry.value() / root_[entry.col()]);
+            W.end_row();
+        }
+        return;
+    }
+    for_each_half_solved_row(D, [&](Eigen::Index, std::vector<std::int32_t>& reach, const Vector& work) {
+        if (!std::is_sorted(reach.begin(), reach.end())) std::sort(reach.begin(), reach.end());
+        for (const auto j : reach)
+            if (work[j] != 0.0) W.put(j, work[j]);
+        W.end_row();
+    });
 }
 
 // H is symmetric, so its compressed rows are its compressed columns.

@@ -234,7 +234,9 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::build_operator(const ProblemView& prob
         square_ = BlockRows(operator_.formed(problem), groups_, p_.data(), p_.data());
         return;
     }
-    if (problem.n > 0 && whitened_) {
+    if (problem.n > 0 && inverse.kind() != HInverse::Kind::Sparse) {
+        rows_ = BlockRows(operator_.whitened().view(problem.n), groups_, p_.data(), nullptr);
+    } else if (problem.n > 0 && whitened_) {
         const SparseColumns Z = inverse.half_solved(problem.D);
         const SparseRowsView W(Z.cols(), Z.rows(), Z.nonZeros(), Z.outerIndexPtr(), Z.innerIndexPtr(),
                                Z.valuePtr());  // the columns of Z are the rows of W = Zᵀ
