@@ -25,7 +25,7 @@ struct Equilibrium {
     State state;                      ///< at t = 0, at rest
     std::vector<double> multipliers;  ///< reactions of the kept rows of joints; N, Nm
     std::vector<LoadStep> load_steps;
-    double largest_force = 0.0;  ///< of the whole loads where the search began, or of reactions, N or Nm
+    double largest_force = 0.0;  ///< of f at the start under the whole loads, or of reactions at the end, N or Nm
     /// The smallest ω² of small vibrations, rad²/s²: negative where the equilibrium is unstable. NaN where it is not
     /// known: no freedom, or more than 600 velocities.
     double smallest_eigenvalue = 0.0;

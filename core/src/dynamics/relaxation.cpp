@@ -66,10 +66,10 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
     StepPoint now = at_rest(state, lambda);
     StepResidual residual;
     if (!newton_.evaluate(state, now, residual)) throw StepFailure("the forces are not finite where the search begins");
-    report.force = largest(residual.force);
     const double farthest = settings_.farthest * (1.0 + largest_of(start.q));
     const double digits = 1e-13 * (1.0 + largest_of(start.q)) * mass_norm(Vector::Ones(n_), state);
     double last_move = std::numeric_limits<double>::infinity(), last_tau = 0.0;
+    int stalled = 0;
     std::string failure;
     tau_ = std::clamp(tau_, 1e-3, 1e3);
     for (int step = 0; step < settings_.most_steps; ++step) {
@@ -105,8 +105,12 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
                 "elements, or carry no load");
         Vector way(n_);
         system_.difference(start.q.data(), now.state.q.data(), way.data());
-        const double threshold = settings_.tolerance * mass_norm(way, now.state) + digits;
-        const bool settled = tau_ > last_tau && move <= threshold && (last_move <= 1e3 * threshold || move <= digits);
+        const double far = mass_norm(way, now.state), threshold = settings_.tolerance * far + digits;
+        // Or to rounding: with longer and longer τ it moves by as little as before.
+        const bool longer = tau_ >= last_tau, little = move <= 1e-7 * far && move > 0.1 * last_move;
+        stalled = longer && little ? stalled + 1 : 0;
+        const bool settled =
+            longer && ((move <= threshold && (last_move <= 1e3 * threshold || move <= digits)) || stalled >= 3);
         last_move = move;
         last_tau = tau_;
         tau_ = std::min(10.0 * tau_, longest_tau);

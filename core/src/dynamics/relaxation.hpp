@@ -22,7 +22,6 @@ struct RelaxationReport {
     int steps = 0, newton_iterations = 0;
     double residual = 0.0;  ///< largest entry of f + C_qᵀ λ, N or Nm
     double reaction = 0.0;  ///< largest entry of C_qᵀ λ
-    double force = 0.0;     ///< largest entry of f where the search began
 };
 
 class DELASSUS_API Relaxation {

@@ -62,7 +62,9 @@ public:
         found.state = mechanics_.initial_state();
         require_rest(mechanics_, found.state);
         require_nothing_touches(mechanics_, found.state, rows_, 0.0);
-        Vector lambda = Vector::Zero(mechanics_.m());
+        Vector loads = Vector::Zero(mechanics_.n()), lambda = Vector::Zero(mechanics_.m());
+        mechanics_.add_force(found.state, 1.0, loads.data());
+        if (loads.size() > 0) found.largest_force = loads.lpNorm<Eigen::Infinity>();
         double load = 0.0;
         int divided = 0;
         for (int step = 1; step <= rule_.load_steps;) {
@@ -80,7 +82,7 @@ public:
             load = std::min(next, goal);
             require_nothing_touches(mechanics_, state, rows_, load);
             found.state = state;
-            found.largest_force = std::max({found.largest_force, effort.force, effort.reaction});
+            found.largest_force = std::max(found.largest_force, effort.reaction);
             found.load_steps.push_back(
                 {load, effort.steps, effort.newton_iterations, effort.residual, mechanics_.energy(state)});
             if (on_step) on_step(found.load_steps.back(), state);
