@@ -177,7 +177,9 @@ TEST(Equilibrium, ACantileverUnderAnEndLoadIsTheElastica) {
 TEST(Equilibrium, ACantileverInOneStepIsThatInMany) {
     const Found many(cantilever(6, 2.0, 20.0));
     const Found one("start: {equilibrium: {load_steps: 1}}\n" + cantilever(6, 2.0, 20.0));
-    EXPECT_EQ(many.equilibrium.load_steps.size(), 10U);
+    // Where a load step is too long for Newton's method, it is divided.
+    EXPECT_GE(many.equilibrium.load_steps.size(), 10U);
+    EXPECT_EQ(many.equilibrium.load_steps.back().load, 1.0);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(one.body("rod_6")[i], many.body("rod_6")[i], 1e-8);
 }
 

@@ -19,8 +19,8 @@ namespace delassus {
 //
 // Where f = −∇V, this is the stationarity of V(q_{k+1}) + ‖Δ‖²_M/(2 τ²), a step of the proximal-point method
 // (Rockafellar, SIAM J. Control Optim. 14, 1976): V descends, and with growing τ the sequence converges faster than
-// linearly; a vibration of frequency ω shrinks by 1/(1 + ω² τ²) in a step. τ is ten times longer after each step, so
-// that near the end these are Newton steps with K alone. (Pseudo-transient continuation, Kelley and Keyes, SIAM J.
+// linearly; a vibration of frequency ω shrinks by 1/(1 + ω² τ²) in a step. τ is up to ten times longer after each step,
+// so that near the end these are Newton steps with K alone. (Pseudo-transient continuation, Kelley and Keyes, SIAM J.
 // Numer. Anal. 35, 1998.) A step in which Newton's method fails, or which the forces do not drive,
 //
 //     ½ (f(q_k) + f(q_{k+1})) · Δ < 0
@@ -70,10 +70,18 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
     const double digits = 1e-13 * (1.0 + largest_of(start.q)) * mass_norm(Vector::Ones(n_), state);
     double last_move = std::numeric_limits<double>::infinity(), last_tau = 0.0;
     int stalled = 0;
+    int failures = 0;
+    double growth = 10.0;
     std::string failure;
+    const auto failed = [&](const char* why) {
+        failure = why;
+        ++failures;
+        tau_ *= 0.1;
+        growth = 2.0;
+    };
     tau_ = std::clamp(tau_, 1e-3, 1e3);
     for (int step = 0; step < settings_.most_steps; ++step) {
-        if (tau_ < shortest_tau) break;
+        if (tau_ < shortest_tau || failures > settings_.most_failures) break;
         const StepSlopes slopes{0.0, 1.0 / (tau_ * tau_)};
         StepPoint next = at_rest(now.state, now.lambda);
         StepResidual next_residual;
@@ -83,10 +91,9 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
         ++report.steps;
         try {
             newton_.solve(now.state, tau_, slopes, next, next_residual, solver, effort);
-        } catch (const StepFailure& error) {
-            failure = error.what();
+        } catch (const StepFailure&) {
+            failed("Newton's method did not converge");
             report.newton_iterations += effort.newton_iterations;
-            tau_ *= 0.1;
             continue;
         }
         report.newton_iterations += effort.newton_iterations;
@@ -94,8 +101,7 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
         const double size = (force_before.norm() + next_residual.force.norm()) * next.delta.norm();
         const double move = mass_norm(next.delta, next.state);
         if (work < -1e-6 * size && move > digits && tau_ > 1e-6) {
-            failure = "the way leads uphill";
-            tau_ *= 0.1;
+            failed("the way leads uphill");
             continue;
         }
         now = at_rest(next.state, next.lambda);
@@ -113,7 +119,8 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
             longer && ((move <= threshold && (last_move <= 1e3 * threshold || move <= digits)) || stalled >= 3);
         last_move = move;
         last_tau = tau_;
-        tau_ = std::min(10.0 * tau_, longest_tau);
+        tau_ = std::min(growth * tau_, longest_tau);
+        growth = std::min(1.5 * growth, 10.0);
         if (!settled) continue;
         newton_.evaluate(now.state, now, residual);
         report.residual = largest(residual.balance);
@@ -122,8 +129,9 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
         lambda = now.lambda;
         return report;
     }
-    throw StepFailure(fmt::format("no equilibrium was found in {} steps of the search{}{}", report.steps,
-                                  failure.empty() ? "" : "; the last that failed: ", failure));
+    throw StepFailure(fmt::format(
+        "no equilibrium was found in {} steps of the search{}{}; smaller load steps may help, if there is one",
+        report.steps, failure.empty() ? "" : ": ", failure));
 }
 
 double Relaxation::smallest_eigenvalue(const State& state, const Vector& lambda) const {

@@ -14,6 +14,7 @@ namespace delassus {
 struct RelaxationSettings {
     double tolerance = 1e-10;  ///< last movement over the whole way, both in the norm of the mass
     int most_steps = 300;      ///< at one load
+    int most_failures = 60;    ///< steps that were tried again
     double farthest = 1e6;     ///< positions beyond this many times the largest at the start are on their way off
 };
 
