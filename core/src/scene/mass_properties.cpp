@@ -73,11 +73,12 @@ Moments moments_of(const Shape& shape) {
         case ShapeKind::Convex:
             return closed_surface(*shape.mesh);
         case ShapeKind::Plane:
+            break;
         case ShapeKind::Terrain:
         case ShapeKind::HeightField:
-            break;
+            throw InputError("terrain has no volume, so mass and inertia cannot follow from it");
     }
-    throw InputError("a plane or a terrain has no volume, so mass and inertia cannot follow from it");
+    throw InputError("a plane has no volume, so mass and inertia cannot follow from it");
 }
 
 }  // namespace
