@@ -86,7 +86,7 @@ TEST(Terrain, ShallowPenetrationOfAClosedConvexMeshIsThatOfItsHull) {
     int compared = 0;
     const auto mesh = box_mesh(0.2, 0.5, 0.3);
     const Shape ground = surface(ShapeKind::Terrain, *mesh), hull = convex(mesh, -1);
-    for (int trial = 0; trial < 800; ++trial) {
+    for (int trial = 0; trial < 1600; ++trial) {
         for (const Shape& moving : kinds(0)) {
             const Pose at = pose(random(0.4, 1.0) * random.direction(), random.rotation());
             const auto expected = on(hull, moving, at, 0.01);
