@@ -129,7 +129,7 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 4: \"convex\" lacks the key \"points\""},
         Case{"NoKind", head + "bodies:\n  - {name: b, mass: 1, shapes: [{margin: 1}]}\n",
              "s.yaml, line 4: a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
-             "\"plane\", \"convex\", \"mesh\""},
+             "\"plane\", \"convex\", \"mesh\", \"terrain\", \"height_field\""},
         Case{"PlaneMoves", head + "bodies:\n  - {name: b, mass: 1, shapes: [{plane: {}}]}\n",
              "s.yaml, line 4: a plane has no volume, so mass and inertia cannot follow from it"}),
     [](const auto& parameter) { return std::string(parameter.param.name); });

@@ -78,7 +78,8 @@ std::map<std::string, std::string> scenes_of_parts() {
                                                  {"motion", ball + "loads: [{force: [{@}, 0, 0]}]"},
                                                  {"linear", ball + "loads: [{force: [{linear: {@}}, 0, 0]}]"},
                                                  {"sine", ball + "loads: [{force: [{sine: {@}}, 0, 0]}]"}};
-    for (const std::string kind : {"sphere", "box", "capsule", "cylinder", "plane", "convex"})
+    for (const std::string kind :
+         {"sphere", "box", "capsule", "cylinder", "plane", "convex", "terrain", "height_field"})
         scenes[kind] = "step: 1\nend: 1\nbodies: [{shapes: [{" + kind + ": {@}}]}]";
     for (const std::string kind : {"joint", "motor", "spring", "load"}) scenes[kind] = ball + kind + "s: [{@}]";
     scenes["mesh"] = "step: 1\nend: 1\nbodies: [{shapes: [{mesh: {@}}]}]";
@@ -88,6 +89,8 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["section"] = "step: 1\nend: 1\nbeams: [{section: {@}}]";
     scenes["step_bounds"] = "step: {@}";
     scenes["sleeping"] = "sleeping: {@}";
+    scenes["start"] = "start: {@}";
+    scenes["equilibrium"] = "start: {equilibrium: {@}}";
     scenes["tolerance"] = "tolerance: {@}";
     scenes["limits"] = "limits: {@}";
     scenes["bushing"] = ball + "bushings: [{@}]";

@@ -22,6 +22,7 @@ struct Action {
 /// Each adds its subcommand to the program; its callback sets action.run.
 void add_solve(CLI::App& program, Action& action);
 void add_run(CLI::App& program, Action& action);
+void add_equilibrium(CLI::App& program, Action& action);
 void add_view(CLI::App& program, Action& action);
 void add_plan(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);

@@ -62,6 +62,7 @@ int parse_and_run(int argc, char** argv) {
     Action action;
     add_solve(program, action);
     add_run(program, action);
+    add_equilibrium(program, action);
     add_view(program, action);
     add_plan(program, action);
     add_compare(program, action);

@@ -14,12 +14,16 @@ function bodyColour(system, body) {
   return new THREE.Color(palette[place % palette.length]).offsetHSL(0, 0, 0.05 * (body % 3));
 }
 
+const reachOfMesh = (_, shape) => shape.vertices.reduce((reach, vertex) => Math.max(reach, Math.hypot(...vertex)), 0);
+
 const reachOf = {
   sphere: ([r]) => r,
   box: (half) => Math.hypot(...half),
   capsule: ([r, h]) => r + h,
   cylinder: ([r, h]) => Math.hypot(r, h),
-  convex: (_, shape) => Math.max(...shape.vertices.map((vertex) => Math.hypot(...vertex))),
+  convex: reachOfMesh,
+  terrain: reachOfMesh,
+  height_field: reachOfMesh,
 };
 
 // Round shapes have sectors of two tones, so that their rotation is seen.
@@ -35,7 +39,7 @@ function withSectors(geometry) {
   return faces;
 }
 
-function convexGeometry(shape) {
+function meshGeometry(shape) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(shape.vertices.flat()), 3));
   geometry.setIndex(shape.triangles.flat());
@@ -53,7 +57,7 @@ function sharedGeometry(shape, place) {
     case "cylinder": return { key: "cylinder", scale: [a, a, b], make: () => withSectors(new THREE.CylinderGeometry(1, 1, 2, 32).rotateX(upright)) };
     case "capsule": return { key: `capsule ${(b / a).toPrecision(6)}`, scale: [a, a, a],
                              make: () => withSectors(new THREE.CapsuleGeometry(1, (2 * b) / a, 8, 32).rotateX(upright)) };
-    default: return { key: `convex ${place}`, scale: [1, 1, 1], make: () => convexGeometry(shape) };
+    default: return { key: `mesh ${place}`, scale: [1, 1, 1], make: () => meshGeometry(shape) };
   }
 }
 

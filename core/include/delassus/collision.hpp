@@ -24,26 +24,29 @@ struct Pose {
     Quaternion orientation{1.0, 0.0, 0.0, 0.0};
 };
 
-/// A closed surface of triangles, in the shape's own frame, m. Collision takes its convex hull.
+/// A surface of triangles, in the shape's own frame, m. That of a convex shape is closed, and collision takes its hull;
+/// that of a terrain may be open, and collides as it is.
 struct Mesh {
     std::vector<Vector3> vertices;
-    std::vector<std::array<std::int32_t, 3>> triangles;  ///< counter-clockwise from outside
+    std::vector<std::array<std::int32_t, 3>> triangles;  ///< counter-clockwise from outside, or from above
 };
 
 enum class ShapeKind {
-    Sphere,    ///< size = (radius, -, -)
-    Box,       ///< size = half of the edges
-    Capsule,   ///< along z; size = (radius, half length of the straight part, -)
-    Cylinder,  ///< along z; size = (radius, half length, -)
-    Plane,     ///< the half space z ≤ 0; size unused; of fixed bodies only
-    Convex     ///< mesh
+    Sphere,      ///< size = (radius, -, -)
+    Box,         ///< size = half of the edges
+    Capsule,     ///< along z; size = (radius, half length of the straight part, -)
+    Cylinder,    ///< along z; size = (radius, half length, -)
+    Plane,       ///< the half space z ≤ 0; size unused; of fixed bodies only
+    Convex,      ///< mesh
+    Terrain,     ///< mesh; of fixed bodies only. Pushes out what is behind it by less than that shape's own reach
+    HeightField  ///< mesh, the graph of z over x and y; of fixed bodies only. Solid all the way down
 };
 
 /// A shape on a body.
 struct Shape {
     ShapeKind kind = ShapeKind::Sphere;
     Vector3 size{0.0, 0.0, 0.0};       ///< m
-    std::shared_ptr<const Mesh> mesh;  ///< Convex only
+    std::shared_ptr<const Mesh> mesh;  ///< Convex, Terrain and HeightField only
     Pose pose;                         ///< of the shape in the frame of its body
     std::int32_t body = -1;            ///< index of its body, −1 for the world
     double margin = 0.0;  ///< m, the sphere-swept margin ε_m of seed section 5: the solid is the shape shrunk by

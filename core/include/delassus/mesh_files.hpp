@@ -36,4 +36,27 @@ struct TetrahedralMesh {
 /// Throws InputError "who: …" unless the triangles bound a solid: closed, counter-clockwise from outside, with volume.
 DELASSUS_API void check_closed_surface(const Mesh& mesh, const std::string& who);
 
+/// The surface of a terrain in a file, which may be open; otherwise as read_surface_mesh, all parts in one. Throws
+/// InputError, naming the file, as check_terrain does.
+[[nodiscard]] DELASSUS_API Mesh read_terrain(const std::filesystem::path& file, double scale = 1.0);
+
+/// Heights over a grid, row by row as on a map: the first row is that of the largest y, and x ascends in a row.
+struct Heights {
+    std::int32_t rows = 0, columns = 0;
+    std::vector<double> values;
+};
+
+/// Heights from a text with a row in each line (blanks or commas between numbers), or from a grey picture (PGM of 8 or
+/// 16 bits), where black is 0 and white is 1. Throws InputError, naming the file and the line.
+[[nodiscard]] DELASSUS_API Heights read_heights(const std::filesystem::path& file);
+
+/// The surface of a height field, its middle over the origin: size_x and size_y along x and y (m), scale (m) times the
+/// heights along z. Throws InputError for fewer than 2 × 2 heights, more than 4 million, or sizes that are not
+/// positive.
+[[nodiscard]] DELASSUS_API Mesh height_field(const Heights& heights, double size_x, double size_y, double scale = 1.0);
+
+/// Throws InputError "who: …" unless the triangles have areas and neighbours run along their edge in opposite
+/// directions.
+DELASSUS_API void check_terrain(const Mesh& mesh, const std::string& who);
+
 }  // namespace delassus

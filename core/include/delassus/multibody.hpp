@@ -292,6 +292,11 @@ public:
 
     [[nodiscard]] const Vector3& gravity() const;  ///< m/s²
 
+    /// Multiplies weight and loads from now on; 1 unless set. For load stepping; after finish().
+    void set_load_factor(double factor);
+    /// Replaces initial_state(); after assemble().
+    void set_start(const State& state);
+
     // ---- Reading states ----
     [[nodiscard]] std::int32_t body_count() const;
     [[nodiscard]] std::int32_t node_count() const;

@@ -44,6 +44,12 @@ struct SleepingRule {
     double time = 0.5;    ///< s, > 0
 };
 
+/// That a run begins in a static equilibrium (delassus/equilibrium.hpp).
+struct EquilibriumRule {
+    std::int32_t load_steps = 10;  ///< ≥ 1: parts in which weight and loads are raised
+    double tolerance = 1e-10;      ///< > 0: the last movement of the search, as a share of the whole way
+};
+
 /// What a run must not exceed; a step that does is a failure. Infinity: no limit.
 struct RunLimits {
     /// Growth of energy that nothing supplies, as a share of what can have moved (docs/running.md).
@@ -58,12 +64,13 @@ struct SceneSystem {
 
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
-    SolverConfig solver;                   ///< an empty name: `auto`
-    double step = 0.0;                     ///< s, > 0; with `control` the first that is tried
-    std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
-    std::optional<SleepingRule> sleeping;  ///< none: every body is awake
-    RunLimits limits;                      ///< what a run must not exceed
-    double end = 0.0;                      ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
+    SolverConfig solver;                         ///< an empty name: `auto`
+    double step = 0.0;                           ///< s, > 0; with `control` the first that is tried
+    std::optional<StepControl> control;          ///< steps follow from a tolerance; none: all are `step` long
+    std::optional<SleepingRule> sleeping;        ///< none: every body is awake
+    std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given
+    RunLimits limits;                            ///< what a run must not exceed
+    double end = 0.0;                            ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
 
     // The names that a plan and a report use.
     std::vector<BodyParameters> bodies;  ///< by BodyIndex

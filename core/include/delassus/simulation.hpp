@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "delassus/adaptive_stepping.hpp"
+#include "delassus/equilibrium.hpp"
 #include "delassus/export.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/scene.hpp"
@@ -131,7 +132,10 @@ public:
     [[nodiscard]] DELASSUS_API std::vector<std::string> warnings() const;
 
     [[nodiscard]] const Assembly& assembly() const { return assembly_; }
-    /// How assembly changed the start: one clause, or nothing where it did not beyond rounding.
+    /// The equilibrium in which it starts, or null.
+    [[nodiscard]] const Equilibrium* equilibrium() const { return equilibrium_.get(); }
+    /// How assembly and the search for an equilibrium changed the start: a clause, or nothing where they did not beyond
+    /// rounding.
     [[nodiscard]] DELASSUS_API std::string start() const;
 
     [[nodiscard]] DELASSUS_API SimulationState save() const;
@@ -155,6 +159,7 @@ private:
     std::unique_ptr<AdaptiveStepping> control_;  // empty with fixed steps
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     Assembly assembly_;
+    std::shared_ptr<const Equilibrium> equilibrium_;
     SimulationState now_;
     StepRecord record_;
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next

@@ -26,29 +26,6 @@ bool rotation_of(const Quaternion& orientation, Matrix3d& rotation) {
     return std::isfinite(norm) && norm > 0.0;
 }
 
-/// Half of the extent of a solid along the axes of the world.
-Vector3d half_extent(const Placed& placed) {
-    const Solid& solid = *placed.solid;
-    const Matrix3d magnitude = placed.rotation.cwiseAbs();
-    Vector3d half = Vector3d::Constant(solid.radius);
-    switch (solid.kind) {
-        case ShapeKind::Box:
-            return half + magnitude * solid.half;
-        case ShapeKind::Capsule:
-            return half + solid.half_length * magnitude.col(2);
-        case ShapeKind::Cylinder:
-            for (Eigen::Index i = 0; i < 3; ++i) {
-                const double cosine = std::min(1.0, magnitude(i, 2));
-                half[i] += solid.half_length * cosine + solid.cylinder_radius * std::sqrt(1.0 - cosine * cosine);
-            }
-            return half;
-        case ShapeKind::Convex:
-            return Vector3d::Constant(solid.reach);
-        default:
-            return half;
-    }
-}
-
 }  // namespace
 
 Detector::Detector(CollisionSetup setup)
@@ -70,6 +47,8 @@ Detector::Detector(CollisionSetup setup)
         rotation_of(shape.pose.orientation, local_rotations_[i]);
         if (shape.kind == ShapeKind::Plane) {
             planes_.push_back(i);
+        } else if (solids_[i].terrain) {
+            terrains_.push_back(i);
         } else {
             bounded_.push_back(i);
             slack_ += 0.1 * solids_[i].reach;
@@ -116,8 +95,8 @@ void Detector::place(std::span<const Pose> poses) {
     }
 }
 
-// Cost: linear in shapes, near pairs and points, but for the tree's logarithm where shapes left their boxes; planes are
-// tried against every shape.
+// Cost: linear in shapes, near pairs and points, but for the tree's logarithm where shapes left their boxes; planes and
+// terrains are tried against every shape.
 void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) {
     contacts.clear();
     if (!(envelope >= 0.0) || !std::isfinite(envelope))
@@ -137,19 +116,24 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         if ((balls_[a].center - balls_[b].center).squaredNorm() < far * far && boxes_[a].overlap(boxes_[b]))
             pairs_.emplace_back(bounded_[a], bounded_[b]);
     }
-    with_planes_.clear();
+    with_ground_.clear();
     for (const std::int32_t plane : planes_) {
         const Vector3d normal = placed_[plane].axis();
         for (const std::int32_t shape : bounded_) {
             const Placed& placed = placed_[shape];
             if (normal.dot(placed.position - placed_[plane].position) - placed.solid->reach >= envelope) continue;
-            if (may_touch(plane, shape)) with_planes_.emplace_back(std::min(plane, shape), std::max(plane, shape));
+            if (may_touch(plane, shape)) with_ground_.emplace_back(std::min(plane, shape), std::max(plane, shape));
         }
     }
-    if (!with_planes_.empty()) {
-        std::sort(with_planes_.begin(), with_planes_.end());
+    // A terrain looks for its triangles itself.
+    for (const std::int32_t terrain : terrains_)
+        for (const std::int32_t shape : bounded_)
+            if (may_touch(terrain, shape))
+                with_ground_.emplace_back(std::min(terrain, shape), std::max(terrain, shape));
+    if (!with_ground_.empty()) {
+        std::sort(with_ground_.begin(), with_ground_.end());
         merged_.clear();
-        std::merge(pairs_.begin(), pairs_.end(), with_planes_.begin(), with_planes_.end(), std::back_inserter(merged_));
+        std::merge(pairs_.begin(), pairs_.end(), with_ground_.begin(), with_ground_.end(), std::back_inserter(merged_));
         pairs_.swap(merged_);
     }
     for (const auto& [a, b] : pairs_) {

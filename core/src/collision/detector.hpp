@@ -21,8 +21,8 @@ private:
     std::vector<Matrix3d> local_rotations_;
     std::vector<Placed> placed_;
     std::vector<Matrix3d> body_rotations_;
-    std::vector<std::int32_t> bounded_;  ///< shapes that are not planes
-    std::vector<std::int32_t> planes_;
+    std::vector<std::int32_t> bounded_;  ///< shapes that are neither planes nor terrains
+    std::vector<std::int32_t> planes_, terrains_;
     std::vector<BroadPhase::Box> boxes_;  ///< of bounded_
     struct Ball {
         Vector3d center;
@@ -30,7 +30,7 @@ private:
     };
     std::vector<Ball> balls_;  ///< about bounded_: each holds its shape
     double slack_ = 0.0;       ///< a tenth of the mean reach, m
-    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_, with_planes_, merged_;
+    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_, with_ground_, merged_;
     BroadPhase broad_phase_;
     NarrowPhase narrow_phase_;
 };

@@ -293,6 +293,12 @@ void Manifold::between(Placed& a, Placed& b, const Vector3d& offset, const Separ
     reduce(points);
 }
 
+void Manifold::facing(const Placed& placed, const Vector3d& direction, std::vector<FacingPoint>& points) {
+    points.clear();
+    incident_polygon(placed, direction);
+    for (const Corner& corner : polygon_) points.push_back({corner.point, corner.vertex});
+}
+
 void Manifold::on_plane(Placed& other, const Vector3d& point, const Vector3d& normal, bool plane_is_a, double limit,
                         std::vector<CorePoint>& points) {
     points.clear();

@@ -9,6 +9,12 @@ namespace delassus::collision {
 /// A contact point between cores, relative to the position of a.
 using CorePoint = Separation;
 
+/// A point of a core that faces a direction, relative to its position, and the vertex that it is.
+struct FacingPoint {
+    Vector3d point;
+    std::int32_t vertex;
+};
+
 /// The most points of a pair.
 constexpr std::size_t kMostPoints = 8;
 
@@ -20,6 +26,8 @@ public:
     /// Against the plane through point (relative to other) with that normal.
     void on_plane(Placed& other, const Vector3d& point, const Vector3d& normal, bool plane_is_a, double limit,
                   std::vector<CorePoint>& points);
+    /// The corners of the face, edge or vertex of a core that faces a direction most; the core has been rotated.
+    void facing(const Placed& placed, const Vector3d& direction, std::vector<FacingPoint>& points);
 
 private:
     /// A corner and the edge that leaves it.

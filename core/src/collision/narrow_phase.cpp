@@ -53,6 +53,8 @@ bool simple(ShapeKind kind) {
 void NarrowPhase::collide(Placed& a, Placed& b, double envelope, std::vector<ContactPoint>& contacts) {
     const Vector3d offset = b.position - a.position;
     const ShapeKind kind_a = a.solid->kind, kind_b = b.solid->kind;
+    if (a.solid->terrain) return terrain_.collide(a, b, true, envelope, contacts);
+    if (b.solid->terrain) return terrain_.collide(b, a, false, envelope, contacts);
     const double limit = envelope + a.solid->radius + b.solid->radius;
     points_.clear();
     if (kind_a == ShapeKind::Plane) {

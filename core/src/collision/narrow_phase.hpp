@@ -2,6 +2,7 @@
 #pragma once
 
 #include "collision/manifold.hpp"
+#include "collision/terrain_contacts.hpp"
 
 namespace delassus::collision {
 
@@ -13,6 +14,7 @@ public:
 
 private:
     Manifold manifold_;
+    TerrainContacts terrain_;
     std::vector<CorePoint> points_;
 };
 

@@ -72,6 +72,11 @@ Solid make_solid(const Shape& shape, std::int32_t index) {
             break;
         case ShapeKind::Plane:
             break;
+        case ShapeKind::Terrain:
+        case ShapeKind::HeightField:
+            solid.radius = shape.margin;
+            solid.terrain = std::make_shared<const Terrain>(*shape.mesh);
+            break;
     }
     solid.reach = solid.core.reach() + solid.radius;
     return solid;
@@ -110,6 +115,28 @@ Vector3d Placed::support(const Vector3d& direction) const {
         }
     }
     return vertices[best];
+}
+
+Vector3d half_extent(const Placed& placed) {
+    const Solid& solid = *placed.solid;
+    const Matrix3d magnitude = placed.rotation.cwiseAbs();
+    Vector3d half = Vector3d::Constant(solid.radius);
+    switch (solid.kind) {
+        case ShapeKind::Box:
+            return half + magnitude * solid.half;
+        case ShapeKind::Capsule:
+            return half + solid.half_length * magnitude.col(2);
+        case ShapeKind::Cylinder:
+            for (Eigen::Index i = 0; i < 3; ++i) {
+                const double cosine = std::min(1.0, magnitude(i, 2));
+                half[i] += solid.half_length * cosine + solid.cylinder_radius * std::sqrt(1.0 - cosine * cosine);
+            }
+            return half;
+        case ShapeKind::Convex:
+            return Vector3d::Constant(solid.reach);
+        default:
+            return half;
+    }
 }
 
 }  // namespace delassus::collision

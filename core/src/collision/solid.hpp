@@ -3,7 +3,10 @@
 // are at s − r_a − r_b along the same n (Minkowski sums with balls, seed section 5), in penetration too.
 #pragma once
 
+#include <memory>
+
 #include "collision/polytope.hpp"
+#include "collision/terrain.hpp"
 #include "delassus/collision.hpp"
 
 namespace delassus::collision {
@@ -18,8 +21,9 @@ struct Solid {
     double cylinder_radius = 0.0;      ///< of the core of a cylinder, else 0, m
     double half_length = 0.0;          ///< of the core of a cylinder or capsule, m
     Vector3d half = Vector3d::Zero();  ///< of the core of a box, m
-    Polytope core;       ///< exact but for a cylinder, whose prism here only starts a search; empty for a plane
-    double reach = 0.0;  ///< radius of a ball about the shape's origin that holds core and sweep, m
+    Polytope core;  ///< exact but for a cylinder, whose prism here only starts a search; empty for a plane
+    std::shared_ptr<const Terrain> terrain;  ///< of a terrain and a height field, which have no core
+    double reach = 0.0;                      ///< radius of a ball about the shape's origin that holds core and sweep, m
 };
 
 /// Throws InputError for a margin that leaves no core, or a mesh without volume; name is for its message.
@@ -41,5 +45,8 @@ struct Placed {
     [[nodiscard]] Vector3d axis() const { return rotation.col(2); }
     [[nodiscard]] bool is_cylinder() const { return solid->kind == ShapeKind::Cylinder; }
 };
+
+/// Half of the extent of a solid along the axes of the frame that it is placed in; not of planes and terrains.
+[[nodiscard]] Vector3d half_extent(const Placed& placed);
 
 }  // namespace delassus::collision

@@ -18,12 +18,14 @@ struct KindRow {
     std::size_t sizes;  ///< how many entries of size are used
 };
 
-constexpr std::array<KindRow, 6> kKinds{{{ShapeKind::Sphere, "sphere", 1},
+constexpr std::array<KindRow, 8> kKinds{{{ShapeKind::Sphere, "sphere", 1},
                                          {ShapeKind::Box, "box", 3},
                                          {ShapeKind::Capsule, "capsule", 2},
                                          {ShapeKind::Cylinder, "cylinder", 2},
                                          {ShapeKind::Plane, "plane", 0},
-                                         {ShapeKind::Convex, "convex", 0}}};
+                                         {ShapeKind::Convex, "convex", 0},
+                                         {ShapeKind::Terrain, "terrain", 0},
+                                         {ShapeKind::HeightField, "height field", 0}}};
 
 bool finite(std::span<const double> values) {
     return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
@@ -59,6 +61,15 @@ void check_shape(const Shape& shape, const std::string& who, const KindRow& row,
     if (shape.kind == ShapeKind::Plane && shape.body >= 0 && !setup.fixed[shape.body]) {
         throw InputError(fmt::format(
             "{}: body {} moves; planes are for fixed bodies and the world only; use a box here.", who, shape.body));
+    }
+    if (shape.kind == ShapeKind::Terrain || shape.kind == ShapeKind::HeightField) {
+        if (shape.body >= 0 && !setup.fixed[shape.body]) {
+            throw InputError(fmt::format(
+                "{}: body {} moves; terrain is for fixed bodies and the world only; use convex shapes here.", who,
+                shape.body));
+        }
+        if (shape.mesh == nullptr) throw InputError(fmt::format("{}: it has no mesh.", who));
+        check_terrain(*shape.mesh, who);
     }
     if (shape.kind == ShapeKind::Convex) {
         if (shape.mesh == nullptr || shape.mesh->triangles.empty())

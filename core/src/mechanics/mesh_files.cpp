@@ -145,6 +145,12 @@ std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double sc
     return parts;
 }
 
+Mesh read_terrain(const std::filesystem::path& file, double scale) {
+    Mesh mesh = read_triangles(file, scale);
+    check_terrain(mesh, file.string());
+    return mesh;
+}
+
 TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale, int refinements) {
     if (refinements < 0 || refinements > 6)
         throw InputError(fmt::format("the number of refinements of a mesh is {}; it must be from 0 to 6", refinements));

@@ -369,6 +369,16 @@ std::int32_t MultibodySystem::body_column(BodyIndex index) const {
     return implementation_->bodies[static_cast<std::size_t>(index)].column;
 }
 
+void MultibodySystem::set_load_factor(double factor) {
+    implementation_->must_be_finished();
+    implementation_->load_factor = factor;
+}
+
+void MultibodySystem::set_start(const State& state) {
+    implementation_->must_be_finished();
+    implementation_->assembled = state;
+}
+
 const Vector3& MultibodySystem::gravity() const {
     return implementation_->gravity;
 }
@@ -531,7 +541,7 @@ std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
 double MultibodySystem::energy(const State& state) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), state.v.data());
-    const Vector3d gravity = vector(self.gravity);
+    const Vector3d gravity = self.load_factor * vector(self.gravity);
     double energy = kinetic_energy(state);
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
         if (self.bodies[k].column >= 0)

@@ -10,10 +10,12 @@ using mechanics::vector;
 
 namespace {
 
-/// Half of the smallest extent of a shape; 0 for a plane, which has none.
+/// Half of the smallest extent of a shape; 0 for planes and terrains, which have none.
 double size_of(const Shape& shape) {
     switch (shape.kind) {
         case ShapeKind::Plane:
+        case ShapeKind::Terrain:
+        case ShapeKind::HeightField:
             return 0.0;
         case ShapeKind::Box:
             return std::min({shape.size[0], shape.size[1], shape.size[2]});

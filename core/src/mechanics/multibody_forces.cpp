@@ -78,7 +78,7 @@ void MultibodySystem::multiply_mass(const State&, double factor, const double* x
 void MultibodySystem::add_force(const State& state, double factor, double* result) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), state.v.data());
-    const Vector3d gravity = vector(self.gravity);
+    const Vector3d gravity = self.load_factor * vector(self.gravity);
     for (const auto& body : self.moving) {
         const Vector3d& omega = self.at[body.body].omega;
         Eigen::Map<Vector3d>(result + body.column) += factor * body.mass * gravity;
@@ -111,8 +111,8 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
     for (const auto& load : self.loads) {
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
-        const Vector3d force = at_time(load.parameters.force, state.t);
-        const Vector3d torque = place.A.transpose() * at_time(load.parameters.torque, state.t);
+        const Vector3d force = self.load_factor * at_time(load.parameters.force, state.t);
+        const Vector3d torque = self.load_factor * (place.A.transpose() * at_time(load.parameters.torque, state.t));
         Eigen::Map<Vector3d>(result + place.column) += factor * force;
         Eigen::Map<Vector3d>(result + place.column + 3) +=
             factor * (load.point.cross(place.A.transpose() * force) + torque);
@@ -150,8 +150,8 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         if (place.column < 0) continue;
         const Vector3d force = place.A.transpose() * at_time(load.parameters.force, state.t);
         const Vector3d torque = place.A.transpose() * at_time(load.parameters.torque, state.t);
-        add_matrix(place.column + 3, place.column + 3, -skew(load.point) * skew(force) - skew(torque), factor, tangent,
-                   H);
+        add_matrix(place.column + 3, place.column + 3, -skew(load.point) * skew(force) - skew(torque),
+                   factor * self.load_factor, tangent, H);
     }
 }
 

@@ -47,8 +47,9 @@ struct MultibodySystem::Implementation {
     std::vector<std::int32_t> first_kept_rows;  // those of assemble()
     std::vector<mechanics::Linkage> redundant;  // those with rows that are left out
     std::vector<mechanics::MovingBody> moving;
-    bool gyroscopic = false;  // a moving body whose moments differ
-    double size = 0.0;        // the median of the shapes that collide
+    bool gyroscopic = false;   // a moving body whose moments differ
+    double load_factor = 1.0;  // of weight and loads
+    double size = 0.0;         // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
     bool leaves_out = true;  ///< what no contact needs
 

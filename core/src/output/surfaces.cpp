@@ -72,6 +72,8 @@ Mesh in_own_frame(const Shape& shape, double plane_size) {
         case ShapeKind::Cylinder:
             return revolved({{0.0, -b}, {a, -b}, {a, b}, {0.0, b}});
         case ShapeKind::Convex:
+        case ShapeKind::Terrain:
+        case ShapeKind::HeightField:
             return *shape.mesh;
         case ShapeKind::Plane:
             break;

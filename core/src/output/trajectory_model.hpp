@@ -14,8 +14,13 @@
 namespace delassus {
 
 /// The names of ShapeKind's values, in their order.
-inline constexpr std::array<std::string_view, 6> shape_names = {"sphere",   "box",   "capsule",
-                                                                "cylinder", "plane", "convex"};
+inline constexpr std::array<std::string_view, 8> shape_names = {"sphere", "box",    "capsule", "cylinder",
+                                                                "plane",  "convex", "terrain", "height_field"};
+
+/// Whether a shape of the kind is its mesh.
+constexpr bool is_mesh(ShapeKind kind) {
+    return kind == ShapeKind::Convex || kind == ShapeKind::Terrain || kind == ShapeKind::HeightField;
+}
 
 /// A joint, a spring or a bushing: what holds two bodies together, at a point of each.
 struct TrajectoryLink {

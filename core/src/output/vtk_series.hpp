@@ -48,7 +48,7 @@ struct VtkCollectionPart {
 };
 
 /// The .pvd: folder is that of the .vtp files, relative to the collection's.
-void write_vtk_collection(const std::filesystem::path& file, const std::string& folder,
-                          const std::vector<VtkCollectionPart>& parts);
+DELASSUS_API void write_vtk_collection(const std::filesystem::path& file, const std::string& folder,
+                                       const std::vector<VtkCollectionPart>& parts);
 
 }  // namespace delassus

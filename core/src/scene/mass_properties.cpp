@@ -74,6 +74,9 @@ Moments moments_of(const Shape& shape) {
             return closed_surface(*shape.mesh);
         case ShapeKind::Plane:
             break;
+        case ShapeKind::Terrain:
+        case ShapeKind::HeightField:
+            throw InputError("terrain has no volume, so mass and inertia cannot follow from it");
     }
     throw InputError("a plane has no volume, so mass and inertia cannot follow from it");
 }

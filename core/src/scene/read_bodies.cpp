@@ -101,6 +101,68 @@ Shape SystemReader::read_shape_kind(const YAML::Node& item, std::string_view kin
     return shape;
 }
 
+Shape SystemReader::read_terrain_shape(const YAML::Node& node) {
+    std::string file;
+    double scale = 1.0;
+    if (node.IsScalar()) {
+        file = node.Scalar();
+    } else {
+        read_map(source_, node, "\"terrain\"",
+                 {{"file", [&](const YAML::Node& n) { file = scalar(source_, n, "file"); }},
+                  {"scale", [&](const YAML::Node& n) { scale = positive_number(source_, n, "scale"); }}});
+    }
+    if (file.empty()) source_.refuse(node, "\"terrain\" lacks the key \"file\"");
+    result_.surfaces_read = true;
+    Shape shape;
+    shape.kind = ShapeKind::Terrain;
+    shape.mesh = at(node, [&] { return std::make_shared<const Mesh>(read_terrain(source_.folder() / file, scale)); });
+    return shape;
+}
+
+Shape SystemReader::read_height_field(const YAML::Node& node) {
+    std::optional<Heights> heights;
+    std::optional<std::array<double, 2>> size;
+    double scale = 1.0;
+    const auto only_once = [&](const YAML::Node& n) {
+        if (heights) source_.refuse(n, "a height field has either \"heights\" or \"file\", not both");
+    };
+    read_map(source_, node, "\"height_field\"",
+             {{"heights",
+               [&](const YAML::Node& n) {
+                   only_once(n);
+                   heights.emplace();
+                   for (const YAML::Node& row : elements(source_, n, "heights")) {
+                       const auto values = elements(source_, row, "heights");
+                       if (heights->rows > 0 && static_cast<std::int32_t>(values.size()) != heights->columns)
+                           source_.refuse(row, fmt::format("the row has {} heights, those before it {}", values.size(),
+                                                           heights->columns));
+                       heights->columns = static_cast<std::int32_t>(values.size());
+                       ++heights->rows;
+                       for (const YAML::Node& value : values)
+                           heights->values.push_back(finite_number(source_, value, "heights"));
+                   }
+               }},
+              {"file",
+               [&](const YAML::Node& n) {
+                   only_once(n);
+                   heights = at(n, [&] { return read_heights(source_.folder() / scalar(source_, n, "file")); });
+               }},
+              {"size",
+               [&](const YAML::Node& n) {
+                   const auto values = elements(source_, n, "size");
+                   if (values.size() != 2) source_.refuse(n, "\"size\" must be two numbers, along x and y");
+                   size = {positive_number(source_, values[0], "size"), positive_number(source_, values[1], "size")};
+               }},
+              {"scale", [&](const YAML::Node& n) { scale = finite_number(source_, n, "scale"); }}});
+    if (!heights) source_.refuse(node, "\"height_field\" lacks the key \"heights\" (or \"file\")");
+    if (!size) source_.refuse(node, "\"height_field\" lacks the key \"size\"");
+    Shape shape;
+    shape.kind = ShapeKind::HeightField;
+    shape.mesh =
+        at(node, [&] { return std::make_shared<const Mesh>(height_field(*heights, (*size)[0], (*size)[1], scale)); });
+    return shape;
+}
+
 std::vector<Shape> SystemReader::read_mesh_shapes(const YAML::Node& node) {
     std::string file;
     double scale = 1.0;
@@ -153,14 +215,23 @@ std::vector<SystemReader::ShapeOfBody> SystemReader::read_shapes(const YAML::Nod
                 if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
                 kind = {read_shape_kind(item, name, n)};
             });
+        handlers.emplace_back("terrain", [&](const YAML::Node& n) {
+            if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
+            kind = {read_terrain_shape(n)};
+        });
+        handlers.emplace_back("height_field", [&](const YAML::Node& n) {
+            if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
+            kind = {read_height_field(n)};
+        });
         handlers.emplace_back("mesh", [&](const YAML::Node& n) {
             if (!kind.empty()) source_.refuse(n, "a shape is of one kind, not of several");
             kind = read_mesh_shapes(n);
         });
         read_map(source_, item, "a shape", handlers);
         if (kind.empty())
-            source_.refuse(item, fmt::format("a shape must have one of the keys \"{}\", \"mesh\"",
-                                             fmt::join(shape_kinds, "\", \"")));
+            source_.refuse(
+                item, fmt::format("a shape must have one of the keys \"{}\", \"mesh\", \"terrain\", \"height_field\"",
+                                  fmt::join(shape_kinds, "\", \"")));
         for (const Shape& part : kind) {
             one.shape = part;
             one.shape.pose = pose;

@@ -20,6 +20,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"tolerance", [this](const YAML::Node& n) { read_tolerance(n); }},
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"sleeping", [this](const YAML::Node& n) { read_sleeping(n); }},
+        {"start", [this](const YAML::Node& n) { read_start(n); }},
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
         {"leave_out",
@@ -121,6 +122,34 @@ void SystemReader::read_sleeping(const YAML::Node& node) {
     read_map(source_, node, "\"sleeping\"",
              {{"speed", [&](const YAML::Node& n) { rule.speed = positive_number(source_, n, "speed"); }},
               {"time", [&](const YAML::Node& n) { rule.time = positive_number(source_, n, "time"); }}});
+}
+
+// start: equilibrium, or start: {equilibrium: {load_steps, tolerance}}
+void SystemReader::read_start(const YAML::Node& node) {
+    if (node.IsScalar()) {
+        if (node.Scalar() != "equilibrium")
+            source_.refuse(node, fmt::format("\"start\" is \"{}\"; it must be equilibrium, or left out for a start as "
+                                             "given",
+                                             node.Scalar()));
+        result_.equilibrium.emplace();
+        return;
+    }
+    read_map(source_, node, "\"start\"",
+             {{"equilibrium", [&](const YAML::Node& inner) {
+                   EquilibriumRule& rule = result_.equilibrium.emplace();
+                   read_map(source_, inner, "\"equilibrium\"",
+                            {{"load_steps",
+                              [&](const YAML::Node& n) {
+                                  rule.load_steps = value<std::int32_t>(source_, n, "load_steps", "a whole number");
+                                  if (rule.load_steps < 1 || rule.load_steps > 100000)
+                                      source_.refuse(n, fmt::format("\"load_steps\" is {}; it must be from 1 to 100000",
+                                                                    rule.load_steps));
+                              }},
+                             {"tolerance", [&](const YAML::Node& n) {
+                                  rule.tolerance = positive_number(source_, n, "tolerance");
+                              }}});
+               }}});
+    if (!result_.equilibrium) source_.refuse(node, "\"start\" lacks the key \"equilibrium\"");
 }
 
 // limits: {energy_growth: 1, drift: null}

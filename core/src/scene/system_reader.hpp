@@ -31,6 +31,7 @@ private:
     void read_step(const YAML::Node& node);
     void read_tolerance(const YAML::Node& node);
     void read_sleeping(const YAML::Node& node);
+    void read_start(const YAML::Node& node);
     void read_limits(const YAML::Node& node);
     /// One step for all, or the control of steps.
     void build_step(const YAML::Node& place);
@@ -60,6 +61,8 @@ private:
     std::vector<ShapeOfBody> read_shapes(const YAML::Node& node);
     /// A file's surface as convex shapes, one for each part.
     std::vector<Shape> read_mesh_shapes(const YAML::Node& node);
+    Shape read_terrain_shape(const YAML::Node& node);
+    Shape read_height_field(const YAML::Node& node);
     /// Keys that elastic blocks and meshes share.
     template <class Parameters>
     std::vector<std::pair<std::string_view, Handler>> elastic_handlers(Parameters& body);

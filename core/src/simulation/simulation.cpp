@@ -91,6 +91,10 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     } catch (const Unsupported& error) {
         throw Unsupported(fmt::format("system \"{}\": {}", system.name, error.what()));
     }
+    if (system.equilibrium) {
+        equilibrium_ = std::make_shared<const Equilibrium>(find_equilibrium(system, registry));
+        system.system->set_start(equilibrium_->state);
+    }
     now_.state = system.system->initial_state();
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
@@ -291,6 +295,11 @@ std::vector<std::string> Simulation::warnings() const {
             fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
                         "moved, though nothing supplies any: the steps are long for {}",
                         system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    if (equilibrium_ && equilibrium_->smallest_eigenvalue < 0.0)
+        sentences.push_back(fmt::format(
+            "system \"{}\": the equilibrium in which the run begins is unstable (smallest eigenvalue {:.3g} "
+            "rad²/s²)",
+            system_->name, equilibrium_->smallest_eigenvalue));
     if (std::max(assembly_.position_share, assembly_.velocity_share) > large_assembly)
         sentences.push_back(
             fmt::format("system \"{}\": the start does not fit the joints and motors and was changed: {}",
@@ -301,8 +310,14 @@ std::vector<std::string> Simulation::warnings() const {
 std::string Simulation::start() const {
     /// Below this share of size and speed, nobody needs to know.
     constexpr double rounding_of_assembly = 1e-9;
-    if (std::max(assembly_.position_share, assembly_.velocity_share_of_all) <= rounding_of_assembly) return {};
-    return describe(assembly_);
+    const bool moved = std::max(assembly_.position_share, assembly_.velocity_share_of_all) > rounding_of_assembly;
+    std::string clause = moved ? describe(assembly_) : std::string();
+    if (equilibrium_) {
+        const LoadStep& last = equilibrium_->load_steps.back();
+        clause += fmt::format("{}static equilibrium after {} load steps, unbalanced force {:.1e}", moved ? "; " : "",
+                              equilibrium_->load_steps.size(), last.residual);
+    }
+    return clause;
 }
 
 SimulationState Simulation::save() const {

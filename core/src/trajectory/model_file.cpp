@@ -49,11 +49,14 @@ void write_shapes(hid_t model, const std::vector<Shape>& shapes, const std::stri
              file);
     put_rows(id, {"pose", "m, 1", "of the shape in its body's frame: position and quaternion w x y z"}, poses, {7},
              file);
-    put_rows(id, {"vertex_end", "1", "of convex shapes: where their vertices end"}, vertex_end, {}, file);
-    put_rows(id, {"triangle_end", "1", "of convex shapes: where their triangles end"}, triangle_end, {}, file);
-    put_rows(id, {"vertices", "m", "of convex shapes, in the shape's frame"}, vertices, {3}, file);
-    put_rows(id, {"triangles", "1", "of convex shapes: vertices of the same shape, counter-clockwise from outside"},
-             triangles, {3}, file);
+    put_rows(id, {"vertex_end", "1", "of convex shapes and terrains: where their vertices end"}, vertex_end, {}, file);
+    put_rows(id, {"triangle_end", "1", "of convex shapes and terrains: where their triangles end"}, triangle_end, {},
+             file);
+    put_rows(id, {"vertices", "m", "of convex shapes and terrains, in the shape's frame"}, vertices, {3}, file);
+    put_rows(
+        id,
+        {"triangles", "1", "of convex shapes and terrains: vertices of the same shape, counter-clockwise from outside"},
+        triangles, {3}, file);
 }
 
 void write_links(hid_t model, const std::vector<TrajectoryLink>& links, const std::string& file) {
@@ -148,7 +151,7 @@ std::vector<Shape> read_shapes(const Group& model, std::int64_t body_count) {
         std::copy_n(poses[i].begin(), 3, shape.pose.position.begin());
         std::copy_n(poses[i].begin() + 3, 4, shape.pose.orientation.begin());
         if (vertex_end[i] < vertex || triangle_end[i] < triangle) in.refuse("/vertex_end or /triangle_end descends");
-        if (shape.kind == ShapeKind::Convex) {
+        if (is_mesh(shape.kind)) {
             Mesh mesh{{vertices.begin() + vertex, vertices.begin() + vertex_end[i]},
                       {triangles.begin() + triangle, triangles.begin() + triangle_end[i]}};
             for (const auto& corners : mesh.triangles)

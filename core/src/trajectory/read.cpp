@@ -173,7 +173,7 @@ void transfer(Message& message, Shape& shape) {
     Mesh mesh = shape.mesh ? *shape.mesh : Mesh{};
     message(mesh.vertices);
     message(mesh.triangles);
-    if (shape.kind == ShapeKind::Convex) shape.mesh = std::make_shared<const Mesh>(std::move(mesh));
+    if (is_mesh(shape.kind)) shape.mesh = std::make_shared<const Mesh>(std::move(mesh));
     message(shape.pose);
     message(shape.body);
 }
