@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "delassus/sdk/blas_threads.hpp"
 #include "delassus/sdk/saddle_point.hpp"
 #include "errors.hpp"
 
@@ -31,6 +32,8 @@ Factorization::~Factorization() {
 
 void Factorization::run(int job) {
     const std::lock_guard lock(library());
+    // The analysis foresees the work of a factorisation; a solve is small beside it.
+    const sdk::BlasThreads threads(job == 2 ? data_.rinfog[0] : 0.0);
     data_.job = job;
     dmumps_c(&data_);
 }

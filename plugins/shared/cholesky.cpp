@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "delassus/sdk/blas_threads.hpp"
 #include "delassus/sdk/h_inverse.hpp"
 
 namespace delassus_cholmod {
@@ -90,6 +91,7 @@ bool Cholesky::factorize(const SparseColumns& A, double shift) {
     if (A.rows() == 0) return true;
     cholmod_sparse sparse = view(A);
     double beta[2] = {shift, 0.0};
+    const delassus::sdk::BlasThreads threads(flops_);
     cholmod_factorize_p(&sparse, beta, nullptr, 0, factor_, &common_);
     if (common_.status < CHOLMOD_OK) fail("numerical factorisation", common_);
     if (common_.status == CHOLMOD_NOT_POSDEF || factor_->minor < factor_->n) return false;
@@ -105,6 +107,7 @@ void Cholesky::solve(Vector& v) const {
     right.x = v.data();
     right.xtype = CHOLMOD_REAL;
     right.dtype = CHOLMOD_DOUBLE;
+    const delassus::sdk::BlasThreads threads(4.0 * entries_);
     if (!cholmod_solve2(CHOLMOD_A, factor_, &right, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_))
         fail("solve", common_);
     std::copy_n(static_cast<const double*>(solution_->x), v.size(), v.data());

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "delassus/sdk/blas_threads.hpp"
 #include "delassus/sdk/h_inverse.hpp"
 
 namespace delassus::ssn {
@@ -61,12 +62,15 @@ bool Factor::factorize_unsymmetric() {
         return status == UMFPACK_OK;
     };
     if (!symbolic_) {
+        std::array<double, UMFPACK_INFO> info;
         if (!check(umfpack_di_symbolic(size, size, A_->outerIndexPtr(), A_->innerIndexPtr(), A_->valuePtr(), &symbolic_,
-                                       control.data(), nullptr)))
+                                       control.data(), info.data())))
             return false;
+        flops_ = info[UMFPACK_FLOPS_ESTIMATE];
         ++analyses_;
     }
     free_numeric();
+    const sdk::BlasThreads threads(flops_);
     return check(umfpack_di_numeric(A_->outerIndexPtr(), A_->innerIndexPtr(), A_->valuePtr(), symbolic_, &numeric_,
                                     control.data(), nullptr));
 }

@@ -50,6 +50,7 @@ private:
     std::unique_ptr<delassus_cholmod::Cholesky> cholesky_;
     void* symbolic_ = nullptr;  // UMFPACK's
     void* numeric_ = nullptr;
+    double flops_ = 0.0;  // of UMFPACK's factorisation, an upper bound
     Vector work_;
     std::int64_t analyses_ = 0;
 };

@@ -15,6 +15,9 @@
 
 namespace delassus {
 
+/// The friction law of scenes that name none.
+inline constexpr Law law_of_scenes = Law::Associated;
+
 /// The chosen solver and its limits. An absent value keeps the default of SolveSettings, or the problem's own law.
 struct SolverConfig {
     std::string name;     ///< a plugin's name, "auto", or the path of a shared library; empty if not given

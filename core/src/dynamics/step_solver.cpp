@@ -280,7 +280,7 @@ std::string StepSolver::choice(std::uint64_t needs) const {
 }
 
 Law StepSolver::law() const {
-    return implementation_->config.law.value_or(Law::Associated);
+    return implementation_->config.law.value_or(law_of_scenes);
 }
 
 const SolverEffort& StepSolver::effort() const {

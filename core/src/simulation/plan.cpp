@@ -239,7 +239,7 @@ private:
             }
         }
         if (friction) {
-            const Law law = system_.solver.law.value_or(Law::Associated);
+            const Law law = system_.solver.law.value_or(law_of_scenes);
             needs_ |= DELASSUS_CAN_FRICTION | (law == Law::Coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED);
         } else {
             leave("friction cones",
