@@ -90,6 +90,8 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["sleeping"] = "sleeping: {@}";
     scenes["tolerance"] = "tolerance: {@}";
     scenes["limits"] = "limits: {@}";
+    scenes["joint_spring"] = ball + "joints: [{spring: {@}}]";
+    scenes["coordinate"] = ball + "joints: [{slide: {@}}]";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;
 }

@@ -36,7 +36,7 @@ struct State {
 /// How tangent matrices are formed. Newton's residual is exact with either; cone problems need the symmetric one.
 enum class Tangent {
     Exact,     ///< the derivative; unsymmetric where forces are gyroscopic or follow the body
-    Symmetric  ///< its symmetric part, ½(A + Aᵀ)
+    Symmetric  ///< its symmetric part, ½(A + Aᵀ), or less of it where that could make H indefinite
 };
 
 /// A 3 × 3 block on the diagonal of an n × n matrix that is the identity elsewhere.

@@ -79,6 +79,15 @@ struct Motion {
     DELASSUS_API static Motion sine(double amplitude, double frequency, double phase = 0.0, double offset = 0.0);
 };
 
+/// What acts in a coordinate of a joint beside its reactions: a linear spring and damper, and dry friction that holds
+/// the coordinate still as long as a force within its bound can. Coordinates are 0 at t = 0. All ≥ 0 but `rest`.
+struct CoordinateForces {
+    double damping = 0.0;    ///< N s/m along an axis, N m s/rad about one
+    double stiffness = 0.0;  ///< N/m or N m/rad
+    double rest = 0.0;       ///< the coordinate at which the spring is at rest, m or rad; turns are counted
+    double friction = 0.0;   ///< N or N m
+};
+
 /// A joint holds from the initial configuration on: its frames are given once, in the world frame at t = 0.
 struct JointParameters {
     std::string name;
@@ -92,6 +101,9 @@ struct JointParameters {
     double gear_ratio = 1.0;  ///< angle of the second = ratio · angle of the first; a fraction with terms below 1000
     /// Limits of the coordinate of a revolute (rad, in (−π, π)) or prismatic (m) joint; not a number: none.
     double lower, upper;
+    CoordinateForces slide;  ///< along the axis; Prismatic and Cylindrical
+    CoordinateForces turn;   ///< about the axis; Revolute and Cylindrical; Spherical and Universal: damping alone, of
+                             ///< the relative angular velocity
     DELASSUS_API JointParameters();
 };
 
@@ -337,6 +349,15 @@ public:
     bool renew_rows(State& state, std::int64_t step);
     /// C of all rows, kept or not; constraint_rows().
     void all_constraints(const State& state, double* C) const;
+    // ---- Whole turns of joints with a spring or an actuator: an orientation does not tell them ----
+    /// The whole turns at a state that is within half a turn of the last one that was followed; one for each such
+    /// joint.
+    [[nodiscard]] std::vector<double> turns(const State& state) const;
+    /// Sets the turns at this state; none given: all are 0.
+    void set_turns(const State& state, const std::vector<double>& turns);
+    /// Counts turns on to this state. Whoever takes steps calls it after each that is kept.
+    void follow(const State& state);
+
     /// λ of all rows from that of those that are kept: 0 in the others.
     [[nodiscard]] std::vector<double> all_multipliers(const std::vector<double>& kept) const;
     /// Names of the joints that have rows that are left out, ascending by joint.

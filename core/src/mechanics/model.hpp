@@ -65,10 +65,46 @@ struct BoundedMotor {
     double limit = 0.0;
 };
 
-/// Potential ½ k C² and damping force −c Ċ ∇C of a row.
-struct RowSpring {
-    Row row;
+/// Dry friction in a coordinate of a joint: a box row on its speed.
+struct JointFriction {
+    std::int32_t joint = -1;
+    bool turns = false;  ///< the coordinate is the angle, else the slide
+    double limit = 0.0;
+};
+
+/// The angle θ of a joint over whole turns as a coordinate with the members of a Row: C = θ − offset − drive(t). Its
+/// derivatives are those where the joint holds.
+struct Turn {
+    Angle angle;
+    double offset = 0.0;
+    const Motion* drive = nullptr;
+    const double* reference = nullptr;  ///< the angle lately: the nearest value modulo 2π counts
+
+    /// θ, from where it was lately.
+    static double nearest(double angle, double reference) {
+        return angle + 2.0 * M_PI * std::round((reference - angle) / (2.0 * M_PI));
+    }
+    [[nodiscard]] RowColumns columns(const Placements& at, bool with_prescribed = false) const;
+    [[nodiscard]] double value(const Placements& at, double t) const;
+    void gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const;
+    void hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const;
+};
+
+/// The force −(k C + c Ċ) ∇C of a coordinate C, a Row or a Turn.
+template <class Coordinate>
+struct CoordinateSpring {
+    Coordinate row;
     double stiffness = 0.0, damping = 0.0;
+    bool potential = true;  ///< ½ k C² counts as energy; that of an actuator does not
+    bool definite = false;  ///< its symmetric tangent is positive semidefinite: k ∇C ∇Cᵀ
+};
+using RowSpring = CoordinateSpring<Row>;
+using TurnSpring = CoordinateSpring<Turn>;
+
+/// The torque −c (ω_second − ω_first) on the second body and its opposite on the first.
+struct TurnDamper {
+    BodyIndex first = world_body, second = world_body;
+    double damping = 0.0;
 };
 
 struct Load {

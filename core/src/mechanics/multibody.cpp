@@ -125,9 +125,12 @@ std::int32_t MultibodySystem::add_joint(const JointParameters& parameters) {
     refuse_unless(
         !(parameters.lower > parameters.upper), "the limits of the joint", name,
         fmt::format("are {} and {}; the lower must not exceed the upper", parameters.lower, parameters.upper));
+    mechanics::check_joint_forces(parameters);
     self.joints.push_back(mechanics::make_joint(parameters, self.initial_placements(), self.joints));
     if (parameters.kind != JointKind::Gear) keep_apart(parameters.first, parameters.second);
-    return static_cast<std::int32_t>(self.joints.size()) - 1;
+    const auto index = static_cast<std::int32_t>(self.joints.size()) - 1;
+    self.add_joint_forces(index);
+    return index;
 }
 
 void MultibodySystem::add_motor(const MotorParameters& motor) {
@@ -540,10 +543,11 @@ double MultibodySystem::energy(const State& state) const {
         if (node.column >= 0)
             energy -= node.parameters.mass * gravity.dot(Eigen::Map<const Vector3d>(state.q.data() + node.position));
     self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
-    for (const auto& spring : self.springs) {
+    self.for_each_spring([&](const auto& spring) {
+        if (!spring.potential) return;
         const double stretch = spring.row.value(self.at, state.t);
         energy += 0.5 * spring.stiffness * stretch * stretch;
-    }
+    });
     return energy;
 }
 

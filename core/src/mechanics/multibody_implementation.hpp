@@ -18,6 +18,14 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::Node> nodes;
     std::vector<mechanics::Joint> joints;
     std::vector<mechanics::RowSpring> springs;
+    std::vector<mechanics::TurnSpring> turn_springs;
+    std::vector<mechanics::TurnDamper> turn_dampers;
+    std::vector<mechanics::JointFriction> frictions;
+    struct CountedAngle {
+        std::int32_t joint = -1;
+        std::unique_ptr<double> reference;  ///< its address lasts
+    };
+    std::vector<CountedAngle> counted;
     std::vector<mechanics::Load> loads;
     std::vector<mechanics::Tetrahedron> tetrahedra;
     std::vector<mechanics::Cable> cables;
@@ -67,6 +75,21 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] mechanics::Placements initial_placements() const;
     /// Placements of a state; v may be null for what needs positions alone.
     void place(const double* q, const double* v) const;
+    void place(const State& state) const { place(state.q.data(), state.v.data()); }
+
+    /// Where the angle of a joint counts its turns from.
+    const double* count_turns_of(std::int32_t joint);
+    /// −k (C − target(t)) − c (Ċ − target˙(t)), C being the coordinate less `rest`; target may be null.
+    void add_coordinate_spring(std::int32_t joint, bool turns, double stiffness, double damping, double rest,
+                               const Motion* target, bool potential);
+    /// What the parameters of a joint say of its coordinates.
+    void add_joint_forces(std::int32_t joint);
+    /// Visits the springs of rows, then those of angles.
+    template <class Visitor>
+    void for_each_spring(Visitor&& visit) const {
+        for (const auto& spring : springs) visit(spring);
+        for (const auto& spring : turn_springs) visit(spring);
+    }
 
     [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
     /// Visits all elements with the placements of their nodes or bodies: visit(element, placements). After place().
@@ -138,6 +161,7 @@ struct MultibodySystem::Implementation {
     void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;
+    void collect_frictions(UnilateralRows& rows) const;
     void collect_motors(double t, UnilateralRows& rows) const;
     void collect_contacts(UnilateralRows& rows);
 };

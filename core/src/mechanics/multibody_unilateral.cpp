@@ -15,7 +15,7 @@ using mechanics::Vector3d;
 namespace {
 
 /// Keys of blocks: what kind, then which one.
-enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4 };
+enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4, Friction = 5 };
 
 std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0, std::uint64_t third = 0) {
     // 4 + 24 + 24 + 12 bits.
@@ -42,7 +42,7 @@ std::uint64_t key_of(const ContactPoint& contact) {
 bool MultibodySystem::has_unilateral() const {
     const auto& self = *implementation_;
     self.must_be_finished();
-    return self.detector || !self.bounded_motors.empty() ||
+    return self.detector || !self.bounded_motors.empty() || !self.frictions.empty() ||
            std::any_of(self.joints.begin(), self.joints.end(), [](const auto& joint) {
                return !std::isnan(joint.parameters.lower) || !std::isnan(joint.parameters.upper);
            });
@@ -51,9 +51,10 @@ bool MultibodySystem::has_unilateral() const {
 void MultibodySystem::collect_unilateral(const State& state, double h, UnilateralRows& rows) {
     auto& self = *implementation_;
     rows.clear();
-    self.place(state.q.data(), state.v.data());
+    self.place(state);
     self.collect_limits(h, rows);
     self.collect_motors(state.t + h, rows);
+    self.collect_frictions(rows);
     if (!self.detector) return;
     for (const auto& body : self.moving) {
         const double* q = state.q.data() + body.position;
@@ -87,9 +88,9 @@ Coordinate coordinate_of(const mechanics::Joint& joint, const mechanics::Placeme
     return result;
 }
 
-void put_coordinate_row(const mechanics::Joint& joint, const mechanics::Placements& at, double sign,
+void put_coordinate_row(const mechanics::Joint& joint, bool turns, const mechanics::Placements& at, double sign,
                         UnilateralRows& rows) {
-    if (joint.parameters.kind == JointKind::Revolute) {
+    if (turns) {
         for (const bool second : {false, true}) {
             const auto& place = at[second ? joint.angle.second : joint.angle.first];
             if (place.column < 0) continue;
@@ -116,25 +117,37 @@ void MultibodySystem::Implementation::collect_limits(double h, UnilateralRows& r
         const auto& joint = joints[k];
         const auto& limits = joint.parameters;
         if (std::isnan(limits.lower) && std::isnan(limits.upper)) continue;
+        const bool turns = limits.kind == JointKind::Revolute;
         const Coordinate now = coordinate_of(joint, at);
         const double reach = 2.0 * h * std::abs(now.speed) + 0.01;
         if (!std::isnan(limits.lower) && now.value - limits.lower < reach) {
-            put_coordinate_row(joint, at, 1.0, rows);
+            put_coordinate_row(joint, turns, at, 1.0, rows);
             rows.end_row(now.value - limits.lower);
             rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Lower, k));
         }
         if (!std::isnan(limits.upper) && limits.upper - now.value < reach) {
-            put_coordinate_row(joint, at, -1.0, rows);
+            put_coordinate_row(joint, turns, at, -1.0, rows);
             rows.end_row(limits.upper - now.value);
             rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Upper, k));
         }
     }
 }
 
+// A box row without a prescribed speed: u = 0 wherever a force within the bounds can hold the coordinate still.
+void MultibodySystem::Implementation::collect_frictions(UnilateralRows& rows) const {
+    for (const auto& [index, turns, limit] : frictions) {
+        put_coordinate_row(joints[static_cast<std::size_t>(index)], turns, at, 1.0, rows);
+        rows.end_row();
+        rows.end_block(Cone::box({-limit}, {limit}),
+                       key_of(KeyKind::Friction, static_cast<std::uint64_t>(index), turns ? 1 : 0));
+    }
+}
+
 void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& rows) const {
     for (std::size_t k = 0; k < bounded_motors.size(); ++k) {
         const auto& motor = bounded_motors[k];
-        put_coordinate_row(joints[static_cast<std::size_t>(motor.joint)], at, 1.0, rows);
+        const auto& joint = joints[static_cast<std::size_t>(motor.joint)];
+        put_coordinate_row(joint, joint.parameters.kind == JointKind::Revolute, at, 1.0, rows);
         rows.end_row(0.0, -motor.speed.value(t));
         rows.end_block(Cone::box({-motor.limit}, {motor.limit}), key_of(KeyKind::Motor, k));
     }

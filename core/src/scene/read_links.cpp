@@ -23,46 +23,96 @@ constexpr std::string_view between_fixed = "both ends are fixed";
 
 }  // namespace
 
+SystemReader::Handlers SystemReader::coordinate_handlers(CoordinateForces& forces) {
+    return {{"damping", [&](const YAML::Node& n) { forces.damping = nonnegative_number(source_, n, "damping"); }},
+            {"spring",
+             [&](const YAML::Node& n) {
+                 bool stiffness = false;
+                 read_map(source_, n, "\"spring\"",
+                          {{"stiffness",
+                            [&](const YAML::Node& v) {
+                                forces.stiffness = positive_number(source_, v, "stiffness");
+                                stiffness = true;
+                            }},
+                           {"rest", [&](const YAML::Node& v) { forces.rest = finite_number(source_, v, "rest"); }}});
+                 if (!stiffness) source_.refuse(n, "\"spring\" lacks the key \"stiffness\"");
+             }},
+            {"friction", [&](const YAML::Node& n) { forces.friction = nonnegative_number(source_, n, "friction"); }}};
+}
+
+// A joint with one coordinate has damping, spring and friction of its own; a cylindrical one has them in two maps.
 void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
     JointParameters joint;
     joint.point = joint.second_point = copy.offset;
     bool kind = false, second = false, gear_first = false, gear_second = false;
-    read_map(source_, item, "a joint",
-             {{"name", [&](const YAML::Node& n) { joint.name = name_in(source_, n, "name", copy); }},
-              {"kind",
-               [&](const YAML::Node& n) {
-                   joint.kind = joint_kind(source_, n);
-                   kind = true;
-               }},
-              {"first", [&](const YAML::Node& n) { joint.first = body_named(n, "first", copy); }},
-              {"second",
-               [&](const YAML::Node& n) {
-                   joint.second = body_named(n, "second", copy);
-                   second = true;
-               }},
-              {"point", [&](const YAML::Node& n) { joint.point = point_in(source_, n, "point", copy); }},
-              {"second_point",
-               [&](const YAML::Node& n) { joint.second_point = point_in(source_, n, "second_point", copy); }},
-              {"axis", [&](const YAML::Node& n) { joint.axis = vector3(source_, n, "axis"); }},
-              {"second_axis", [&](const YAML::Node& n) { joint.second_axis = vector3(source_, n, "second_axis"); }},
-              {"gear_first",
-               [&](const YAML::Node& n) {
-                   joint.gear_first = joint_named(n, "gear_first", copy);
-                   gear_first = true;
-               }},
-              {"gear_second",
-               [&](const YAML::Node& n) {
-                   joint.gear_second = joint_named(n, "gear_second", copy);
-                   gear_second = true;
-               }},
-              {"gear_ratio", [&](const YAML::Node& n) { joint.gear_ratio = finite_number(source_, n, "gear_ratio"); }},
-              {"lower", [&](const YAML::Node& n) { joint.lower = finite_number(source_, n, "lower"); }},
-              {"upper", [&](const YAML::Node& n) { joint.upper = finite_number(source_, n, "upper"); }},
-              {"repeat", [](const YAML::Node&) {}}});
+    CoordinateForces own;
+    YAML::Node own_place(YAML::NodeType::Undefined), parts(YAML::NodeType::Undefined);
+    const auto part = [&](CoordinateForces& forces, std::string_view key) {
+        return std::pair<std::string_view, Handler>{key, [&, key](const YAML::Node& n) {
+                                                        read_map(source_, n, fmt::format("\"{}\"", key),
+                                                                 coordinate_handlers(forces));
+                                                        parts.reset(n);
+                                                    }};
+    };
+    Handlers handlers = coordinate_handlers(own);
+    for (auto& [key, handler] : handlers)
+        handler = [&own_place, read = std::move(handler)](const YAML::Node& n) {
+            read(n);
+            own_place.reset(n);
+        };
+    const Handlers others = {
+        {"name", [&](const YAML::Node& n) { joint.name = name_in(source_, n, "name", copy); }},
+        {"kind",
+         [&](const YAML::Node& n) {
+             joint.kind = joint_kind(source_, n);
+             kind = true;
+         }},
+        {"first", [&](const YAML::Node& n) { joint.first = body_named(n, "first", copy); }},
+        {"second",
+         [&](const YAML::Node& n) {
+             joint.second = body_named(n, "second", copy);
+             second = true;
+         }},
+        {"point", [&](const YAML::Node& n) { joint.point = point_in(source_, n, "point", copy); }},
+        {"second_point", [&](const YAML::Node& n) { joint.second_point = point_in(source_, n, "second_point", copy); }},
+        {"axis", [&](const YAML::Node& n) { joint.axis = vector3(source_, n, "axis"); }},
+        {"second_axis", [&](const YAML::Node& n) { joint.second_axis = vector3(source_, n, "second_axis"); }},
+        {"gear_first",
+         [&](const YAML::Node& n) {
+             joint.gear_first = joint_named(n, "gear_first", copy);
+             gear_first = true;
+         }},
+        {"gear_second",
+         [&](const YAML::Node& n) {
+             joint.gear_second = joint_named(n, "gear_second", copy);
+             gear_second = true;
+         }},
+        {"gear_ratio", [&](const YAML::Node& n) { joint.gear_ratio = finite_number(source_, n, "gear_ratio"); }},
+        {"lower", [&](const YAML::Node& n) { joint.lower = finite_number(source_, n, "lower"); }},
+        {"upper", [&](const YAML::Node& n) { joint.upper = finite_number(source_, n, "upper"); }},
+        part(joint.slide, "slide"),
+        part(joint.turn, "turn"),
+        {"repeat", [](const YAML::Node&) {}}};
+    handlers.insert(handlers.end(), others.begin(), others.end());
+    read_map(source_, item, "a joint", handlers);
     const auto need = [&](bool given, std::string_view key) {
         if (!given) source_.refuse(item, fmt::format("joint \"{}\" lacks the key \"{}\"", joint.name, key));
     };
     need(kind, "kind");
+    if (joint.kind == JointKind::Cylindrical) {
+        if (own_place.IsDefined())
+            source_.refuse(own_place,
+                           fmt::format("the cylindrical joint \"{}\" has two coordinates: give damping, spring "
+                                       "and friction in \"slide: {{…}}\" and \"turn: {{…}}\"",
+                                       joint.name));
+    } else {
+        if (parts.IsDefined())
+            source_.refuse(parts,
+                           fmt::format("\"slide\" and \"turn\" are for cylindrical joints; the joint \"{}\" takes "
+                                       "\"damping\", \"spring\" and \"friction\" themselves",
+                                       joint.name));
+        (joint.kind == JointKind::Prismatic ? joint.slide : joint.turn) = own;
+    }
     if (joint.kind == JointKind::Gear) {
         need(gear_first, "gear_first");
         need(gear_second, "gear_second");

@@ -43,6 +43,9 @@ private:
     void read_cable(const YAML::Node& item, const Copy& copy);
     void read_beam(const YAML::Node& item, const Copy& copy);
     void read_joint(const YAML::Node& item, const Copy& copy);
+    using Handlers = std::vector<std::pair<std::string_view, Handler>>;
+    /// The keys `damping`, `spring` and `friction`.
+    Handlers coordinate_handlers(CoordinateForces& forces);
     void read_motor(const YAML::Node& item, const Copy& copy);
     void read_spring(const YAML::Node& item, const Copy& copy);
     void read_bushing(const YAML::Node& item, const Copy& copy);
