@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,39 @@ struct Inertia {
     DELASSUS_API static Inertia rod(double mass, double length);
 };
 
+/// How Motion::table goes from value to value.
+enum class Interpolation {
+    Linear,
+    Cubic  ///< the cubic spline; its slopes at the ends are 0, or those of its period
+};
+
+/// A prescribed function of time with two derivatives and its integral from zero. An empty one is zero.
+struct Motion {
+    std::function<double(double)> value, rate, acceleration;
+    std::function<double(double)> integral;  ///< needed of the speed of a motor without force limit
+    DELASSUS_API static Motion constant(double value);
+    DELASSUS_API static Motion linear(double start, double rate);
+    /// offset + amplitude sin(2π frequency t + phase)
+    DELASSUS_API static Motion sine(double amplitude, double frequency, double phase = 0.0, double offset = 0.0);
+    /// Two or more values at ascending times, and between them. Before and after, the first and the last value are
+    /// kept; if periodic, everything repeats, and the last value must be the first. Throws InputError.
+    DELASSUS_API static Motion table(const std::vector<double>& times, const std::vector<double>& values,
+                                     Interpolation interpolation = Interpolation::Linear, bool periodic = false);
+    /// Σ coefficients[k] t^k
+    DELASSUS_API static Motion polynomial(const std::vector<double>& coefficients);
+    /// From one value to another within `duration` (s, > 0) after `start`: with a continuous rate (smoothness 1) or
+    /// second derivative (2).
+    DELASSUS_API static Motion ramp(double from, double to, double start, double duration, int smoothness = 2);
+};
+
+/// Moves a body along a given way: turned by an angle about an axis through a point, then moved. Beginning at its pose.
+struct BodyMotion {
+    std::array<Motion, 3> translation;  ///< m, world frame
+    Motion angle;                       ///< rad
+    Vector3 axis{0.0, 0.0, 1.0};        ///< world frame; need not be a unit vector
+    std::optional<Vector3> point;       ///< world frame; none: the body's position
+};
+
 /// A rigid body.
 struct BodyParameters {
     std::string name;
@@ -45,6 +79,9 @@ struct BodyParameters {
     Vector3 velocity{};          ///< of the mass centre, world frame
     Vector3 angular_velocity{};  ///< body frame
     bool fixed = false;
+    /// The body is kinematic: it takes part in contacts and joints, and nothing that they do moves it. Mass, inertia
+    /// and velocities do not count then. MultibodySystem::body() has the pose at t = 0.
+    std::optional<BodyMotion> motion;
 };
 
 /// A point mass.
@@ -67,16 +104,6 @@ enum class JointKind {
                    ///< the first
     Distance,      ///< 1 row: the points keep their initial distance
     Gear           ///< 1 row: the relative rotations of two revolute joints keep a ratio
-};
-
-/// A prescribed function of time with two derivatives and its integral from zero. An empty one is zero.
-struct Motion {
-    std::function<double(double)> value, rate, acceleration;
-    std::function<double(double)> integral;  ///< needed of the speed of a motor without force limit
-    DELASSUS_API static Motion constant(double value);
-    DELASSUS_API static Motion linear(double start, double rate);
-    /// offset + amplitude sin(2π frequency t + phase)
-    DELASSUS_API static Motion sine(double amplitude, double frequency, double phase = 0.0, double offset = 0.0);
 };
 
 /// What acts in a coordinate of a joint beside its reactions: a linear spring and damper, and dry friction that holds
@@ -117,6 +144,20 @@ struct MotorParameters {
     DELASSUS_API MotorParameters();
 };
 
+/// A servo at the coordinate c of a revolute or prismatic joint, with the force or torque
+///     kp (position(t) − c) + kd (speed(t) − ċ),
+/// cut off at the limit. It is taken at the end of each step, so that any gains are stable.
+struct ActuatorParameters {
+    std::string name;
+    std::int32_t joint = -1;
+    Motion position;     ///< m or rad, over whole turns; needed where kp > 0
+    Motion speed;        ///< m/s or rad/s; empty: the rate of `position`
+    double kp = 0.0;     ///< N/m or N m/rad, ≥ 0
+    double kd = 0.0;     ///< N s/m or N m s/rad, ≥ 0; one of the two > 0
+    double force_limit;  ///< N or N m, ≥ 0; infinity: none. With a limit it is a box row, for steppers that take those
+    DELASSUS_API ActuatorParameters();
+};
+
 /// A spring and damper between two points: force k (ℓ − ℓ₀) + c dℓ/dt along the line.
 struct SpringParameters {
     std::string name;
@@ -143,6 +184,7 @@ struct LoadParameters {
     std::array<Motion, 3> force;   ///< at the point, world frame, N
     std::array<Motion, 3> torque;  ///< world frame, Nm
     Vector3 point{};               ///< world frame at t = 0; moves with the body
+    bool follower = false;         ///< force and torque are in the body's frame, and turn with it
 };
 
 /// An isotropic elastic material.
@@ -271,6 +313,7 @@ public:
     std::int32_t add_node(const NodeParameters& node);
     std::int32_t add_joint(const JointParameters& joint);
     void add_motor(const MotorParameters& motor);
+    void add_actuator(const ActuatorParameters& actuator);
     void add_spring(const SpringParameters& spring);
     void add_bushing(const BushingParameters& bushing);
     void add_load(const LoadParameters& load);

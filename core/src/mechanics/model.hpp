@@ -9,6 +9,7 @@
 
 #include "delassus/multibody.hpp"
 #include "mechanics/angle.hpp"
+#include "mechanics/prescribed_motion.hpp"
 #include "mechanics/row.hpp"
 
 namespace delassus::mechanics {
@@ -16,7 +17,8 @@ namespace delassus::mechanics {
 struct Body {
     BodyParameters parameters;
     Matrix3d inertia = Matrix3d::Identity();
-    std::int32_t position = -1, column = -1;  ///< first entries in q and v; −1 if fixed
+    std::int32_t position = -1, column = -1;             ///< first entries in q and v; −1 if fixed or prescribed
+    std::shared_ptr<const PrescribedMotion> prescribed;  ///< null: it moves freely, or is fixed
 };
 
 /// What a step reads of each body that moves, side by side.
@@ -41,6 +43,13 @@ struct Gear {
     double numerator = 1.0, denominator = 1.0;
     double offset = 0.0;  ///< at t = 0
 
+    /// ∂/∂t, by bodies whose motion is prescribed, and the part of d²/dt² that their accelerations make.
+    [[nodiscard]] double rate(const Placements& at) const {
+        return second.prescribed_rate(at) - numerator / denominator * first.prescribed_rate(at);
+    }
+    [[nodiscard]] double acceleration(const Placements& at) const {
+        return second.prescribed_acceleration(at) - numerator / denominator * first.prescribed_acceleration(at);
+    }
     [[nodiscard]] double value(const Placements& at) const {
         const double angle = denominator * second.value(at) - numerator * first.value(at) - offset;
         return std::remainder(angle, 2.0 * M_PI) / denominator;
@@ -63,6 +72,14 @@ struct BoundedMotor {
     std::int32_t joint = -1;
     Motion speed;
     double limit = 0.0;
+};
+
+/// A servo with a force limit: a box row with a compliance.
+struct BoundedActuator {
+    std::int32_t joint = -1;
+    Motion position, speed;  ///< both there
+    double kp = 0.0, kd = 0.0, limit = 0.0;
+    const double* reference = nullptr;  ///< of an angle: see Turn
 };
 
 /// Dry friction in a coordinate of a joint: a box row on its speed.

@@ -77,6 +77,16 @@ Vector3d at_time(const std::array<Motion, 3>& motions, double t) {
     return result;
 }
 
+// A force F̄ and a torque T̄ in the frame of the body: f = (A F̄, s̄ × F̄ + T̄), so that −∂f/∂θ = (A [F̄]×, 0). The
+// symmetric tangent takes nothing of it: half of it with its transpose would be indefinite, and in a linearised step
+// the transpose is a torque that does not exist, by which a force through the mass centre would change the spin.
+void add_follower(const mechanics::Load& load, const mechanics::Placement& place, double t, double factor,
+                  Tangent tangent, MatrixAssembler& H) {
+    if (tangent == Tangent::Symmetric) return;
+    const RowMajor3 K = place.A * skew(at_time(load.parameters.force, t));
+    H.add_block(place.column, place.column + 3, 3, 3, K.data(), factor);
+}
+
 }  // namespace
 
 void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) const {
@@ -152,10 +162,15 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
         const Vector3d force = at_time(load.parameters.force, state.t);
-        const Vector3d torque = place.A.transpose() * at_time(load.parameters.torque, state.t);
+        const Vector3d torque = at_time(load.parameters.torque, state.t);
+        if (load.parameters.follower) {
+            Eigen::Map<Vector3d>(result + place.column) += factor * (place.A * force);
+            Eigen::Map<Vector3d>(result + place.column + 3) += factor * (load.point.cross(force) + torque);
+            continue;
+        }
         Eigen::Map<Vector3d>(result + place.column) += factor * force;
         Eigen::Map<Vector3d>(result + place.column + 3) +=
-            factor * (load.point.cross(place.A.transpose() * force) + torque);
+            factor * (load.point.cross(place.A.transpose() * force) + place.A.transpose() * torque);
     }
 }
 
@@ -182,11 +197,13 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         K += spring.damping * self.gradient * turning.transpose();
         add_local(columns, K, factor, tangent, H);
     });
-    for (const auto& damper : self.turn_dampers)
+    for (const auto& damper : self.turn_dampers) {
+        if (tangent == Tangent::Symmetric) break;  // as of coordinates
         add_damper(
             damper, self.at, factor, tangent, H,
             [](const Matrix3d& P, const Vector3d& omega) -> Matrix3d { return -skew(P * omega); },
             [](const Matrix3d& P, const Vector3d& omega) -> Matrix3d { return P * skew(omega); });
+    }
     self.for_each_element(state, [&](const auto& element, const auto& at) {
         using Element = std::decay_t<decltype(element)>;
         typename Element::Matrix K;
@@ -196,6 +213,10 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
     for (const auto& load : self.loads) {
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
+        if (load.parameters.follower) {
+            add_follower(load, place, state.t, factor, tangent, H);
+            continue;
+        }
         const Vector3d force = place.A.transpose() * at_time(load.parameters.force, state.t);
         const Vector3d torque = place.A.transpose() * at_time(load.parameters.torque, state.t);
         add_matrix(place.column + 3, place.column + 3, -skew(load.point) * skew(force) - skew(torque), factor, tangent,

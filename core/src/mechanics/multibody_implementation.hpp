@@ -31,6 +31,7 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::Cable> cables;
     std::vector<mechanics::Beam> beams;
     std::vector<mechanics::BoundedMotor> bounded_motors;
+    std::vector<mechanics::BoundedActuator> bounded_actuators;
     mechanics::Motions motions;
     std::vector<Shape> shapes;
     std::vector<std::int32_t> shape_material;  // of shapes, then of node contacts
@@ -55,8 +56,9 @@ struct MultibodySystem::Implementation {
     std::vector<std::int32_t> first_kept_rows;  // those of assemble()
     std::vector<mechanics::Linkage> redundant;  // those with rows that are left out
     std::vector<mechanics::MovingBody> moving;
-    bool gyroscopic = false;  // a moving body whose moments differ
-    double size = 0.0;        // the median of the shapes that collide
+    std::vector<BodyIndex> prescribed;  // bodies that move as they are told
+    bool gyroscopic = false;            // a moving body whose moments differ
+    double size = 0.0;                  // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
     bool leaves_out = true;  ///< what no contact needs
 
@@ -74,8 +76,8 @@ struct MultibodySystem::Implementation {
     /// Placements of all bodies so far at t = 0, without columns.
     [[nodiscard]] mechanics::Placements initial_placements() const;
     /// Placements of a state; v may be null for what needs positions alone.
-    void place(const double* q, const double* v) const;
-    void place(const State& state) const { place(state.q.data(), state.v.data()); }
+    void place(const double* q, const double* v, double t) const;
+    void place(const State& state) const { place(state.q.data(), state.v.data(), state.t); }
 
     /// Where the angle of a joint counts its turns from.
     const double* count_turns_of(std::int32_t joint);
@@ -149,6 +151,7 @@ struct MultibodySystem::Implementation {
         std::int32_t column;           ///< −1 if fixed
         const mechanics::Matrix3d* A;  ///< null for a node
         mechanics::Vector3d arm;       ///< from the mass centre, world frame
+        mechanics::Vector3d velocity;  ///< of the point where it is prescribed, else 0
 
         /// The entries of sign · direction · ṗ.
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;
@@ -156,13 +159,16 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] PointOfOwner point_of(std::int32_t owner, const mechanics::Vector3d& point) const;
     /// Of the pair where it was given, else from both: the geometric mean of friction, the larger restitution.
     [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
-    [[nodiscard]] Pose pose_of(std::size_t body, const double* q) const;
+    [[nodiscard]] Pose pose_of(std::size_t body, const State& state) const;
+    /// The poses of all that collides, for the detector.
+    void place_shapes(const State& state);
     void make_detector();
     void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;
     void collect_frictions(UnilateralRows& rows) const;
     void collect_motors(double t, UnilateralRows& rows) const;
+    void collect_actuators(double t, double h, UnilateralRows& rows) const;
     void collect_contacts(UnilateralRows& rows);
 };
 

@@ -19,8 +19,6 @@ JointKind joint_kind(const Source& source, const YAML::Node& node) {
     source.refuse(node, fmt::format("there is no kind of joint \"{}\"{}", name, nearest_name_hint(name, names)));
 }
 
-constexpr std::string_view between_fixed = "both ends are fixed";
-
 }  // namespace
 
 SystemReader::Handlers SystemReader::coordinate_handlers(CoordinateForces& forces) {
@@ -127,7 +125,7 @@ void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
                 fmt::format("joint \"{}\" joins a body to itself: \"first\" and \"second\" must differ", joint.name));
         if (!moves(joint.first) && !moves(joint.second)) {
             take_name(item, joints_, "joint", joint.name, -1);
-            result_.left_out.push_back({fmt::format("joint \"{}\"", joint.name), std::string(between_fixed)});
+            result_.left_out.push_back({fmt::format("joint \"{}\"", joint.name), no_effect(joint.first, joint.second)});
             return;
         }
     }
@@ -166,6 +164,30 @@ void SystemReader::read_motor(const YAML::Node& item, const Copy& copy) {
     result_.motors.push_back(motor);
 }
 
+void SystemReader::read_actuator(const YAML::Node& item, const Copy& copy) {
+    ActuatorParameters actuator;
+    bool has_joint = false;
+    read_map(source_, item, "an actuator",
+             {{"name", [&](const YAML::Node& n) { actuator.name = name_in(source_, n, "name", copy); }},
+              {"joint",
+               [&](const YAML::Node& n) {
+                   has_joint = true;
+                   actuator.joint = joint_named(n, "joint", copy);
+                   if (actuator.joint < 0)
+                       source_.refuse(n, "\"joint\" names a joint between fixed bodies, which no actuator can move");
+               }},
+              {"position", [&](const YAML::Node& n) { actuator.position = motion(source_, n, "position"); }},
+              {"speed", [&](const YAML::Node& n) { actuator.speed = motion(source_, n, "speed"); }},
+              {"kp", [&](const YAML::Node& n) { actuator.kp = nonnegative_number(source_, n, "kp"); }},
+              {"kd", [&](const YAML::Node& n) { actuator.kd = nonnegative_number(source_, n, "kd"); }},
+              {"limit", [&](const YAML::Node& n) { actuator.force_limit = nonnegative_number(source_, n, "limit"); }},
+              {"repeat", [](const YAML::Node&) {}}});
+    if (!has_joint) source_.refuse(item, "an actuator lacks the key \"joint\"");
+    take_name(item, others_, "actuator", actuator.name, 0);
+    at(item, [&] { result_.system->add_actuator(actuator); });
+    result_.actuators.push_back(actuator);
+}
+
 void SystemReader::read_spring(const YAML::Node& item, const Copy& copy) {
     SpringParameters spring;
     bool second = false, first_point = false, second_point = false;
@@ -198,7 +220,7 @@ void SystemReader::read_spring(const YAML::Node& item, const Copy& copy) {
     if (!second_point) spring.second_point = position(spring.second);
     take_name(item, others_, "spring", spring.name, 0);
     if (!moves(spring.first) && !moves(spring.second)) {
-        result_.left_out.push_back({fmt::format("spring \"{}\"", spring.name), std::string(between_fixed)});
+        result_.left_out.push_back({fmt::format("spring \"{}\"", spring.name), no_effect(spring.first, spring.second)});
         return;
     }
     at(item, [&] { result_.system->add_spring(spring); });
@@ -237,22 +259,23 @@ void SystemReader::read_bushing(const YAML::Node& item, const Copy& copy) {
     if (!second) source_.refuse(item, fmt::format("bushing \"{}\" lacks the key \"second\"", bushing.name));
     take_name(item, others_, "bushing", bushing.name, 0);
     if (!moves(bushing.first) && !moves(bushing.second)) {
-        result_.left_out.push_back({fmt::format("bushing \"{}\"", bushing.name), std::string(between_fixed)});
+        result_.left_out.push_back(
+            {fmt::format("bushing \"{}\"", bushing.name), no_effect(bushing.first, bushing.second)});
         return;
     }
     at(item, [&] { result_.system->add_bushing(bushing); });
     result_.bushings.push_back(bushing);
 }
 
+std::array<Motion, 3> SystemReader::three_motions(const YAML::Node& node, std::string_view key) {
+    const auto list = elements(source_, node, key);
+    if (list.size() != 3) source_.refuse(node, fmt::format("\"{}\" must be a list of 3 numbers or motions", key));
+    return {motion(source_, list[0], key), motion(source_, list[1], key), motion(source_, list[2], key)};
+}
+
 void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
     LoadParameters load;
     bool body = false, point = false;
-    const auto three_motions = [&](const YAML::Node& node, std::string_view key) {
-        const auto list = elements(source_, node, key);
-        if (list.size() != 3) source_.refuse(node, fmt::format("\"{}\" must be a list of 3 numbers or motions", key));
-        return std::array<Motion, 3>{motion(source_, list[0], key), motion(source_, list[1], key),
-                                     motion(source_, list[2], key)};
-    };
     read_map(source_, item, "a load",
              {{"name", [&](const YAML::Node& n) { load.name = name_in(source_, n, "name", copy); }},
               {"body",
@@ -267,12 +290,15 @@ void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
                    load.point = point_in(source_, n, "point", copy);
                    point = true;
                }},
+              {"follower", [&](const YAML::Node& n) { load.follower = truth(source_, n, "follower"); }},
               {"repeat", [](const YAML::Node&) {}}});
     if (!body) source_.refuse(item, fmt::format("load \"{}\" lacks the key \"body\"", load.name));
     if (!point) load.point = position(load.body);
     take_name(item, others_, "load", load.name, 0);
     if (!moves(load.body)) {
-        result_.left_out.push_back({fmt::format("load \"{}\"", load.name), "its body is fixed"});
+        const bool fixed = load.body == world_body || result_.bodies[static_cast<std::size_t>(load.body)].fixed;
+        result_.left_out.push_back(
+            {fmt::format("load \"{}\"", load.name), fixed ? "its body is fixed" : "the motion of its body is given"});
         return;
     }
     at(item, [&] { result_.system->add_load(load); });
