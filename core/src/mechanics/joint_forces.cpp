@@ -101,7 +101,7 @@ void MultibodySystem::Implementation::add_joint_forces(std::int32_t index) {
     for (const bool turns : {false, true}) {
         const CoordinateForces& forces = turns ? joint.turn : joint.slide;
         add_coordinate_spring(index, turns, forces.stiffness, forces.damping, forces.rest, nullptr, true);
-        if (forces.friction > 0.0) frictions.push_back({index, turns, forces.friction});
+        if (forces.friction > 0.0) frictions.push_back({index, turns, mechanics::box_of(forces.friction)});
     }
 }
 

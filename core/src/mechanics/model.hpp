@@ -71,14 +71,20 @@ struct Joint {
 struct BoundedMotor {
     std::int32_t joint = -1;
     Motion speed;
-    double limit = 0.0;
+    Cone box;  ///< of its limit
 };
+
+/// Forces of one row up to a limit, both ways.
+inline Cone box_of(double limit) {
+    return Cone::box({-limit}, {limit});
+}
 
 /// A servo with a force limit: a box row with a compliance.
 struct BoundedActuator {
     std::int32_t joint = -1;
     Motion position, speed;  ///< both there
-    double kp = 0.0, kd = 0.0, limit = 0.0;
+    double kp = 0.0, kd = 0.0;
+    Cone box;                           ///< of its limit
     const double* reference = nullptr;  ///< of an angle: see Turn
 };
 
@@ -86,7 +92,7 @@ struct BoundedActuator {
 struct JointFriction {
     std::int32_t joint = -1;
     bool turns = false;  ///< the coordinate is the angle, else the slide
-    double limit = 0.0;
+    Cone box;            ///< of its bound
 };
 
 /// The angle θ of a joint over whole turns as a coordinate with the members of a Row: C = θ − offset − drive(t). Its

@@ -161,7 +161,7 @@ void MultibodySystem::add_motor(const MotorParameters& motor) {
         mechanics::drive_joint(joint, motor, self.motions);
     } else {
         refuse_unless(motor.speed, "the motor", name, "has a force limit, so it must be driven by speed");
-        self.bounded_motors.push_back({motor.joint, motor.motion, motor.force_limit});
+        self.bounded_motors.push_back({motor.joint, motor.motion, mechanics::box_of(motor.force_limit)});
     }
 }
 
@@ -190,7 +190,7 @@ void MultibodySystem::add_actuator(const ActuatorParameters& actuator) {
                                           {rate, nullptr, nullptr, nullptr},
                                           actuator.kp,
                                           actuator.kd,
-                                          actuator.force_limit,
+                                          mechanics::box_of(actuator.force_limit),
                                           kind == JointKind::Revolute ? self.count_turns_of(actuator.joint) : nullptr});
         return;
     }

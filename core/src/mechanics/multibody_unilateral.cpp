@@ -155,12 +155,11 @@ void MultibodySystem::Implementation::collect_limits(double h, UnilateralRows& r
 
 // A box row without a prescribed speed: u = 0 wherever a force within the bounds can hold the coordinate still.
 void MultibodySystem::Implementation::collect_frictions(UnilateralRows& rows) const {
-    for (const auto& [index, turns, limit] : frictions) {
+    for (const auto& [index, turns, box] : frictions) {
         const auto& joint = joints[static_cast<std::size_t>(index)];
         put_coordinate_row(joint, turns, at, 1.0, rows);
         rows.end_row(0.0, prescribed_rate_of(joint, turns, at));
-        rows.end_block(Cone::box({-limit}, {limit}),
-                       key_of(KeyKind::Friction, static_cast<std::uint64_t>(index), turns ? 1 : 0));
+        rows.end_block(box, key_of(KeyKind::Friction, static_cast<std::uint64_t>(index), turns ? 1 : 0));
     }
 }
 
@@ -171,7 +170,7 @@ void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& r
         const bool turns = joint.parameters.kind == JointKind::Revolute;
         put_coordinate_row(joint, turns, at, 1.0, rows);
         rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - motor.speed.value(t));
-        rows.end_block(Cone::box({-motor.limit}, {motor.limit}), key_of(KeyKind::Motor, k));
+        rows.end_block(motor.box, key_of(KeyKind::Motor, k));
     }
 }
 
@@ -189,7 +188,7 @@ void MultibodySystem::Implementation::collect_actuators(double t, double h, Unil
         const double gain = one.kd + h * one.kp;
         put_coordinate_row(joint, turns, at, 1.0, rows);
         rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - force / gain);
-        rows.end_block(Cone::box({-one.limit}, {one.limit}), key_of(KeyKind::Actuator, k), 0.0, 1.0 / gain);
+        rows.end_block(one.box, key_of(KeyKind::Actuator, k), 0.0, 1.0 / gain);
     }
 }
 
