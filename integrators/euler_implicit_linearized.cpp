@@ -39,6 +39,8 @@ namespace {
 // and |Φ| taken less by the resolution of gaps: what a solver leaves of the velocities adds up in the gaps, and as Φ/h
 // it would come back as a motion, so that nothing came to rest.
 //
+// Rows with a compliance c (of a servo with limits) have u = D v⁺ + Φ_t + c λ/h, λ/h being the force: E = c/h.
+//
 // A joint's C/h needs no such bound: it pulls both ways, and gains nothing.
 //
 // Newton's law of impact: where a contact would close in this step, u_n⁺ ≥ −e u_n⁻, that is b = e u_n⁻. The associated
@@ -366,6 +368,28 @@ private:
             approaches_.push_back({std::max(rows_.rows()[row].gap, 0.0), -block.speed, block.along_normal(), pushed});
             row += block.cone.rows;
         }
+        assemble_compliance(h);
+    }
+
+    // E is absent where no row is compliant.
+    void assemble_compliance(double h) {
+        SparseMatrix& E = problem_.E;
+        const auto blocks = rows_.blocks();
+        const bool any = std::any_of(blocks.begin(), blocks.end(), [](const auto& b) { return b.compliance > 0.0; });
+        if (!any && E.rows == 0) return;
+        E.rows = E.columns = any ? static_cast<std::int32_t>(problem_.b.size()) : 0;
+        E.row_start.assign(any ? static_cast<std::size_t>(m_) + 1 : 1, 0);
+        E.column.clear();
+        E.value.clear();
+        if (!any) return;
+        for (const auto& block : blocks)
+            for (std::int32_t i = 0; i < block.cone.rows; ++i) {
+                if (block.compliance > 0.0) {
+                    E.column.push_back(static_cast<std::int32_t>(E.row_start.size()) - 1);
+                    E.value.push_back(block.compliance / h);
+                }
+                E.row_start.push_back(static_cast<std::int32_t>(E.value.size()));
+            }
     }
 
     /// Restitution and De Saxcé's term in the first b of a contact, whose first row of D_A is `row`.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 /* A solver that allocates nothing: projected Gauss-Seidel on a dense N in static arrays, for tiny problems with free,
-   nonnegative and friction rows and any definite H. */
+   nonnegative, box and friction rows, any definite H, and E. */
 #include <math.h>
 #include <stddef.h>
 
@@ -55,6 +55,8 @@ static double row_times(const delassus_matrix* D, int32_t row, const double* v) 
 static void project(const delassus_cone* cone, double* l) {
     if (cone->kind == DELASSUS_CONE_NONNEGATIVE)
         for (int32_t i = 0; i < cone->rows; ++i) l[i] = fmax(l[i], 0.0);
+    if (cone->kind == DELASSUS_CONE_BOX)
+        for (int32_t i = 0; i < cone->rows; ++i) l[i] = fmin(fmax(l[i], cone->lo[i]), cone->hi[i]);
     if (cone->kind != DELASSUS_CONE_FRICTION) return;
     const double mu = cone->parameters[0];
     double norm = 0.0;
@@ -84,6 +86,8 @@ static int32_t solve(void* solver, const delassus_problem* p, const delassus_req
     }
     for (int32_t i = 0; i < p->m; ++i)
         for (int32_t j = 0; j < p->m; ++j) N[i][j] = row_times(&p->D, i, Z[j]);
+    for (int32_t i = 0; i < p->m; ++i)
+        for (int32_t k = p->E.row_start[i]; k < p->E.row_start[i + 1]; ++k) N[i][p->E.column[k]] += p->E.value[k];
     double change = 1.0;
     int64_t sweep = 0;
     for (; sweep < 100000 && change > 1e-30; ++sweep) {
@@ -142,9 +146,10 @@ const delassus_plugin_descriptor* delassus_plugin(void) {
         .version = "1.0",
         .description = "allocates nothing",
         .licence = "BSD-3-Clause",
-        .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_FRICTION | DELASSUS_CAN_ASSOCIATED |
-                        DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE |
-                        DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
+        .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
+                        DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
+                        DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |
+                        DELASSUS_CAN_WARM_START,
         .create = create,
         .destroy = destroy,
         .analyze = nothing,

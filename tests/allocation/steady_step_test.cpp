@@ -103,6 +103,32 @@ TEST(SteadySteps, OfJointedBodiesAllocateNothing) {
     EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", false), 0);
 }
 
+TEST(SteadySteps, OfServosAndDryJointsOnAKinematicBodyAllocateNothing) {
+    MultibodySystem system;
+    BodyParameters base;
+    base.name = "base";
+    base.motion.emplace().translation[0] = Motion::linear(0.0, 1.0);
+    BodyParameters link;
+    link.name = "link";
+    link.inertia = Inertia::rod(1.0, 1.0);
+    link.pose.position = {0.5, 0.0, 0.0};
+    link.velocity = {1.0, 0.0, 0.0};
+    JointParameters joint;
+    joint.kind = JointKind::Revolute;
+    joint.first = system.add_body(base);
+    joint.second = system.add_body(link);
+    joint.axis = {0.0, 1.0, 0.0};
+    joint.turn = {0.1, 2.0, 0.0, 0.3};
+    ActuatorParameters servo;
+    servo.joint = system.add_joint(joint);
+    servo.position = Motion::constant(0.1);
+    servo.kp = 50.0;
+    servo.kd = 5.0;
+    servo.force_limit = 20.0;
+    system.add_actuator(servo);
+    EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", false), 0);
+}
+
 TEST(SteadySteps, OfFreeBodiesAllocateNothing) {
     MultibodySystem system;
     BodyParameters stone;

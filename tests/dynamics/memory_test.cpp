@@ -120,10 +120,11 @@ TEST(Refusals, OnlyTheLinearizedEulerMethodTakesContacts) {
     } system;
     for (const auto& info : timesteppers()) {
         if (info.unilateral) continue;
-        expect_refusal(info.name, system, {},
-                       info.name +
-                           " takes no contacts, stops or force limits, which the system has. Can: "
-                           "euler_implicit_linearized");
+        expect_refusal(
+            info.name, system, {},
+            info.name +
+                " takes no contacts, stops, dry friction of joints or force limits, which the system has. Can: "
+                "euler_implicit_linearized");
     }
 }
 

@@ -99,7 +99,71 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"EmptyMotion",
              head + bodies +
                  "joints:\n  - {name: j, kind: revolute, second: ball}\nmotors:\n  - {name: m, joint: j, motion: {}}\n",
-             "s.yaml, line 8: \"motion\" is empty; it must be constant, linear or sine"},
+             "s.yaml, line 8: \"motion\" is empty; it must be constant, linear, sine, table, polynomial or ramp"},
+        Case{"NegativeJointFriction",
+             head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, friction: -1}\n",
+             "s.yaml, line 6: \"friction\" is -1; it must not be negative"},
+        Case{"SpringOfABallJoint",
+             head + bodies + "joints:\n  - {name: j, kind: spherical, second: ball, spring: {stiffness: 1}}\n",
+             "s.yaml, line 6: the joint \"j\" has no single angle for a spring or friction: spherical and universal "
+             "joints take damping alone"},
+        Case{"DampingOfAFixedJoint", head + bodies + "joints:\n  - {name: j, kind: fixed, second: ball, damping: 1}\n",
+             "s.yaml, line 6: the joint \"j\" has no angle for a spring, damping or friction: revolute and cylindrical "
+             "joints have, and spherical and universal ones take damping"},
+        Case{"DampingOfACylindricalJoint",
+             head + bodies + "joints:\n  - {name: j, kind: cylindrical, second: ball, damping: 1}\n",
+             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring and friction in "
+             "\"slide: {…}\" and \"turn: {…}\""},
+        Case{"SlideOfARevoluteJoint",
+             head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, slide: {damping: 1}}\n",
+             "s.yaml, line 6: \"slide\" and \"turn\" are for cylindrical joints; the joint \"j\" takes \"damping\", "
+             "\"spring\" and \"friction\" themselves"},
+        Case{"JointSpringWithoutStiffness",
+             head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, spring: {rest: 1}}\n",
+             "s.yaml, line 6: \"spring\" lacks the key \"stiffness\""},
+        Case{
+            "ActuatorWithoutGains",
+            head + bodies +
+                "joints:\n  - {name: j, kind: revolute, second: ball}\nactuators:\n  - {name: m, joint: j, speed: 1}\n",
+            "s.yaml, line 8: the gains of the actuator \"m\" must be finite and not negative, and kp or kd must be "
+            "positive"},
+        Case{"ActuatorWithoutAPosition",
+             head + bodies +
+                 "joints:\n  - {name: j, kind: revolute, second: ball}\nactuators:\n  - {name: m, joint: j, kp: 1}\n",
+             "s.yaml, line 8: the actuator \"m\" has a kp, but no position to go to"},
+        Case{"ActuatorOfABallJoint",
+             head + bodies +
+                 "joints:\n  - {name: j, kind: spherical, second: ball}\nactuators:\n  - {name: m, joint: j, kd: 1, "
+                 "speed: 2}\n",
+             "s.yaml, line 8: the actuator \"m\" must drive a revolute or a prismatic joint"},
+        Case{"FixedAndMoving", head + "bodies:\n  - {name: b, fixed: true, motion: {translation: [1, 0, 0]}}\n",
+             "s.yaml, line 4: body \"b\" is fixed, and has a \"motion\"; give one of them"},
+        Case{"KinematicWithAVelocity",
+             head + "bodies:\n  - {name: b, velocity: [1, 0, 0], motion: {translation: [1, 0, 0]}}\n",
+             "s.yaml, line 4: the velocities of body \"b\" follow from its \"motion\"; give no \"velocity\" and no "
+             "\"angular_velocity\""},
+        Case{"EmptyBodyMotion", head + "bodies:\n  - {name: b, motion: {}}\n",
+             "s.yaml, line 4: \"motion\" is empty; it must have a translation or a rotation"},
+        Case{"RotationWithoutAngle", head + "bodies:\n  - {name: b, motion: {rotation: {axis: [0, 0, 1]}}}\n",
+             "s.yaml, line 4: \"rotation\" lacks the key \"angle\""},
+        Case{"RotationAboutNothing", head + "bodies:\n  - {name: b, motion: {rotation: {axis: [0, 0, 0], angle: 1}}}\n",
+             "s.yaml, line 4: the axis of the motion of body \"b\" has no direction"},
+        Case{"TableThatGoesBack",
+             head + bodies +
+                 "loads:\n  - {name: l, body: ball, force: [{table: {times: [0, 2, 1], values: [0, 1, 2]}}, 0, 0]}\n",
+             "s.yaml, line 6: the times of a table must ascend, and 2 is followed by 1"},
+        Case{"TableOfUnknownKind",
+             head + bodies + "loads:\n  - {name: l, body: ball, force: [{table: {interpolation: quintic}}, 0, 0]}\n",
+             "s.yaml, line 6: \"interpolation\" is \"quintic\"; it must be linear or cubic"},
+        Case{"RampWithoutEnd",
+             head + bodies + "loads:\n  - {name: l, body: ball, force: [{ramp: {duration: 1}}, 0, 0]}\n",
+             "s.yaml, line 6: \"ramp\" lacks the key \"to\""},
+        Case{"RoughRamp",
+             head + bodies +
+                 "loads:\n  - {name: l, body: ball, force: [{ramp: {to: 1, duration: 1, smoothness: 3}}, 0, 0]}\n",
+             "s.yaml, line 6: \"smoothness\" is 3; it must be 1 or 2"},
+        Case{"EmptyPolynomial", head + bodies + "loads:\n  - {name: l, body: ball, force: [{polynomial: []}, 0, 0]}\n",
+             "s.yaml, line 6: a polynomial needs one finite coefficient or more"},
         Case{"NegativeStiffness", head + bodies + "springs:\n  - {name: s, second: ball, stiffness: -1}\n",
              "s.yaml, line 6: \"stiffness\" is -1; it must not be negative"},
         Case{"RepeatedName",

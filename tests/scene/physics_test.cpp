@@ -159,6 +159,19 @@ TEST(ExampleScene, WallStands) {
     expect_stands("brick_wall", 50);
 }
 
+TEST(ExampleScene, ParcelLineDoesWhatItsHeadSays) {
+    Running run(read_scene(example_scene("parcel_line")));
+    while (run.simulation.state().t < 4.0 - 1e-9) run.simulation.step();
+    EXPECT_NEAR(run.pose("parcel").position[0], 0.5, 1e-6);
+    EXPECT_NEAR(run.velocities("wheel")[1][2], 0.5 * 0.0625 / 0.5, 2e-3);
+    run.finish();
+    EXPECT_NEAR(run.velocities("wheel")[1][2], 0.0, 1e-8);
+    const auto gate = run.pose("gate").orientation;
+    EXPECT_NEAR(2.0 * std::atan2(gate[3], gate[0]), 1.2, 1.1e-3);
+    EXPECT_NEAR(run.pose("parcel").position[0], 0.5, 1e-6);
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+}
+
 TEST(ExampleScene, ArchStands) {
     expect_stands("arch", 11 * 4);  // four points to a joint
 }

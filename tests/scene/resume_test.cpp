@@ -70,8 +70,35 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"heavy_top", "generalized_alpha", 0.0005}, Case{"four_bar", "generalized_alpha", 0.002},
                     Case{"bricard", "hht", 0.02}, Case{"bouncing_ball", "euler_implicit_linearized", 0.02},
                     Case{"brick_wall", "euler_implicit_linearized", 0.002},
+                    Case{"parcel_line", "euler_implicit_linearized", 0.002},
                     Case{"sphere_pile", "euler_implicit_linearized", 0.01}),
     [](const auto& parameter) { return std::string(parameter.param.scene) + "_" + parameter.param.integrator; });
+
+// A spring that is wound by several turns: the orientation does not tell how many.
+TEST(Checkpoint, HasTheTurnsOfSprings) {
+    constexpr int first = 230, all = 400;
+    const auto read = [&] {
+        return parse_scene(
+            "step: 0.002\nend: 10\ngravity: [0, 0, 0]\n"
+            "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 2}, angular_velocity: [0, 0, 40]}]\n"
+            "joints: [{name: h, kind: revolute, second: b, spring: {stiffness: 8}}]\n",
+            "s");
+    };
+    Running whole(read()), stopped(read()), resumed(read());
+    for (int i = 0; i < all; ++i) whole.simulation.step();
+    for (int i = 0; i < first; ++i) stopped.simulation.step();
+    const ScratchFolder scratch;
+    const auto file = scratch / "checkpoint.json";
+    write_checkpoint({"scene", {{"main", stopped.simulation.save(), {}}}}, file);
+    resumed.simulation.load(read_checkpoint(file).systems[0].simulation);
+    for (int i = first; i < all; ++i) resumed.simulation.step();
+    const auto expected = whole.simulation.save(), got = resumed.simulation.save();
+    EXPECT_GE(stopped.simulation.save().turns.at(0), 2.0);
+    EXPECT_EQ(bits(got.state.q), bits(expected.state.q));
+    EXPECT_EQ(bits(got.state.v), bits(expected.state.v));
+    EXPECT_EQ(bits(got.turns), bits(expected.turns));
+    EXPECT_EQ(got.totals.energy, expected.totals.energy);
+}
 
 TEST(Checkpoint, DamagedFilesAreRefused) {
     const ScratchFolder scratch;

@@ -93,6 +93,13 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["equilibrium"] = "start: {equilibrium: {@}}";
     scenes["tolerance"] = "tolerance: {@}";
     scenes["limits"] = "limits: {@}";
+    scenes["joint_spring"] = ball + "joints: [{spring: {@}}]";
+    scenes["coordinate"] = ball + "joints: [{slide: {@}}]";
+    scenes["actuator"] = ball + "actuators: [{@}]";
+    scenes["body_motion"] = "step: 1\nend: 1\nbodies: [{motion: {@}}]";
+    scenes["rotation"] = "step: 1\nend: 1\nbodies: [{motion: {rotation: {@}}}]";
+    scenes["table"] = ball + "loads: [{force: [{table: {@}}, 0, 0]}]";
+    scenes["ramp"] = ball + "loads: [{force: [{ramp: {@}}, 0, 0]}]";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;
 }

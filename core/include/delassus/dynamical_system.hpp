@@ -36,7 +36,7 @@ struct State {
 /// How tangent matrices are formed. Newton's residual is exact with either; cone problems need the symmetric one.
 enum class Tangent {
     Exact,     ///< the derivative; unsymmetric where forces are gyroscopic or follow the body
-    Symmetric  ///< its symmetric part, ½(A + Aᵀ)
+    Symmetric  ///< its symmetric part, ½(A + Aᵀ), or less of it where that could make H indefinite
 };
 
 /// A 3 × 3 block on the diagonal of an n × n matrix that is the identity elsewhere.
@@ -65,6 +65,7 @@ public:
         double restitution = 0.0;  ///< e in [0, 1] of Newton's law u_n⁺ ≥ −e u_n⁻; normal row of a contact
         std::uint64_t key = 0;     ///< the same constraint has the same key in the next step: for warm starts
         double speed = 0.0;        ///< of its first row, at the velocities of measure_speeds_at()
+        double compliance = 0.0;   ///< of each of its rows: u has compliance · force more, m/(N s); E = compliance/h
 
         /// Whether its first row is the distance of two things that cannot overlap.
         [[nodiscard]] bool along_normal() const {
@@ -97,7 +98,7 @@ public:
         row_start_.push_back(static_cast<std::int32_t>(used_));
     }
     /// Closes a block of the rows since the last one; throws InputError if their number is not cone.rows.
-    DELASSUS_API void end_block(const Cone& cone, std::uint64_t key, double restitution = 0.0);
+    DELASSUS_API void end_block(const Cone& cone, std::uint64_t key, double restitution = 0.0, double compliance = 0.0);
 
     [[nodiscard]] std::span<const Block> blocks() const { return {blocks_.data(), block_count_}; }
     [[nodiscard]] const std::vector<Row>& rows() const { return rows_; }

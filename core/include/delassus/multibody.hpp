@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,39 @@ struct Inertia {
     DELASSUS_API static Inertia rod(double mass, double length);
 };
 
+/// How Motion::table goes from value to value.
+enum class Interpolation {
+    Linear,
+    Cubic  ///< the cubic spline; its slopes at the ends are 0, or those of its period
+};
+
+/// A prescribed function of time with two derivatives and its integral from zero. An empty one is zero.
+struct Motion {
+    std::function<double(double)> value, rate, acceleration;
+    std::function<double(double)> integral;  ///< needed of the speed of a motor without force limit
+    DELASSUS_API static Motion constant(double value);
+    DELASSUS_API static Motion linear(double start, double rate);
+    /// offset + amplitude sin(2π frequency t + phase)
+    DELASSUS_API static Motion sine(double amplitude, double frequency, double phase = 0.0, double offset = 0.0);
+    /// Two or more values at ascending times, and between them. Before and after, the first and the last value are
+    /// kept; if periodic, everything repeats, and the last value must be the first. Throws InputError.
+    DELASSUS_API static Motion table(const std::vector<double>& times, const std::vector<double>& values,
+                                     Interpolation interpolation = Interpolation::Linear, bool periodic = false);
+    /// Σ coefficients[k] t^k
+    DELASSUS_API static Motion polynomial(const std::vector<double>& coefficients);
+    /// From one value to another within `duration` (s, > 0) after `start`: with a continuous rate (smoothness 1) or
+    /// second derivative (2).
+    DELASSUS_API static Motion ramp(double from, double to, double start, double duration, int smoothness = 2);
+};
+
+/// Moves a body along a given way: turned by an angle about an axis through a point, then moved. Beginning at its pose.
+struct BodyMotion {
+    std::array<Motion, 3> translation;  ///< m, world frame
+    Motion angle;                       ///< rad
+    Vector3 axis{0.0, 0.0, 1.0};        ///< world frame; need not be a unit vector
+    std::optional<Vector3> point;       ///< world frame; none: the body's position
+};
+
 /// A rigid body.
 struct BodyParameters {
     std::string name;
@@ -45,6 +79,9 @@ struct BodyParameters {
     Vector3 velocity{};          ///< of the mass centre, world frame
     Vector3 angular_velocity{};  ///< body frame
     bool fixed = false;
+    /// The body is kinematic: it takes part in contacts and joints, and nothing that they do moves it. Mass, inertia
+    /// and velocities do not count then. MultibodySystem::body() has the pose at t = 0.
+    std::optional<BodyMotion> motion;
 };
 
 /// A point mass.
@@ -69,14 +106,13 @@ enum class JointKind {
     Gear           ///< 1 row: the relative rotations of two revolute joints keep a ratio
 };
 
-/// A prescribed function of time with two derivatives and its integral from zero. An empty one is zero.
-struct Motion {
-    std::function<double(double)> value, rate, acceleration;
-    std::function<double(double)> integral;  ///< needed of the speed of a motor without force limit
-    DELASSUS_API static Motion constant(double value);
-    DELASSUS_API static Motion linear(double start, double rate);
-    /// offset + amplitude sin(2π frequency t + phase)
-    DELASSUS_API static Motion sine(double amplitude, double frequency, double phase = 0.0, double offset = 0.0);
+/// What acts in a coordinate of a joint beside its reactions: a linear spring and damper, and dry friction that holds
+/// the coordinate still as long as a force within its bound can. Coordinates are 0 at t = 0. All ≥ 0 but `rest`.
+struct CoordinateForces {
+    double damping = 0.0;    ///< N s/m along an axis, N m s/rad about one
+    double stiffness = 0.0;  ///< N/m or N m/rad
+    double rest = 0.0;       ///< the coordinate at which the spring is at rest, m or rad; turns are counted
+    double friction = 0.0;   ///< N or N m
 };
 
 /// A joint holds from the initial configuration on: its frames are given once, in the world frame at t = 0.
@@ -92,6 +128,9 @@ struct JointParameters {
     double gear_ratio = 1.0;  ///< angle of the second = ratio · angle of the first; a fraction with terms below 1000
     /// Limits of the coordinate of a revolute (rad, in (−π, π)) or prismatic (m) joint; not a number: none.
     double lower, upper;
+    CoordinateForces slide;  ///< along the axis; Prismatic and Cylindrical
+    CoordinateForces turn;   ///< about the axis; Revolute and Cylindrical; Spherical and Universal: damping alone, of
+                             ///< the relative angular velocity
     DELASSUS_API JointParameters();
 };
 
@@ -103,6 +142,20 @@ struct MotorParameters {
     Motion motion;
     double force_limit;  ///< N or Nm, speed motors only; infinity: a bilateral constraint
     DELASSUS_API MotorParameters();
+};
+
+/// A servo at the coordinate c of a revolute or prismatic joint, with the force or torque
+///     kp (position(t) − c) + kd (speed(t) − ċ),
+/// cut off at the limit. It is taken at the end of each step, so that any gains are stable.
+struct ActuatorParameters {
+    std::string name;
+    std::int32_t joint = -1;
+    Motion position;     ///< m or rad, over whole turns; needed where kp > 0
+    Motion speed;        ///< m/s or rad/s; empty: the rate of `position`
+    double kp = 0.0;     ///< N/m or N m/rad, ≥ 0
+    double kd = 0.0;     ///< N s/m or N m s/rad, ≥ 0; one of the two > 0
+    double force_limit;  ///< N or N m, ≥ 0; infinity: none. With a limit it is a box row, for steppers that take those
+    DELASSUS_API ActuatorParameters();
 };
 
 /// A spring and damper between two points: force k (ℓ − ℓ₀) + c dℓ/dt along the line.
@@ -131,6 +184,7 @@ struct LoadParameters {
     std::array<Motion, 3> force;   ///< at the point, world frame, N
     std::array<Motion, 3> torque;  ///< world frame, Nm
     Vector3 point{};               ///< world frame at t = 0; moves with the body
+    bool follower = false;         ///< force and torque are in the body's frame, and turn with it
 };
 
 /// An isotropic elastic material.
@@ -259,6 +313,7 @@ public:
     std::int32_t add_node(const NodeParameters& node);
     std::int32_t add_joint(const JointParameters& joint);
     void add_motor(const MotorParameters& motor);
+    void add_actuator(const ActuatorParameters& actuator);
     void add_spring(const SpringParameters& spring);
     void add_bushing(const BushingParameters& bushing);
     void add_load(const LoadParameters& load);
@@ -342,6 +397,15 @@ public:
     bool renew_rows(State& state, std::int64_t step);
     /// C of all rows, kept or not; constraint_rows().
     void all_constraints(const State& state, double* C) const;
+    // ---- Whole turns of joints with a spring or an actuator: an orientation does not tell them ----
+    /// The whole turns at a state that is within half a turn of the last one that was followed; one for each such
+    /// joint.
+    [[nodiscard]] std::vector<double> turns(const State& state) const;
+    /// Sets the turns at this state; none given: all are 0.
+    void set_turns(const State& state, const std::vector<double>& turns);
+    /// Counts turns on to this state. Whoever takes steps calls it after each that is kept.
+    void follow(const State& state);
+
     /// λ of all rows from that of those that are kept: 0 in the others.
     [[nodiscard]] std::vector<double> all_multipliers(const std::vector<double>& kept) const;
     /// Names of the joints that have rows that are left out, ascending by joint.

@@ -80,7 +80,8 @@ struct SceneSystem {
     std::vector<std::array<BodyIndex, 2>> beams;      ///< the bodies at the ends of each element
     std::vector<JointParameters> joints;              ///< by joint index
     std::vector<MotorParameters> motors;              ///< in the order of the file
-    std::vector<SpringParameters> springs;            ///< likewise, as the next two
+    std::vector<ActuatorParameters> actuators;        ///< likewise, as the next three
+    std::vector<SpringParameters> springs;
     std::vector<BushingParameters> bushings;
     std::vector<LoadParameters> loads;
     std::vector<SceneMaterial> materials;

@@ -77,6 +77,7 @@ struct SimulationTotals {
 struct SimulationState {
     std::int64_t step = 0;
     State state;
+    std::vector<double> turns;    ///< MultibodySystem::turns()
     std::vector<double> memory;   ///< Timestepper::save(), warm starts included
     std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps
     std::vector<std::int32_t>

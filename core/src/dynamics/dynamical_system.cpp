@@ -58,7 +58,7 @@ void UnilateralRows::move_into(SparseMatrix& D) {
     used_ = 0;
 }
 
-void UnilateralRows::end_block(const Cone& cone, std::uint64_t key, double restitution) {
+void UnilateralRows::end_block(const Cone& cone, std::uint64_t key, double restitution, double compliance) {
     const auto given = static_cast<std::int32_t>(rows_.size() - rows_in_blocks_);
     if (given != cone.rows)
         throw InputError(fmt::format("a block of {} rows was given a cone of {}", given, cone.rows));
@@ -67,6 +67,7 @@ void UnilateralRows::end_block(const Cone& cone, std::uint64_t key, double resti
     Block& block = blocks_[block_count_++];
     copy_cone(cone, block.cone);
     block.restitution = restitution;
+    block.compliance = compliance;
     block.key = key;
     block.speed = velocity_ ? speed(first_row, velocity_) : 0.0;
     // The processor's own prefetching ends at each page.

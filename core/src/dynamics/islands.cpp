@@ -149,6 +149,36 @@ void Islands::find(const Problem& problem, std::span<const std::int32_t> bodies)
     if (!untouched_.columns.empty()) next_island().columns = untouched_.columns;
 }
 
+bool Islands::can_part(const Problem& problem) {
+    bool diagonal = true;
+    for (std::int32_t row = 0; row < problem.E.rows; ++row)
+        for_each_entry(problem.E, row, [&](std::size_t k) { diagonal = diagonal && problem.E.column[k] == row; });
+    return diagonal;
+}
+
+namespace {
+
+/// Makes a matrix absent; its memory stays.
+void clear(SparseMatrix& matrix) {
+    if (matrix.rows == 0) return;
+    matrix.rows = matrix.columns = 0;
+    matrix.row_start.assign(1, 0);
+    matrix.column.clear();
+    matrix.value.clear();
+}
+
+/// Makes `to` one row and column larger: by the entry of `from` on its diagonal in that row, if there is one.
+void append_diagonal_row(const SparseMatrix& from, std::int32_t row, SparseMatrix& to) {
+    for_each_entry(from, row, [&](std::size_t k) {
+        to.column.push_back(to.rows);
+        to.value.push_back(from.value[k]);
+    });
+    to.columns = ++to.rows;
+    to.row_start.push_back(static_cast<std::int32_t>(to.value.size()));
+}
+
+}  // namespace
+
 void Islands::part(const Island& island, Problem& part) const {
     const Problem& whole = *problem_;
     part.name = whole.name;
@@ -207,6 +237,14 @@ void Islands::part(const Island& island, Problem& part) const {
         }
     }
     end(part.D);
+
+    clear(part.E);
+    if (whole.E.rows == 0) return;
+    for (const auto c : island.cones)
+        for (auto row = first_row_[static_cast<std::size_t>(c)]; row < first_row_[static_cast<std::size_t>(c) + 1];
+             ++row)
+            append_diagonal_row(whole.E, row, part.E);
+    if (part.E.value.empty()) clear(part.E);
 }
 
 std::uint64_t Islands::identity(const Island& island) const {
@@ -235,6 +273,9 @@ std::uint64_t Islands::identity(const Island& island) const {
         add(whole.D.column, begin, end);
         add(whole.D.value, begin, end);
         add(whole.b, first, last);
+        if (whole.E.rows > 0)
+            add(whole.E.value, whole.E.row_start[static_cast<std::size_t>(first)],
+                whole.E.row_start[static_cast<std::size_t>(last)]);
     }
     return std::max<std::uint64_t>(hash.value(), 2);
 }

@@ -16,9 +16,10 @@ struct Island {
     std::vector<std::int32_t> cones;  ///< indices into Problem::cones; empty: nothing touches these columns
 };
 
-/// The parts of a problem without E, by their first columns; those without cones are gathered in one part at the end,
-/// if there are any. Cones whose rows have no entries (between fixed bodies) belong to none: nothing that a solver does
-/// changes them. Linear in its entries, all parts together. Arrays are kept from problem to problem.
+/// The parts of a problem whose E is diagonal or absent, by their first columns; those without cones are gathered in
+/// one part at the end, if there are any. Cones whose rows have no entries (between fixed bodies) belong to none:
+/// nothing that a solver does changes them. Linear in its entries, all parts together. Arrays are kept from problem to
+/// problem.
 class Islands {
 public:
     /// Finds the parts of a problem, which must outlive their use. Neighbouring columns with equal numbers in bodies,
@@ -26,6 +27,8 @@ public:
     void find(const Problem& problem, std::span<const std::int32_t> bodies = {});
 
     [[nodiscard]] std::span<const Island> list() const { return {islands_.data(), count_}; }
+    /// Whether a problem can be cut into parts: its E links no rows.
+    [[nodiscard]] static bool can_part(const Problem& problem);
     /// The problem of one part, in place of what was in part.
     void part(const Island& island, Problem& part) const;
     /// A hash of a part: its columns, its cones, and their entries in D, a and b. Neither 0 nor 1.

@@ -63,6 +63,8 @@ struct StepSolver::Implementation {
     /// Whether the velocities without reactions vanish in rounding, so that no reactions are the answer: what recovers
     /// a penetration at constant speed is such a case. Errors relative to them say nothing. solution: that answer then.
     static bool moves_freely(const PreparedProblem& part, Solution& solution);
+    /// Whether x = 0 without reactions is the answer, but for numbers too small to be squared.
+    static bool is_at_rest(const Problem& problem);
 
     /// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
     static constexpr double rounding_limit = 1e-8;
@@ -115,7 +117,8 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
-    if (!self.leaves_out || m == 0 || problem.E.rows > 0) return self.solve_part(problem, solution, warm_start, 0, {});
+    if (!self.leaves_out || m == 0 || !Islands::can_part(problem))
+        return self.solve_part(problem, solution, warm_start, 0, {});
 
     self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
@@ -196,12 +199,31 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     return false;
 }
 
+// What dry friction stops loses a share of its speed in each step that is as small as the tolerance, until the squares
+// of all numbers vanish and no error can be measured any more. Far above that it counts as rest.
+bool StepSolver::Implementation::is_at_rest(const Problem& problem) {
+    constexpr double nothing = 1e-100;
+    const auto vanish = [](const std::vector<double>& values) {
+        return std::all_of(values.begin(), values.end(), [](double value) { return std::abs(value) < nothing; });
+    };
+    const auto hold_zero = [](const Cone& cone) {
+        return std::all_of(cone.lo.begin(), cone.lo.end(), [](double bound) { return bound <= 0.0; }) &&
+               std::all_of(cone.hi.begin(), cone.hi.end(), [](double bound) { return bound >= 0.0; });
+    };
+    return vanish(problem.a) && vanish(problem.b) && std::all_of(problem.cones.begin(), problem.cones.end(), hold_zero);
+}
+
 bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solution& solution) {
     const Structure structure = part.structure();
     if (structure != Structure::Diagonal && structure != Structure::Blocks && structure != Structure::Definite)
         return false;
     Solution free;
     free.lambda.assign(solution.lambda.size(), 0.0);
+    if (is_at_rest(part.problem())) {
+        free.x.assign(static_cast<std::size_t>(part.problem().n()), 0.0);
+        solution = std::move(free);
+        return true;
+    }
     part.meter().velocity_of(free.lambda, free.x);
     const Errors error = part.meter().measure(free.x, free.lambda);
     constexpr double no_digits = 1e-3;  // of rounding: what is measured has three digits at most
@@ -259,7 +281,7 @@ std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
         if (const auto law = implementation_->config.law) prepared.set_law(*law);
         return Part{part.n(), part.m(), prepared.structure(), prepared.needs()};
     };
-    if (!implementation_->leaves_out || problem.m() == 0 || problem.E.rows > 0) return {part_of(problem)};
+    if (!implementation_->leaves_out || problem.m() == 0 || !Islands::can_part(problem)) return {part_of(problem)};
     Islands islands;
     islands.find(problem);
     std::vector<Part> result;

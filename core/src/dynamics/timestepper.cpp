@@ -83,9 +83,9 @@ std::unique_ptr<Timestepper> make_timestepper(std::string_view name, DynamicalSy
                                       system.m(),
                                       fmt::join(names_where([](const auto& row) { return row.constraints; }), ", ")));
     if (system.has_unilateral() && !info->unilateral)
-        throw Unsupported(fmt::format("{} takes no contacts, stops or force limits, which the system has. Can: {}",
-                                      info->name,
-                                      fmt::join(names_where([](const auto& row) { return row.unilateral; }), ", ")));
+        throw Unsupported(fmt::format(
+            "{} takes no contacts, stops, dry friction of joints or force limits, which the system has. Can: {}",
+            info->name, fmt::join(names_where([](const auto& row) { return row.unilateral; }), ", ")));
     return info->make(system, values);
 }
 

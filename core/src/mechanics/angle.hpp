@@ -29,11 +29,25 @@ struct Angle {
     [[nodiscard]] double rate(const Placements& at) const {
         return coefficients(at, true).dot(at[second].omega) + coefficients(at, false).dot(at[first].omega);
     }
+    /// The parts of θ̇ and θ̈ that bodies of prescribed motion have.
+    [[nodiscard]] double prescribed_rate(const Placements& at) const { return prescribed_part(at, &Placement::omega); }
+    [[nodiscard]] double prescribed_acceleration(const Placements& at) const {
+        return prescribed_part(at, &Placement::turning);
+    }
     /// Derivative of coefficients(second) along θ of the second and of the first body: [Aᵀz]× and −A_sᵀA_f [z̄]×. Those
     /// of the first are constant.
     [[nodiscard]] Matrix3d turning(const Placements& at, bool along_second) const {
         const Matrix3d relative = at[second].A.transpose() * at[first].A;
         return along_second ? skew(relative * z) : Matrix3d(-relative * skew(z));
+    }
+
+private:
+    [[nodiscard]] double prescribed_part(const Placements& at, Vector3d Placement::*of) const {
+        double sum = 0.0;
+        for (const bool of_second : {true, false})
+            if (const auto& place = at[of_second ? second : first]; place.prescribed())
+                sum += coefficients(at, of_second).dot(place.*of);
+        return sum;
     }
 };
 

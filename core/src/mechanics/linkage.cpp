@@ -66,7 +66,9 @@ std::vector<Linkage> Linkage::of(const std::vector<Body>& bodies, const std::vec
         if (const auto group = groups.find(find(static_cast<BodyIndex>(k))); group != groups.end())
             group->second.first.push_back(static_cast<BodyIndex>(k));
     const auto placements = std::make_shared<Placements>(at);
-    for (std::size_t k = 0; k < bodies.size(); ++k) (*placements)[static_cast<BodyIndex>(k)].column = -1;
+    for (std::size_t k = 0; k < bodies.size(); ++k)
+        (*placements)[static_cast<BodyIndex>(k)].column =
+            bodies[k].prescribed ? prescribed_column(static_cast<BodyIndex>(k)) : -1;
     std::vector<Linkage> linkages;
     for (auto& [first, group] : groups)
         linkages.push_back(Linkage(bodies, joints, std::move(group.first), group.second, placements));
@@ -77,6 +79,8 @@ std::vector<Linkage> Linkage::of(const std::vector<Body>& bodies, const std::vec
 Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& joints, std::vector<BodyIndex> members,
                  const std::vector<std::int32_t>& own_joints, std::shared_ptr<Placements> at)
     : bodies_(&bodies), members_(std::move(members)), at_(std::move(at)) {
+    for (std::size_t k = 0; k < bodies.size(); ++k)
+        if (bodies[k].prescribed) prescribed_.push_back(static_cast<BodyIndex>(k));
     Eigen::AlignedBox3d box;
     double radius = 0.0;
     for (std::size_t k = 0; k < members_.size(); ++k) {
@@ -185,6 +189,8 @@ void Linkage::increment(State& state, const Eigen::VectorXd& change) const {
 }
 
 void Linkage::place(const State& state) const {
+    for (const BodyIndex index : prescribed_)
+        (*bodies_)[static_cast<std::size_t>(index)].prescribed->place(state.t, (*at_)[index]);
     for (const BodyIndex index : members_) {
         const Body& body = (*bodies_)[static_cast<std::size_t>(index)];
         (*at_)[index].x = three(state.q, body.position);
@@ -219,6 +225,7 @@ void Linkage::evaluate(const State& state, const std::vector<std::size_t>& rows,
         if (one.row == nullptr) {
             const Gear& gear = *one.joint->gear;
             values.C[index] = gear.value(*at_);
+            values.rate[index] = gear.rate(*at_);
             add_turn(i, gear.second, 1.0);
             add_turn(i, gear.first, -gear.numerator / gear.denominator);
             continue;

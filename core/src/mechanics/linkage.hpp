@@ -100,7 +100,7 @@ private:
     bool move(State& state, std::uint32_t seed) const;
 
     const std::vector<Body>* bodies_;
-    std::vector<BodyIndex> members_;
+    std::vector<BodyIndex> members_, prescribed_;
     std::vector<RowOfJoint> rows_;
     std::vector<std::int32_t> numbers_;
     std::vector<std::size_t> all_, scleronomic_;

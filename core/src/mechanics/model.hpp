@@ -9,6 +9,7 @@
 
 #include "delassus/multibody.hpp"
 #include "mechanics/angle.hpp"
+#include "mechanics/prescribed_motion.hpp"
 #include "mechanics/row.hpp"
 
 namespace delassus::mechanics {
@@ -16,7 +17,8 @@ namespace delassus::mechanics {
 struct Body {
     BodyParameters parameters;
     Matrix3d inertia = Matrix3d::Identity();
-    std::int32_t position = -1, column = -1;  ///< first entries in q and v; −1 if fixed
+    std::int32_t position = -1, column = -1;             ///< first entries in q and v; −1 if fixed or prescribed
+    std::shared_ptr<const PrescribedMotion> prescribed;  ///< null: it moves freely, or is fixed
 };
 
 /// What a step reads of each body that moves, side by side.
@@ -41,6 +43,13 @@ struct Gear {
     double numerator = 1.0, denominator = 1.0;
     double offset = 0.0;  ///< at t = 0
 
+    /// ∂/∂t, by bodies whose motion is prescribed, and the part of d²/dt² that their accelerations make.
+    [[nodiscard]] double rate(const Placements& at) const {
+        return second.prescribed_rate(at) - numerator / denominator * first.prescribed_rate(at);
+    }
+    [[nodiscard]] double acceleration(const Placements& at) const {
+        return second.prescribed_acceleration(at) - numerator / denominator * first.prescribed_acceleration(at);
+    }
     [[nodiscard]] double value(const Placements& at) const {
         const double angle = denominator * second.value(at) - numerator * first.value(at) - offset;
         return std::remainder(angle, 2.0 * M_PI) / denominator;
@@ -62,13 +71,63 @@ struct Joint {
 struct BoundedMotor {
     std::int32_t joint = -1;
     Motion speed;
-    double limit = 0.0;
+    Cone box;  ///< of its limit
 };
 
-/// Potential ½ k C² and damping force −c Ċ ∇C of a row.
-struct RowSpring {
-    Row row;
+/// Forces of one row up to a limit, both ways.
+inline Cone box_of(double limit) {
+    return Cone::box({-limit}, {limit});
+}
+
+/// A servo with a force limit: a box row with a compliance.
+struct BoundedActuator {
+    std::int32_t joint = -1;
+    Motion position, speed;  ///< both there
+    double kp = 0.0, kd = 0.0;
+    Cone box;                           ///< of its limit
+    const double* reference = nullptr;  ///< of an angle: see Turn
+};
+
+/// Dry friction in a coordinate of a joint: a box row on its speed.
+struct JointFriction {
+    std::int32_t joint = -1;
+    bool turns = false;  ///< the coordinate is the angle, else the slide
+    Cone box;            ///< of its bound
+};
+
+/// The angle θ of a joint over whole turns as a coordinate with the members of a Row: C = θ − offset − drive(t). Its
+/// derivatives are those where the joint holds.
+struct Turn {
+    Angle angle;
+    double offset = 0.0;
+    const Motion* drive = nullptr;
+    const double* reference = nullptr;  ///< the angle lately: the nearest value modulo 2π counts
+
+    /// θ, from where it was lately.
+    static double nearest(double angle, double reference) {
+        return angle + 2.0 * M_PI * std::round((reference - angle) / (2.0 * M_PI));
+    }
+    [[nodiscard]] RowColumns columns(const Placements& at, bool with_prescribed = false) const;
+    [[nodiscard]] double value(const Placements& at, double t) const;
+    void gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const;
+    void hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const;
+};
+
+/// The force −(k C + c Ċ) ∇C of a coordinate C, a Row or a Turn.
+template <class Coordinate>
+struct CoordinateSpring {
+    Coordinate row;
     double stiffness = 0.0, damping = 0.0;
+    bool potential = true;  ///< ½ k C² counts as energy; that of an actuator does not
+    bool definite = false;  ///< its symmetric tangent is positive semidefinite: k ∇C ∇Cᵀ
+};
+using RowSpring = CoordinateSpring<Row>;
+using TurnSpring = CoordinateSpring<Turn>;
+
+/// The torque −c (ω_second − ω_first) on the second body and its opposite on the first.
+struct TurnDamper {
+    BodyIndex first = world_body, second = world_body;
+    double damping = 0.0;
 };
 
 struct Load {

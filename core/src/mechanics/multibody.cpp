@@ -82,7 +82,19 @@ BodyIndex MultibodySystem::add_body(const BodyParameters& parameters) {
     body.parameters = parameters;
     body.parameters.pose.orientation = normalized(parameters.pose.orientation, name);
     body.inertia = tensor(parameters.inertia);
-    if (!parameters.fixed) check_inertia(name, body.inertia);
+    if (parameters.motion) {
+        const BodyMotion& motion = *parameters.motion;
+        refuse_unless(!parameters.fixed, "the body", name, "is fixed and has a motion; it can have one of them");
+        refuse_unless(finite(motion.axis) && vector(motion.axis).norm() > 0.0, "the axis of the motion of body", name,
+                      "has no direction");
+        refuse_unless(!motion.point || finite(*motion.point), "the point of the motion of body", name, "is not finite");
+        body.prescribed = std::make_shared<mechanics::PrescribedMotion>(motion, body.parameters.pose);
+        body.parameters.pose = body.prescribed->pose(0.0);
+        refuse_unless(finite(body.parameters.pose.position) && std::isfinite(body.parameters.pose.orientation[0]),
+                      "the motion of body", name, "is not finite at t = 0");
+    } else if (!parameters.fixed) {
+        check_inertia(name, body.inertia);
+    }
     self.bodies.push_back(std::move(body));
     return static_cast<BodyIndex>(self.bodies.size()) - 1;
 }
@@ -125,9 +137,12 @@ std::int32_t MultibodySystem::add_joint(const JointParameters& parameters) {
     refuse_unless(
         !(parameters.lower > parameters.upper), "the limits of the joint", name,
         fmt::format("are {} and {}; the lower must not exceed the upper", parameters.lower, parameters.upper));
+    mechanics::check_joint_forces(parameters);
     self.joints.push_back(mechanics::make_joint(parameters, self.initial_placements(), self.joints));
     if (parameters.kind != JointKind::Gear) keep_apart(parameters.first, parameters.second);
-    return static_cast<std::int32_t>(self.joints.size()) - 1;
+    const auto index = static_cast<std::int32_t>(self.joints.size()) - 1;
+    self.add_joint_forces(index);
+    return index;
 }
 
 void MultibodySystem::add_motor(const MotorParameters& motor) {
@@ -146,8 +161,46 @@ void MultibodySystem::add_motor(const MotorParameters& motor) {
         mechanics::drive_joint(joint, motor, self.motions);
     } else {
         refuse_unless(motor.speed, "the motor", name, "has a force limit, so it must be driven by speed");
-        self.bounded_motors.push_back({motor.joint, motor.motion, motor.force_limit});
+        self.bounded_motors.push_back({motor.joint, motor.motion, mechanics::box_of(motor.force_limit)});
     }
+}
+
+void MultibodySystem::add_actuator(const ActuatorParameters& actuator) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    const auto& name = actuator.name;
+    refuse_unless(actuator.joint >= 0 && actuator.joint < static_cast<std::int32_t>(self.joints.size()), "the actuator",
+                  name, "drives no joint of the system");
+    const JointKind kind = self.joints[static_cast<std::size_t>(actuator.joint)].parameters.kind;
+    refuse_unless(kind == JointKind::Revolute || kind == JointKind::Prismatic, "the actuator", name,
+                  "must drive a revolute or a prismatic joint");
+    refuse_unless(mechanics::finite_and_not_negative({actuator.kp, actuator.kd}) && actuator.kp + actuator.kd > 0.0,
+                  "the gains of the actuator", name, "must be finite and not negative, and kp or kd must be positive");
+    refuse_unless(actuator.force_limit >= 0.0, "the force limit of the actuator", name, "must not be negative");
+    const bool position = static_cast<bool>(actuator.position.value), speed = static_cast<bool>(actuator.speed.value);
+    refuse_unless(position == (actuator.kp > 0.0), "the actuator", name,
+                  position ? "has a position to go to, but no kp" : "has a kp, but no position to go to");
+    refuse_unless(position || speed, "the actuator", name, "has neither a position nor a speed to go to");
+    const auto zero = [](double) { return 0.0; };
+    const Motion& place = position ? actuator.position : Motion{zero, zero, zero, zero};
+    const auto rate = speed ? actuator.speed.value : actuator.position.rate;
+    if (!std::isinf(actuator.force_limit)) {
+        self.bounded_actuators.push_back({actuator.joint,
+                                          place,
+                                          {rate, nullptr, nullptr, nullptr},
+                                          actuator.kp,
+                                          actuator.kd,
+                                          mechanics::box_of(actuator.force_limit),
+                                          kind == JointKind::Revolute ? self.count_turns_of(actuator.joint) : nullptr});
+        return;
+    }
+    const auto drive = [&](double kp, double kd, const Motion& target) {
+        self.motions.push_back(std::make_unique<Motion>(target));
+        self.add_coordinate_spring(actuator.joint, kind == JointKind::Revolute, kp, kd, 0.0, self.motions.back().get(),
+                                   false);
+    };
+    if (actuator.kp > 0.0) drive(actuator.kp, 0.0, place);
+    if (actuator.kd > 0.0) drive(0.0, actuator.kd, {zero, rate, nullptr, nullptr});
 }
 
 void MultibodySystem::add_spring(const SpringParameters& spring) {
@@ -258,6 +311,10 @@ void MultibodySystem::finish() {
     for (std::size_t k = 0; k < self.bodies.size(); ++k) {
         auto& body = self.bodies[k];
         if (body.parameters.fixed) continue;
+        if (body.prescribed) {
+            self.prescribed.push_back(static_cast<BodyIndex>(k));
+            continue;
+        }
         body.position = self.position_size;
         body.column = self.n;
         self.position_size += 7;
@@ -284,7 +341,8 @@ void MultibodySystem::finish() {
     }
     self.at = self.initial_placements();
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
-        self.at[static_cast<BodyIndex>(k)].column = self.bodies[k].column;
+        self.at[static_cast<BodyIndex>(k)].column =
+            self.bodies[k].prescribed ? mechanics::prescribed_column(static_cast<BodyIndex>(k)) : self.bodies[k].column;
     std::int32_t rows = 0;
     for (auto& joint : self.joints) {
         joint.first_row = rows;
@@ -317,8 +375,9 @@ void MultibodySystem::Implementation::find_bodies_alone(const MultibodySystem& s
 
 // ---- Reading states ----
 
-void MultibodySystem::Implementation::place(const double* q, const double* v) const {
+void MultibodySystem::Implementation::place(const double* q, const double* v, double t) const {
     must_be_finished();
+    for (const auto index : prescribed) bodies[static_cast<std::size_t>(index)].prescribed->place(t, at[index]);
     for (const auto& body : moving) {
         auto& place = at[body.body];
         const double* from = q + body.position;
@@ -400,13 +459,14 @@ BodyIndex MultibodySystem::find_body(const std::string& name) const {
 Pose MultibodySystem::pose(const State& state, BodyIndex index) const {
     if (index == world_body) return {};
     implementation_->check_body(index, "pose()");
-    return implementation_->pose_of(static_cast<std::size_t>(index), state.q.data());
+    return implementation_->pose_of(static_cast<std::size_t>(index), state);
 }
 
-Pose MultibodySystem::Implementation::pose_of(std::size_t index, const double* state_q) const {
+Pose MultibodySystem::Implementation::pose_of(std::size_t index, const State& state) const {
     const auto& body = bodies[index];
+    if (body.prescribed) return body.prescribed->pose(state.t);
     if (body.column < 0) return body.parameters.pose;
-    const double* q = state_q + body.position;
+    const double* q = state.q.data() + body.position;
     return {{q[0], q[1], q[2]}, {q[3], q[4], q[5], q[6]}};
 }
 
@@ -414,6 +474,11 @@ std::array<Vector3, 2> MultibodySystem::velocities(const State& state, BodyIndex
     if (index == world_body) return {};
     implementation_->check_body(index, "velocities()");
     const auto& body = implementation_->bodies[static_cast<std::size_t>(index)];
+    if (body.prescribed) {
+        mechanics::Placement place;
+        body.prescribed->place(state.t, place);
+        return {array(place.v), array(place.omega)};
+    }
     if (body.column < 0) return {};
     const double* v = state.v.data() + body.column;
     return {Vector3{v[0], v[1], v[2]}, Vector3{v[3], v[4], v[5]}};
@@ -520,7 +585,7 @@ double MultibodySystem::kinetic_energy(const State& state) const {
 
 std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), state.v.data());
+    self.place(state);
     Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
     for (std::size_t k = 0; k < self.bodies.size(); ++k) {
         if (self.bodies[k].column < 0) continue;
@@ -540,7 +605,7 @@ std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
 
 double MultibodySystem::energy(const State& state) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), state.v.data());
+    self.place(state);
     const Vector3d gravity = self.load_factor * vector(self.gravity);
     double energy = kinetic_energy(state);
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
@@ -550,10 +615,11 @@ double MultibodySystem::energy(const State& state) const {
         if (node.column >= 0)
             energy -= node.parameters.mass * gravity.dot(Eigen::Map<const Vector3d>(state.q.data() + node.position));
     self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
-    for (const auto& spring : self.springs) {
+    self.for_each_spring([&](const auto& spring) {
+        if (!spring.potential) return;
         const double stretch = spring.row.value(self.at, state.t);
         energy += 0.5 * spring.stiffness * stretch * stretch;
-    }
+    });
     return energy;
 }
 

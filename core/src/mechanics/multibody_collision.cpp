@@ -50,12 +50,13 @@ std::int32_t MultibodySystem::Implementation::owner_of(std::int32_t shape) const
     return static_cast<std::int32_t>(bodies.size()) + node_contacts[index - shapes.size()].node;
 }
 
+// Bodies whose motion is prescribed do not touch one another, nor fixed ones.
 // For the detector a node is a body that does not turn, after the bodies; its sphere comes after their shapes.
 void MultibodySystem::Implementation::make_detector() {
     CollisionSetup setup{shapes, {}, {apart.begin(), apart.end()}, {}};
     for (const auto& body : bodies) {
-        setup.fixed.push_back(body.column < 0);
-        setup.group.push_back(-1);
+        setup.fixed.push_back(body.column < 0 && !body.prescribed);
+        setup.group.push_back(prescribed.empty() || body.column >= 0 ? -1 : 1);
     }
     for (const auto& node : nodes) {
         setup.fixed.push_back(node.column < 0);
@@ -69,7 +70,8 @@ void MultibodySystem::Implementation::make_detector() {
         shape_material.push_back(contact.material);
     }
     const bool moves = std::any_of(setup.shapes.begin(), setup.shapes.end(), [&](const Shape& shape) {
-        return shape.body >= 0 && !setup.fixed[static_cast<std::size_t>(shape.body)];
+        const auto body = static_cast<std::size_t>(shape.body);
+        return shape.body >= 0 && !setup.fixed[body] && (body >= bodies.size() || !bodies[body].prescribed);
     });
     if (!moves || setup.shapes.size() < 2) {
         if (!leaves_out) static_cast<void>(make_collision_detector({}));

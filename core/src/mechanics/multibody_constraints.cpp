@@ -42,14 +42,14 @@ std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
 
 void MultibodySystem::constraint(const State& state, double* C) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), nullptr);
+    self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { C[i] = row.value(self.at, state.t); });
     self.for_each_gear([&](std::int32_t i, const Gear& gear) { C[i] = gear.value(self.at); });
 }
 
 void MultibodySystem::all_constraints(const State& state, double* C) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), nullptr);
+    self.place(state.q.data(), nullptr, state.t);
     for (const auto& joint : self.joints) {
         double* own = C + joint.first_row;
         if (joint.gear) own[0] = joint.gear->value(self.at);
@@ -59,7 +59,7 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
 
 void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), nullptr);
+    self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) {
         const auto columns = row.columns(self.at);
         row.gradient(self.at, state.t, columns, self.gradient);
@@ -80,18 +80,18 @@ void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t f
 
 void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), nullptr);
+    self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { C_t[i] = row.rate(self.at, state.t); });
-    self.for_each_gear([&](std::int32_t i, const Gear&) { C_t[i] = 0.0; });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) { C_t[i] = gear.rate(self.at); });
 }
 
 void MultibodySystem::constraint_curvature(const State& state, double* c) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), state.v.data());
+    self.place(state);
     self.for_each_row([&](std::int32_t i, const Row& row) { c[i] = row.curvature(self.at, state.t); });
     // θ̇ = z · (ω_s − ω_f), and at ω̄˙ = 0 also ω̇ = 0: what is left is ż · (ω_s − ω_f) = (ω_f × z) · ω_s.
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
-        c[i] = 0.0;
+        c[i] = gear.acceleration(self.at);
         for (const auto& [angle, factor] : self.terms_of(gear)) {
             const auto &first = self.at[angle.first], &second = self.at[angle.second];
             c[i] += factor * (first.A * first.omega.cross(angle.z)).dot(second.A * second.omega);
@@ -102,7 +102,7 @@ void MultibodySystem::constraint_curvature(const State& state, double* c) const 
 void MultibodySystem::add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
                                                MatrixAssembler& H) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), nullptr);
+    self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) {
         const auto columns = row.columns(self.at);
         row.hessian(self.at, state.t, columns, self.hessian);
@@ -146,7 +146,7 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
 void MultibodySystem::add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
                                                         MatrixAssembler& H) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), nullptr);
+    self.place(state.q.data(), nullptr, state.t);
     for (const auto& joint : self.joints) {
         Vector3d force = Vector3d::Zero();  // of all rows on the span of points that they share
         const Feature* span = nullptr;

@@ -5,8 +5,11 @@
 namespace delassus {
 
 using mechanics::Matrix3d;
+using mechanics::Placements;
+using mechanics::RowColumns;
 using mechanics::RowMatrix;
 using mechanics::RowVector;
+using mechanics::TurnDamper;
 using mechanics::vector;
 using mechanics::Vector3d;
 
@@ -36,11 +39,52 @@ void add_element(const Matrix& matrix, const Nodes& at, double factor, Tangent t
         }
 }
 
+/// The velocities of the bodies of a row, in the order of its columns.
+RowVector velocities_of(const RowColumns& columns, const Placements& at) {
+    RowVector v(6 * columns.bodies);
+    for (int k = 0; k < columns.bodies; ++k) {
+        const auto& place = at[columns.body[static_cast<std::size_t>(k)]];
+        v.segment<3>(6 * k) = place.v;
+        v.segment<3>(6 * k + 3) = place.omega;
+    }
+    return v;
+}
+
+// In the frames of the bodies the torques are −c (ω̄_s − P ω̄_f) on the second and −c (ω̄_f − Pᵀ ω̄_s) on the first, with
+// P = A_sᵀ A_f. Along increments δ(P ω̄_f) = [P ω̄_f]× θ_s − P [ω̄_f]× θ_f, and the same with the bodies exchanged.
+/// H += factor c · blocks on a body's own turning and on the other's: own(P, ω̄_other) and other(P, ω̄_other).
+template <class Own, class Other>
+void add_damper(const TurnDamper& damper, const Placements& at, double factor, Tangent tangent, MatrixAssembler& H,
+                Own&& own, Other&& other) {
+    RowColumns columns;
+    for (const BodyIndex body : {damper.first, damper.second})
+        if (at[body].column >= 0) columns.add(body, at[body].column);
+    RowMatrix matrix = RowMatrix::Zero(6 * columns.bodies, 6 * columns.bodies);
+    for (const auto& [here, there] :
+         {std::pair{&at[damper.second], &at[damper.first]}, {&at[damper.first], &at[damper.second]}}) {
+        const int row = columns.place(here->column), column = columns.place(there->column);
+        const Matrix3d P = here->A.transpose() * there->A;
+        if (row >= 0) matrix.block<3, 3>(row + 3, row + 3) += damper.damping * own(P, there->omega);
+        if (row >= 0 && column >= 0) matrix.block<3, 3>(row + 3, column + 3) += damper.damping * other(P, there->omega);
+    }
+    add_local(columns, matrix, factor, tangent, H);
+}
+
 Vector3d at_time(const std::array<Motion, 3>& motions, double t) {
     Vector3d result = Vector3d::Zero();
     for (std::size_t i = 0; i < 3; ++i)
         if (motions[i].value) result[static_cast<Eigen::Index>(i)] = motions[i].value(t);
     return result;
+}
+
+// A force F̄ and a torque T̄ in the frame of the body: f = (A F̄, s̄ × F̄ + T̄), so that −∂f/∂θ = (A [F̄]×, 0). The
+// symmetric tangent takes nothing of it: half of it with its transpose would be indefinite, and in a linearised step
+// the transpose is a torque that does not exist, by which a force through the mass centre would change the spin.
+void add_follower(const mechanics::Load& load, const mechanics::Placement& place, double t, double factor,
+                  Tangent tangent, MatrixAssembler& H) {
+    if (tangent == Tangent::Symmetric) return;
+    const RowMajor3 K = place.A * skew(at_time(load.parameters.force, t));
+    H.add_block(place.column, place.column + 3, 3, 3, K.data(), factor);
 }
 
 }  // namespace
@@ -77,7 +121,7 @@ void MultibodySystem::multiply_mass(const State&, double factor, const double* x
 // (F, s̄ × Aᵀ F + Aᵀ T).
 void MultibodySystem::add_force(const State& state, double factor, double* result) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), state.v.data());
+    self.place(state);
     const Vector3d gravity = self.load_factor * vector(self.gravity);
     for (const auto& body : self.moving) {
         const Vector3d& omega = self.at[body.body].omega;
@@ -86,17 +130,23 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
     }
     for (const auto& node : self.nodes)
         if (node.column >= 0) Eigen::Map<Vector3d>(result + node.column) += factor * node.parameters.mass * gravity;
-    for (const auto& spring : self.springs) {
-        const auto columns = spring.row.columns(self.at);
+    self.for_each_spring([&](const auto& spring) {
+        const auto columns = spring.row.columns(self.at, true);
         spring.row.gradient(self.at, state.t, columns, self.gradient);
         double force = spring.stiffness * spring.row.value(self.at, state.t);
+        const RowVector v = velocities_of(columns, self.at);
+        for (int k = 0; k < 6 * columns.bodies; ++k) force += spring.damping * self.gradient[k] * v[k];
+        if (spring.row.drive) force -= spring.damping * spring.row.drive->rate(state.t);
         for (int k = 0; k < columns.bodies; ++k)
-            for (int i = 0; i < 6; ++i)
-                force += spring.damping * self.gradient[6 * k + i] *
-                         state.v[static_cast<std::size_t>(columns.column[static_cast<std::size_t>(k)] + i)];
-        for (int k = 0; k < columns.bodies; ++k)
-            for (int i = 0; i < 6; ++i)
-                result[columns.column[static_cast<std::size_t>(k)] + i] -= factor * force * self.gradient[6 * k + i];
+            if (const auto column = columns.column[static_cast<std::size_t>(k)]; column >= 0)
+                for (int i = 0; i < 6; ++i) result[column + i] -= factor * force * self.gradient[6 * k + i];
+    });
+    for (const auto& damper : self.turn_dampers) {
+        const auto &first = self.at[damper.first], &second = self.at[damper.second];
+        const Vector3d torque = -damper.damping * (second.A * second.omega - first.A * first.omega);
+        for (const auto& [place, sign] : {std::pair{&first, -1.0}, {&second, 1.0}})
+            if (place->column >= 0)
+                Eigen::Map<Vector3d>(result + place->column + 3) += factor * sign * (place->A.transpose() * torque);
     }
     self.for_each_element(state, [&](const auto& element, const auto& at) {
         using Element = std::decay_t<decltype(element)>;
@@ -112,32 +162,47 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
         const Vector3d force = self.load_factor * at_time(load.parameters.force, state.t);
-        const Vector3d torque = self.load_factor * (place.A.transpose() * at_time(load.parameters.torque, state.t));
+        const Vector3d torque = self.load_factor * at_time(load.parameters.torque, state.t);
+        if (load.parameters.follower) {
+            Eigen::Map<Vector3d>(result + place.column) += factor * (place.A * force);
+            Eigen::Map<Vector3d>(result + place.column + 3) += factor * (load.point.cross(force) + torque);
+            continue;
+        }
         Eigen::Map<Vector3d>(result + place.column) += factor * force;
         Eigen::Map<Vector3d>(result + place.column + 3) +=
-            factor * (load.point.cross(place.A.transpose() * force) + torque);
+            factor * (load.point.cross(place.A.transpose() * force) + place.A.transpose() * torque);
     }
 }
 
 // Springs: f = −(k C + c Ċ) ∇C, so that K = k ∇C ∇Cᵀ + (k C + c Ċ) ∇²C + c ∇C (∂Ċ/∂q)ᵀ with Ċ = ∇C · v and
-// (∂Ċ/∂q)_j = Σ_i v_i ∇²C_ij. Loads: −∂(s̄ × Aᵀ F + Aᵀ T)/∂θ = −[s̄]× [Aᵀ F]× − [Aᵀ T]×.
+// (∂Ċ/∂q)_j = Σ_i v_i ∇²C_ij. The force of an actuator may be large beside light links, and ∇²C is indefinite: the
+// symmetric tangent of a joint's coordinate takes k ∇C ∇Cᵀ alone. Loads: −∂(s̄ × Aᵀ F + Aᵀ T)/∂θ = −[s̄]× [Aᵀ F]× − [Aᵀ
+// T]×.
 void MultibodySystem::add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), state.v.data());
-    for (const auto& spring : self.springs) {
-        const auto columns = spring.row.columns(self.at);
+    self.place(state);
+    self.for_each_spring([&](const auto& spring) {
+        const auto columns = spring.row.columns(self.at, true);
         spring.row.gradient(self.at, state.t, columns, self.gradient);
+        if (spring.definite && tangent == Tangent::Symmetric) {
+            const RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose();
+            return add_local(columns, K, factor, tangent, H);
+        }
         spring.row.hessian(self.at, state.t, columns, self.hessian);
-        RowVector v(6 * columns.bodies);
-        for (int k = 0; k < columns.bodies; ++k)
-            v.segment<6>(6 * k) = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(
-                state.v.data() + columns.column[static_cast<std::size_t>(k)]);
-        const double force =
-            spring.stiffness * spring.row.value(self.at, state.t) + spring.damping * self.gradient.dot(v);
+        const RowVector v = velocities_of(columns, self.at);
+        double force = spring.stiffness * spring.row.value(self.at, state.t) + spring.damping * self.gradient.dot(v);
+        if (spring.row.drive) force -= spring.damping * spring.row.drive->rate(state.t);
         const RowVector turning = self.hessian.transpose() * v;
         RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose() + force * self.hessian;
         K += spring.damping * self.gradient * turning.transpose();
         add_local(columns, K, factor, tangent, H);
+    });
+    for (const auto& damper : self.turn_dampers) {
+        if (tangent == Tangent::Symmetric) break;  // as of coordinates
+        add_damper(
+            damper, self.at, factor, tangent, H,
+            [](const Matrix3d& P, const Vector3d& omega) -> Matrix3d { return -skew(P * omega); },
+            [](const Matrix3d& P, const Vector3d& omega) -> Matrix3d { return P * skew(omega); });
     }
     self.for_each_element(state, [&](const auto& element, const auto& at) {
         using Element = std::decay_t<decltype(element)>;
@@ -148,6 +213,10 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
     for (const auto& load : self.loads) {
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
+        if (load.parameters.follower) {
+            add_follower(load, place, state.t, factor * self.load_factor, tangent, H);
+            continue;
+        }
         const Vector3d force = place.A.transpose() * at_time(load.parameters.force, state.t);
         const Vector3d torque = place.A.transpose() * at_time(load.parameters.torque, state.t);
         add_matrix(place.column + 3, place.column + 3, -skew(load.point) * skew(force) - skew(torque),
@@ -158,14 +227,19 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
 // Springs: R = c ∇C ∇Cᵀ.
 void MultibodySystem::add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
-    self.place(state.q.data(), state.v.data());
-    for (const auto& spring : self.springs) {
-        if (spring.damping == 0.0) continue;
+    self.place(state);
+    self.for_each_spring([&](const auto& spring) {
+        if (spring.damping == 0.0) return;
         const auto columns = spring.row.columns(self.at);
         spring.row.gradient(self.at, state.t, columns, self.gradient);
         const RowMatrix R = spring.damping * self.gradient * self.gradient.transpose();
         add_local(columns, R, factor, tangent, H);
-    }
+    });
+    for (const auto& damper : self.turn_dampers)
+        add_damper(
+            damper, self.at, factor, tangent, H,
+            [](const Matrix3d&, const Vector3d&) -> Matrix3d { return Matrix3d::Identity(); },
+            [](const Matrix3d& relative, const Vector3d&) -> Matrix3d { return -relative; });
     self.for_each_element(state, [&](const auto& element, const auto& at) {
         if (!element.damped()) return;
         using Element = std::decay_t<decltype(element)>;
@@ -177,8 +251,8 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
 
 bool MultibodySystem::has_stiffness() const {
     const auto& self = *implementation_;
-    return !self.springs.empty() || !self.loads.empty() || !self.tetrahedra.empty() || !self.cables.empty() ||
-           !self.beams.empty();
+    return !self.springs.empty() || !self.turn_springs.empty() || !self.turn_dampers.empty() || !self.loads.empty() ||
+           !self.tetrahedra.empty() || !self.cables.empty() || !self.beams.empty();
 }
 
 }  // namespace delassus

@@ -18,11 +18,20 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::Node> nodes;
     std::vector<mechanics::Joint> joints;
     std::vector<mechanics::RowSpring> springs;
+    std::vector<mechanics::TurnSpring> turn_springs;
+    std::vector<mechanics::TurnDamper> turn_dampers;
+    std::vector<mechanics::JointFriction> frictions;
+    struct CountedAngle {
+        std::int32_t joint = -1;
+        std::unique_ptr<double> reference;  ///< its address lasts
+    };
+    std::vector<CountedAngle> counted;
     std::vector<mechanics::Load> loads;
     std::vector<mechanics::Tetrahedron> tetrahedra;
     std::vector<mechanics::Cable> cables;
     std::vector<mechanics::Beam> beams;
     std::vector<mechanics::BoundedMotor> bounded_motors;
+    std::vector<mechanics::BoundedActuator> bounded_actuators;
     mechanics::Motions motions;
     std::vector<Shape> shapes;
     std::vector<std::int32_t> shape_material;  // of shapes, then of node contacts
@@ -47,9 +56,10 @@ struct MultibodySystem::Implementation {
     std::vector<std::int32_t> first_kept_rows;  // those of assemble()
     std::vector<mechanics::Linkage> redundant;  // those with rows that are left out
     std::vector<mechanics::MovingBody> moving;
-    bool gyroscopic = false;   // a moving body whose moments differ
-    double load_factor = 1.0;  // of weight and loads
-    double size = 0.0;         // the median of the shapes that collide
+    std::vector<BodyIndex> prescribed;  // bodies that move as they are told
+    bool gyroscopic = false;            // a moving body whose moments differ
+    double load_factor = 1.0;           // of weight and loads
+    double size = 0.0;                  // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
     bool leaves_out = true;  ///< what no contact needs
 
@@ -67,7 +77,22 @@ struct MultibodySystem::Implementation {
     /// Placements of all bodies so far at t = 0, without columns.
     [[nodiscard]] mechanics::Placements initial_placements() const;
     /// Placements of a state; v may be null for what needs positions alone.
-    void place(const double* q, const double* v) const;
+    void place(const double* q, const double* v, double t) const;
+    void place(const State& state) const { place(state.q.data(), state.v.data(), state.t); }
+
+    /// Where the angle of a joint counts its turns from.
+    const double* count_turns_of(std::int32_t joint);
+    /// −k (C − target(t)) − c (Ċ − target˙(t)), C being the coordinate less `rest`; target may be null.
+    void add_coordinate_spring(std::int32_t joint, bool turns, double stiffness, double damping, double rest,
+                               const Motion* target, bool potential);
+    /// What the parameters of a joint say of its coordinates.
+    void add_joint_forces(std::int32_t joint);
+    /// Visits the springs of rows, then those of angles.
+    template <class Visitor>
+    void for_each_spring(Visitor&& visit) const {
+        for (const auto& spring : springs) visit(spring);
+        for (const auto& spring : turn_springs) visit(spring);
+    }
 
     [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
     /// Visits all elements with the placements of their nodes or bodies: visit(element, placements). After place().
@@ -127,6 +152,7 @@ struct MultibodySystem::Implementation {
         std::int32_t column;           ///< −1 if fixed
         const mechanics::Matrix3d* A;  ///< null for a node
         mechanics::Vector3d arm;       ///< from the mass centre, world frame
+        mechanics::Vector3d velocity;  ///< of the point where it is prescribed, else 0
 
         /// The entries of sign · direction · ṗ.
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;
@@ -134,12 +160,16 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] PointOfOwner point_of(std::int32_t owner, const mechanics::Vector3d& point) const;
     /// Of the pair where it was given, else from both: the geometric mean of friction, the larger restitution.
     [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
-    [[nodiscard]] Pose pose_of(std::size_t body, const double* q) const;
+    [[nodiscard]] Pose pose_of(std::size_t body, const State& state) const;
+    /// The poses of all that collides, for the detector.
+    void place_shapes(const State& state);
     void make_detector();
     void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;
+    void collect_frictions(UnilateralRows& rows) const;
     void collect_motors(double t, UnilateralRows& rows) const;
+    void collect_actuators(double t, double h, UnilateralRows& rows) const;
     void collect_contacts(UnilateralRows& rows);
 };
 

@@ -15,7 +15,7 @@ using mechanics::Vector3d;
 namespace {
 
 /// Keys of blocks: what kind, then which one.
-enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4 };
+enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4, Friction = 5, Actuator = 6 };
 
 std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0, std::uint64_t third = 0) {
     // 4 + 24 + 24 + 12 bits.
@@ -42,8 +42,8 @@ std::uint64_t key_of(const ContactPoint& contact) {
 bool MultibodySystem::has_unilateral() const {
     const auto& self = *implementation_;
     self.must_be_finished();
-    return self.detector || !self.bounded_motors.empty() ||
-           std::any_of(self.joints.begin(), self.joints.end(), [](const auto& joint) {
+    return self.detector || !self.bounded_motors.empty() || !self.bounded_actuators.empty() ||
+           !self.frictions.empty() || std::any_of(self.joints.begin(), self.joints.end(), [](const auto& joint) {
                return !std::isnan(joint.parameters.lower) || !std::isnan(joint.parameters.upper);
            });
 }
@@ -51,31 +51,52 @@ bool MultibodySystem::has_unilateral() const {
 void MultibodySystem::collect_unilateral(const State& state, double h, UnilateralRows& rows) {
     auto& self = *implementation_;
     rows.clear();
-    self.place(state.q.data(), state.v.data());
+    self.place(state);
+    for (const auto index : self.prescribed)
+        self.bodies[static_cast<std::size_t>(index)].prescribed->place_for_step(state.t, h, self.at[index]);
     self.collect_limits(h, rows);
     self.collect_motors(state.t + h, rows);
+    self.collect_frictions(rows);
+    self.collect_actuators(state.t, h, rows);
     if (!self.detector) return;
-    for (const auto& body : self.moving) {
-        const double* q = state.q.data() + body.position;
-        self.poses[static_cast<std::size_t>(body.body)] = {{q[0], q[1], q[2]}, {q[3], q[4], q[5], q[6]}};
-    }
-    for (std::size_t k = 0; k < self.nodes.size(); ++k)
-        self.poses[self.bodies.size() + k].position =
-            mechanics::array(self.node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
+    self.place_shapes(state);
     self.detector->detect(self.poses, self.envelope, rows.contacts());
+    if (!self.prescribed.empty())
+        std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
+            return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&
+                   self.point_of(self.owner_of(contact.shape_b), {}).column < 0;
+        });
     self.collect_contacts(rows);
+}
+
+void MultibodySystem::Implementation::place_shapes(const State& state) {
+    for (const auto& body : moving) {
+        const double* q = state.q.data() + body.position;
+        poses[static_cast<std::size_t>(body.body)] = {{q[0], q[1], q[2]}, {q[3], q[4], q[5], q[6]}};
+    }
+    for (const auto index : prescribed)
+        poses[static_cast<std::size_t>(index)] = pose_of(static_cast<std::size_t>(index), state);
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+        poses[bodies.size() + k].position =
+            mechanics::array(node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
 }
 
 namespace {
 
-/// A joint's coordinate, its speed, and its row of D.
+/// A joint's coordinate, its speed, and the part of it that bodies of prescribed motion have.
 struct Coordinate {
-    double value = 0.0, speed = 0.0;
+    double value = 0.0, speed = 0.0, rate = 0.0;
 };
 
+double prescribed_rate_of(const mechanics::Joint& joint, bool turns, const mechanics::Placements& at) {
+    return turns ? joint.angle.prescribed_rate(at) : joint.slide.rate(at, 0.0);
+}
+
 Coordinate coordinate_of(const mechanics::Joint& joint, const mechanics::Placements& at) {
-    if (joint.parameters.kind == JointKind::Revolute) return {joint.angle.value(at), joint.angle.rate(at)};
-    Coordinate result{joint.slide.value(at, 0.0), 0.0};
+    const bool turns = joint.parameters.kind == JointKind::Revolute;
+    const double rate = prescribed_rate_of(joint, turns, at);
+    if (turns) return {joint.angle.value(at), joint.angle.rate(at), rate};
+    Coordinate result{joint.slide.value(at, 0.0), rate, rate};
     const auto columns = joint.slide.columns(at);
     mechanics::RowVector gradient;
     joint.slide.gradient(at, 0.0, columns, gradient);
@@ -87,9 +108,9 @@ Coordinate coordinate_of(const mechanics::Joint& joint, const mechanics::Placeme
     return result;
 }
 
-void put_coordinate_row(const mechanics::Joint& joint, const mechanics::Placements& at, double sign,
+void put_coordinate_row(const mechanics::Joint& joint, bool turns, const mechanics::Placements& at, double sign,
                         UnilateralRows& rows) {
-    if (joint.parameters.kind == JointKind::Revolute) {
+    if (turns) {
         for (const bool second : {false, true}) {
             const auto& place = at[second ? joint.angle.second : joint.angle.first];
             if (place.column < 0) continue;
@@ -116,27 +137,58 @@ void MultibodySystem::Implementation::collect_limits(double h, UnilateralRows& r
         const auto& joint = joints[k];
         const auto& limits = joint.parameters;
         if (std::isnan(limits.lower) && std::isnan(limits.upper)) continue;
+        const bool turns = limits.kind == JointKind::Revolute;
         const Coordinate now = coordinate_of(joint, at);
         const double reach = 2.0 * h * std::abs(now.speed) + 0.01;
         if (!std::isnan(limits.lower) && now.value - limits.lower < reach) {
-            put_coordinate_row(joint, at, 1.0, rows);
-            rows.end_row(now.value - limits.lower);
+            put_coordinate_row(joint, turns, at, 1.0, rows);
+            rows.end_row(now.value - limits.lower, now.rate);
             rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Lower, k));
         }
         if (!std::isnan(limits.upper) && limits.upper - now.value < reach) {
-            put_coordinate_row(joint, at, -1.0, rows);
-            rows.end_row(limits.upper - now.value);
+            put_coordinate_row(joint, turns, at, -1.0, rows);
+            rows.end_row(limits.upper - now.value, -now.rate);
             rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Upper, k));
         }
+    }
+}
+
+// A box row without a prescribed speed: u = 0 wherever a force within the bounds can hold the coordinate still.
+void MultibodySystem::Implementation::collect_frictions(UnilateralRows& rows) const {
+    for (const auto& [index, turns, box] : frictions) {
+        const auto& joint = joints[static_cast<std::size_t>(index)];
+        put_coordinate_row(joint, turns, at, 1.0, rows);
+        rows.end_row(0.0, prescribed_rate_of(joint, turns, at));
+        rows.end_block(box, key_of(KeyKind::Friction, static_cast<std::uint64_t>(index), turns ? 1 : 0));
     }
 }
 
 void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& rows) const {
     for (std::size_t k = 0; k < bounded_motors.size(); ++k) {
         const auto& motor = bounded_motors[k];
-        put_coordinate_row(joints[static_cast<std::size_t>(motor.joint)], at, 1.0, rows);
-        rows.end_row(0.0, -motor.speed.value(t));
-        rows.end_block(Cone::box({-motor.limit}, {motor.limit}), key_of(KeyKind::Motor, k));
+        const auto& joint = joints[static_cast<std::size_t>(motor.joint)];
+        const bool turns = joint.parameters.kind == JointKind::Revolute;
+        put_coordinate_row(joint, turns, at, 1.0, rows);
+        rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - motor.speed.value(t));
+        rows.end_block(motor.box, key_of(KeyKind::Motor, k));
+    }
+}
+
+// The force at the end of the step is τ = kp (p − c − h ċ) + kd (s − ċ) = r − g ċ with p and s at that time,
+// r = kp (p − c) + kd s and g = kd + h kp, where c is the coordinate now. As a row it is ċ + τ/g − r/g = 0, with the
+// compliance 1/g, and τ in the box of the limit: a servo at its limit gives just that.
+void MultibodySystem::Implementation::collect_actuators(double t, double h, UnilateralRows& rows) const {
+    for (std::size_t k = 0; k < bounded_actuators.size(); ++k) {
+        const auto& one = bounded_actuators[k];
+        const auto& joint = joints[static_cast<std::size_t>(one.joint)];
+        const bool turns = one.reference != nullptr;
+        const double value =
+            turns ? mechanics::Turn::nearest(joint.angle.value(at), *one.reference) : joint.slide.value(at, 0.0);
+        const double force = one.kp * (one.position.value(t + h) - value) + one.kd * one.speed.value(t + h);
+        const double gain = one.kd + h * one.kp;
+        put_coordinate_row(joint, turns, at, 1.0, rows);
+        rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - force / gain);
+        rows.end_block(one.box, key_of(KeyKind::Actuator, k), 0.0, 1.0 / gain);
     }
 }
 
@@ -144,9 +196,12 @@ void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& r
 MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::point_of(std::int32_t owner,
                                                                                         const Vector3d& point) const {
     const auto count = static_cast<std::int32_t>(bodies.size());
-    if (owner >= count) return {nodes[static_cast<std::size_t>(owner - count)].column, nullptr, Vector3d::Zero()};
+    if (owner >= count)
+        return {nodes[static_cast<std::size_t>(owner - count)].column, nullptr, Vector3d::Zero(), Vector3d::Zero()};
     const auto& place = at[owner];
-    return {place.column, &place.A, point - place.x};
+    const Vector3d arm = point - place.x;
+    if (!place.prescribed()) return {place.column, &place.A, arm, Vector3d::Zero()};
+    return {place.column, &place.A, arm, place.v + (place.A * place.omega).cross(arm)};
 }
 
 // Inline in the loop over contacts, which calls it six times for each.
@@ -183,22 +238,19 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
         const Vector3d normal = vector(contact.normal);
         const PointOfOwner a = point_of(owner_of(contact.shape_a), vector(contact.point_a));
         const PointOfOwner b = point_of(owner_of(contact.shape_b), vector(contact.point_b));
-        const auto put_row = [&](const Vector3d& direction) {
+        const auto put_row = [&](const Vector3d& direction, double gap) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
+            rows.end_row(gap, prescribed.empty() ? 0.0 : direction.dot(b.velocity - a.velocity));
         };
         const auto key = key_of(contact);
-        put_row(normal);
-        rows.end_row(contact.gap);
+        put_row(normal, contact.gap);
         if (material.friction == 0.0 && leaves_out) {
             rows.end_block(Cone::nonnegative(1), key, material.restitution);
             continue;
         }
         const mechanics::Matrix3d frame = contact_frame(normal);
-        for (int k = 1; k < 3; ++k) {
-            put_row(frame.col(k));
-            rows.end_row();
-        }
+        for (int k = 1; k < 3; ++k) put_row(frame.col(k), 0.0);
         rows.end_block(Cone::friction(material.friction), key, material.restitution);
     }
 }

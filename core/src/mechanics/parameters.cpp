@@ -33,28 +33,6 @@ Inertia Inertia::rod(double mass, double length) {
     return {1e-6 * across, across, across};
 }
 
-Motion Motion::constant(double level) {
-    return {[level](double) { return level; }, [](double) { return 0.0; }, [](double) { return 0.0; },
-            [level](double t) { return level * t; }};
-}
-
-Motion Motion::linear(double start, double slope) {
-    return {[=](double t) { return start + slope * t; }, [=](double) { return slope; }, [](double) { return 0.0; },
-            [=](double t) { return start * t + 0.5 * slope * t * t; }};
-}
-
-Motion Motion::sine(double amplitude, double frequency, double phase, double offset) {
-    const double omega = 2.0 * std::numbers::pi * frequency;
-    return {[=](double t) { return offset + amplitude * std::sin(omega * t + phase); },
-            [=](double t) { return amplitude * omega * std::cos(omega * t + phase); },
-            [=](double t) { return -amplitude * omega * omega * std::sin(omega * t + phase); },
-            [=](double t) {
-                const double swing =
-                    omega == 0.0 ? std::sin(phase) * t : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
-                return offset * t + amplitude * swing;
-            }};
-}
-
 // Torsion of a rectangle a ≥ b: a b³ (1/3 − 0.21 (b/a)(1 − b⁴/(12 a⁴))) (Young and Budynas, Roark's Formulas for
 // Stress and Strain, 2002, table 10.1).
 BeamSection BeamSection::rectangle(double width, double height) {
@@ -75,6 +53,7 @@ BeamSection BeamSection::circle(double radius) {
 
 JointParameters::JointParameters() : lower(none), upper(none) {}
 MotorParameters::MotorParameters() : force_limit(std::numeric_limits<double>::infinity()) {}
+ActuatorParameters::ActuatorParameters() : force_limit(std::numeric_limits<double>::infinity()) {}
 SpringParameters::SpringParameters() : rest_length(none) {}
 CableParameters::CableParameters() : rest_length(none) {}
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mechanics/row.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace delassus::mechanics {
@@ -59,6 +60,9 @@ Motion3 evaluate(const Feature& feature, const Placements& at, double t) {
         result.velocity += part.sign * (l * place.v + place.A * (turned + arm.c_t));
         result.curvature +=
             part.sign * (place.A * (place.omega.cross(turned) + 2.0 * place.omega.cross(arm.c_t) + arm.c_tt));
+        if (!place.prescribed()) continue;
+        result.partial += part.sign * (l * place.v + place.A * turned);
+        result.curvature += part.sign * (l * place.acceleration + place.A * place.turning.cross(arm.c));
     }
     return result;
 }
@@ -69,8 +73,8 @@ void add_transposed(const Feature& feature, const Placements& at, double t, cons
     for (int k = 0; k < feature.count; ++k) {
         const Part& part = feature.parts[static_cast<std::size_t>(k)];
         const Placement& place = at[part.body];
-        if (place.column < 0) continue;
         const int first = columns.place(place.column);
+        if (first < 0) continue;
         if (part.point) result.segment<3>(first) += factor * part.sign * y;
         result.segment<3>(first + 3) += factor * part.sign * direction_of(part, t).cross(place.A.transpose() * y);
     }
@@ -82,8 +86,8 @@ void add_turning(const Feature& feature, const Placements& at, double t, const V
     for (int k = 0; k < feature.count; ++k) {
         const Part& part = feature.parts[static_cast<std::size_t>(k)];
         const Placement& place = at[part.body];
-        if (place.column < 0) continue;
         const int first = columns.place(place.column) + 3;
+        if (first < 3) continue;
         result.block<3, 3>(first, first) +=
             factor * part.sign * skew(direction_of(part, t)) * skew(place.A.transpose() * y);
     }
@@ -95,14 +99,14 @@ void add_product(const Feature& u, const Feature& w, const Placements& at, doubl
     for (int k = 0; k < u.count; ++k) {
         const Part& left = u.parts[static_cast<std::size_t>(k)];
         const Placement& left_place = at[left.body];
-        if (left_place.column < 0) continue;
         const int row = columns.place(left_place.column);
+        if (row < 0) continue;
         const Matrix3d left_turn = -left.sign * left_place.A * skew(direction_of(left, t));
         for (int j = 0; j < w.count; ++j) {
             const Part& right = w.parts[static_cast<std::size_t>(j)];
             const Placement& right_place = at[right.body];
-            if (right_place.column < 0) continue;
             const int column = columns.place(right_place.column);
+            if (column < 0) continue;
             const Matrix3d right_turn = -right.sign * right_place.A * skew(direction_of(right, t));
             if (left.point && right.point)
                 result.block<3, 3>(row, column) += factor * left.sign * right.sign * Matrix3d::Identity();
@@ -130,13 +134,13 @@ Vector3d arm(const Part& part, double t) {
     return arm_of(part, t).c;
 }
 
-RowColumns Row::columns(const Placements& at) const {
+RowColumns Row::columns(const Placements& at, bool with_prescribed) const {
     RowColumns result;
     for (const Feature* feature : {&u, &w})
         for (int k = 0; k < feature->count; ++k) {
-            const auto column = at[feature->parts[static_cast<std::size_t>(k)].body].column;
-            if (column >= 0 && result.place(column) < 0)
-                result.column[static_cast<std::size_t>(result.bodies++)] = column;
+            const BodyIndex body = feature->parts[static_cast<std::size_t>(k)].body;
+            const auto& place = at[body];
+            if (place.column >= 0 || (with_prescribed && place.prescribed())) result.add(body, place.column);
         }
     return result;
 }
@@ -194,7 +198,9 @@ void Row::hessian(const Placements& at, double t, const RowColumns& columns, Row
 
 void add_local(const RowColumns& columns, const RowMatrix& matrix, double factor, Tangent tangent, MatrixAssembler& H) {
     for (int a = 0; a < columns.bodies; ++a)
-        for (int b = 0; b < columns.bodies; ++b)
+        for (int b = 0; b < columns.bodies; ++b) {
+            if (std::min(columns.column[static_cast<std::size_t>(a)], columns.column[static_cast<std::size_t>(b)]) < 0)
+                continue;
             for (int i = 0; i < 6; ++i)
                 for (int j = 0; j < 6; ++j) {
                     const double value = tangent == Tangent::Exact
@@ -203,6 +209,7 @@ void add_local(const RowColumns& columns, const RowMatrix& matrix, double factor
                     H.add(columns.column[static_cast<std::size_t>(a)] + i,
                           columns.column[static_cast<std::size_t>(b)] + j, factor * value);
                 }
+        }
 }
 
 }  // namespace delassus::mechanics

@@ -11,7 +11,8 @@
 //
 //     part:       J_x = s l I,   J_θ = −s A [c̄]×
 //     velocity:   s (l v + A (ω × c̄ + c̄_t))
-//     curvature:  s A (ω × (ω × c̄) + 2 ω × c̄_t + c̄_tt)            (second derivative in time at v̇ = 0)
+//     curvature:  s A (ω × (ω × c̄) + 2 ω × c̄_t + c̄_tt)            (second derivative in time at v̇ = 0), and
+//                 s (l v̇ + A (ω̇ × c̄)) more of a body whose motion is prescribed
 //     stiffness:  ∂(J_θᵀ y)/∂θ = ∂(s c̄ × Aᵀ y)/∂θ = s [c̄]× [Aᵀ y]×   (for fixed y)
 //
 //     c = u · w:  ∇c = J_uᵀ w + J_wᵀ u,   c̈ = ü · w + 2 u̇ · ẇ + u · ẅ,
@@ -28,13 +29,17 @@
 
 namespace delassus::mechanics {
 
-/// Where a body is and how it moves. Columns of v: x at column, θ at column + 3; −1 if it is fixed.
+/// Where a body is and how it moves. Columns of v: x at column, θ at column + 3; −1 if it is fixed. A body whose motion
+/// is prescribed has none either: a number of its own below −1 stands there.
 struct Placement {
     Vector3d x = Vector3d::Zero();
     Matrix3d A = Matrix3d::Identity();
     Vector3d v = Vector3d::Zero();
     Vector3d omega = Vector3d::Zero();
     std::int32_t column = -1;
+    Vector3d acceleration = Vector3d::Zero(), turning = Vector3d::Zero();  ///< v̇ and ω̇ of a prescribed motion
+
+    [[nodiscard]] bool prescribed() const { return column < -1; }
 };
 
 /// Placements of all bodies; the world last.
@@ -88,7 +93,15 @@ struct Feature {
 struct RowColumns {
     static constexpr int most = 4;
     std::array<std::int32_t, most> column{};
+    std::array<BodyIndex, most> body{};
     int bodies = 0;
+
+    /// Adds a body, once.
+    void add(BodyIndex index, std::int32_t its_column) {
+        if (place(its_column) >= 0) return;
+        body[static_cast<std::size_t>(bodies)] = index;
+        column[static_cast<std::size_t>(bodies++)] = its_column;
+    }
 
     [[nodiscard]] int place(std::int32_t wanted) const {
         for (int k = 0; k < bodies; ++k)
@@ -108,7 +121,8 @@ struct Row {
     double offset = 0.0;
     const Motion* drive = nullptr;
 
-    [[nodiscard]] RowColumns columns(const Placements& at) const;
+    /// Of the bodies that move freely; with_prescribed: also of those whose motion is prescribed, by negative numbers.
+    [[nodiscard]] RowColumns columns(const Placements& at, bool with_prescribed = false) const;
     /// C.
     [[nodiscard]] double value(const Placements& at, double t) const;
     /// ∇C over columns().
@@ -123,7 +137,7 @@ struct Row {
     void hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const;
 };
 
-/// H += factor · matrix, over columns; its symmetric part if asked.
+/// H += factor · matrix, over columns; its symmetric part if asked. Columns of prescribed bodies are left out.
 void add_local(const RowColumns& columns, const RowMatrix& matrix, double factor, Tangent tangent, MatrixAssembler& H);
 
 }  // namespace delassus::mechanics

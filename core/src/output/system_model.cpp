@@ -37,7 +37,9 @@ TrajectoryModel trajectory_model(const SceneSystem& system) {
     }
     model.shapes = mechanics.shapes();
     // Positions of nodes follow those of moving bodies, which have 7 numbers in q for 6 in v.
-    const auto moving = static_cast<std::int32_t>(std::count(model.fixed.begin(), model.fixed.end(), 0));
+    std::int32_t moving = 0;
+    for (BodyIndex body = 0; body < mechanics.body_count(); ++body)
+        if (mechanics.body_column(body) >= 0) ++moving;
     const State start = mechanics.initial_state();
     for (std::int32_t node = 0; node < mechanics.node_count(); ++node) {
         const auto column = mechanics.node_column(node);

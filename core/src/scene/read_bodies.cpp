@@ -251,12 +251,41 @@ Inertia scaled(const Inertia& inertia, double factor) {
 
 }  // namespace
 
+// motion: {translation: [x, y, z], rotation: {axis, angle, point}}
+BodyMotion SystemReader::read_body_motion(const YAML::Node& node, const Copy& copy) {
+    BodyMotion result;
+    bool translation = false, rotation = false, angle = false;
+    read_map(source_, node, "\"motion\"",
+             {{"translation",
+               [&](const YAML::Node& n) {
+                   result.translation = three_motions(n, "translation");
+                   translation = true;
+               }},
+              {"rotation", [&](const YAML::Node& n) {
+                   rotation = true;
+                   read_map(
+                       source_, n, "\"rotation\"",
+                       {{"axis", [&](const YAML::Node& v) { result.axis = vector3(source_, v, "axis"); }},
+                        {"angle",
+                         [&](const YAML::Node& v) {
+                             result.angle = motion(source_, v, "angle");
+                             angle = true;
+                         }},
+                        {"point", [&](const YAML::Node& v) { result.point = point_in(source_, v, "point", copy); }}});
+                   if (!angle) source_.refuse(n, "\"rotation\" lacks the key \"angle\"");
+               }}});
+    if (!translation && !rotation)
+        source_.refuse(node, "\"motion\" is empty; it must have a translation or a rotation");
+    return result;
+}
+
 void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
     BodyParameters body;
     body.pose.position = copy.offset;
     std::optional<double> mass, density;
     std::optional<Inertia> inertia;
     std::vector<ShapeOfBody> shapes;
+    YAML::Node motion_place(YAML::NodeType::Undefined);
     read_map(source_, item, "a body",
              {{"name", [&](const YAML::Node& n) { body.name = name_in(source_, n, "name", copy); }},
               {"mass", [&](const YAML::Node& n) { mass = positive_number(source_, n, "mass"); }},
@@ -279,10 +308,22 @@ void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
               {"angular_velocity",
                [&](const YAML::Node& n) { body.angular_velocity = vector3(source_, n, "angular_velocity"); }},
               {"fixed", [&](const YAML::Node& n) { body.fixed = truth(source_, n, "fixed"); }},
+              {"motion",
+               [&](const YAML::Node& n) {
+                   body.motion = read_body_motion(n, copy);
+                   motion_place.reset(n);
+               }},
               {"shapes", [&](const YAML::Node& n) { shapes = read_shapes(n); }},
               {"repeat", [](const YAML::Node&) {}}});
+    if (body.motion && body.fixed)
+        source_.refuse(motion_place,
+                       fmt::format("body \"{}\" is fixed, and has a \"motion\"; give one of them", body.name));
+    if (body.motion && (body.velocity != Vector3{} || body.angular_velocity != Vector3{}))
+        source_.refuse(motion_place, fmt::format("the velocities of body \"{}\" follow from its \"motion\"; give no "
+                                                 "\"velocity\" and no \"angular_velocity\"",
+                                                 body.name));
     if (mass && density) source_.refuse(item, "a body has either \"mass\" or \"density\", not both");
-    if (!body.fixed) {
+    if (!body.fixed && !body.motion) {
         if (!mass && !density)
             source_.refuse(item,
                            fmt::format("body \"{}\" lacks the key \"mass\" (or \"density\", with shapes)", body.name));
@@ -309,6 +350,7 @@ void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
     }
     const auto index = at(item, [&] { return result_.system->add_body(body); });
     take_name(item, bodies_, "body", body.name, index);
+    if (body.motion) body.pose = result_.system->body(index).pose;  // at t = 0
     result_.bodies.push_back(body);
     for (auto& one : shapes) {
         if (one.material < 0) {

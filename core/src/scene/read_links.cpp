@@ -19,50 +19,98 @@ JointKind joint_kind(const Source& source, const YAML::Node& node) {
     source.refuse(node, fmt::format("there is no kind of joint \"{}\"{}", name, nearest_name_hint(name, names)));
 }
 
-constexpr std::string_view between_fixed = "both ends are fixed";
-
 }  // namespace
 
+SystemReader::Handlers SystemReader::coordinate_handlers(CoordinateForces& forces) {
+    return {{"damping", [&](const YAML::Node& n) { forces.damping = nonnegative_number(source_, n, "damping"); }},
+            {"spring",
+             [&](const YAML::Node& n) {
+                 bool stiffness = false;
+                 read_map(source_, n, "\"spring\"",
+                          {{"stiffness",
+                            [&](const YAML::Node& v) {
+                                forces.stiffness = positive_number(source_, v, "stiffness");
+                                stiffness = true;
+                            }},
+                           {"rest", [&](const YAML::Node& v) { forces.rest = finite_number(source_, v, "rest"); }}});
+                 if (!stiffness) source_.refuse(n, "\"spring\" lacks the key \"stiffness\"");
+             }},
+            {"friction", [&](const YAML::Node& n) { forces.friction = nonnegative_number(source_, n, "friction"); }}};
+}
+
+// A joint with one coordinate has damping, spring and friction of its own; a cylindrical one has them in two maps.
 void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
     JointParameters joint;
     joint.point = joint.second_point = copy.offset;
     bool kind = false, second = false, gear_first = false, gear_second = false;
-    read_map(source_, item, "a joint",
-             {{"name", [&](const YAML::Node& n) { joint.name = name_in(source_, n, "name", copy); }},
-              {"kind",
-               [&](const YAML::Node& n) {
-                   joint.kind = joint_kind(source_, n);
-                   kind = true;
-               }},
-              {"first", [&](const YAML::Node& n) { joint.first = body_named(n, "first", copy); }},
-              {"second",
-               [&](const YAML::Node& n) {
-                   joint.second = body_named(n, "second", copy);
-                   second = true;
-               }},
-              {"point", [&](const YAML::Node& n) { joint.point = point_in(source_, n, "point", copy); }},
-              {"second_point",
-               [&](const YAML::Node& n) { joint.second_point = point_in(source_, n, "second_point", copy); }},
-              {"axis", [&](const YAML::Node& n) { joint.axis = vector3(source_, n, "axis"); }},
-              {"second_axis", [&](const YAML::Node& n) { joint.second_axis = vector3(source_, n, "second_axis"); }},
-              {"gear_first",
-               [&](const YAML::Node& n) {
-                   joint.gear_first = joint_named(n, "gear_first", copy);
-                   gear_first = true;
-               }},
-              {"gear_second",
-               [&](const YAML::Node& n) {
-                   joint.gear_second = joint_named(n, "gear_second", copy);
-                   gear_second = true;
-               }},
-              {"gear_ratio", [&](const YAML::Node& n) { joint.gear_ratio = finite_number(source_, n, "gear_ratio"); }},
-              {"lower", [&](const YAML::Node& n) { joint.lower = finite_number(source_, n, "lower"); }},
-              {"upper", [&](const YAML::Node& n) { joint.upper = finite_number(source_, n, "upper"); }},
-              {"repeat", [](const YAML::Node&) {}}});
+    CoordinateForces own;
+    YAML::Node own_place(YAML::NodeType::Undefined), parts(YAML::NodeType::Undefined);
+    const auto part = [&](CoordinateForces& forces, std::string_view key) {
+        return std::pair<std::string_view, Handler>{key, [&, key](const YAML::Node& n) {
+                                                        read_map(source_, n, fmt::format("\"{}\"", key),
+                                                                 coordinate_handlers(forces));
+                                                        parts.reset(n);
+                                                    }};
+    };
+    Handlers handlers = coordinate_handlers(own);
+    for (auto& [key, handler] : handlers)
+        handler = [&own_place, read = std::move(handler)](const YAML::Node& n) {
+            read(n);
+            own_place.reset(n);
+        };
+    const Handlers others = {
+        {"name", [&](const YAML::Node& n) { joint.name = name_in(source_, n, "name", copy); }},
+        {"kind",
+         [&](const YAML::Node& n) {
+             joint.kind = joint_kind(source_, n);
+             kind = true;
+         }},
+        {"first", [&](const YAML::Node& n) { joint.first = body_named(n, "first", copy); }},
+        {"second",
+         [&](const YAML::Node& n) {
+             joint.second = body_named(n, "second", copy);
+             second = true;
+         }},
+        {"point", [&](const YAML::Node& n) { joint.point = point_in(source_, n, "point", copy); }},
+        {"second_point", [&](const YAML::Node& n) { joint.second_point = point_in(source_, n, "second_point", copy); }},
+        {"axis", [&](const YAML::Node& n) { joint.axis = vector3(source_, n, "axis"); }},
+        {"second_axis", [&](const YAML::Node& n) { joint.second_axis = vector3(source_, n, "second_axis"); }},
+        {"gear_first",
+         [&](const YAML::Node& n) {
+             joint.gear_first = joint_named(n, "gear_first", copy);
+             gear_first = true;
+         }},
+        {"gear_second",
+         [&](const YAML::Node& n) {
+             joint.gear_second = joint_named(n, "gear_second", copy);
+             gear_second = true;
+         }},
+        {"gear_ratio", [&](const YAML::Node& n) { joint.gear_ratio = finite_number(source_, n, "gear_ratio"); }},
+        {"lower", [&](const YAML::Node& n) { joint.lower = finite_number(source_, n, "lower"); }},
+        {"upper", [&](const YAML::Node& n) { joint.upper = finite_number(source_, n, "upper"); }},
+        part(joint.slide, "slide"),
+        part(joint.turn, "turn"),
+        {"repeat", [](const YAML::Node&) {}}};
+    handlers.insert(handlers.end(), others.begin(), others.end());
+    read_map(source_, item, "a joint", handlers);
     const auto need = [&](bool given, std::string_view key) {
         if (!given) source_.refuse(item, fmt::format("joint \"{}\" lacks the key \"{}\"", joint.name, key));
     };
     need(kind, "kind");
+    if (joint.kind == JointKind::Cylindrical) {
+        if (own_place.IsDefined())
+            source_.refuse(own_place,
+                           fmt::format("the cylindrical joint \"{}\" has two coordinates: give damping, spring "
+                                       "and friction in \"slide: {{…}}\" and \"turn: {{…}}\"",
+                                       joint.name));
+    } else {
+        if (parts.IsDefined())
+            source_.refuse(parts,
+                           fmt::format("\"slide\" and \"turn\" are for cylindrical joints; the joint \"{}\" takes "
+                                       "\"damping\", \"spring\" and \"friction\" themselves",
+                                       joint.name));
+        (joint.kind == JointKind::Prismatic ? joint.slide : joint.turn) = own;
+    }
     if (joint.kind == JointKind::Gear) {
         need(gear_first, "gear_first");
         need(gear_second, "gear_second");
@@ -77,7 +125,7 @@ void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
                 fmt::format("joint \"{}\" joins a body to itself: \"first\" and \"second\" must differ", joint.name));
         if (!moves(joint.first) && !moves(joint.second)) {
             take_name(item, joints_, "joint", joint.name, -1);
-            result_.left_out.push_back({fmt::format("joint \"{}\"", joint.name), std::string(between_fixed)});
+            result_.left_out.push_back({fmt::format("joint \"{}\"", joint.name), no_effect(joint.first, joint.second)});
             return;
         }
     }
@@ -116,6 +164,30 @@ void SystemReader::read_motor(const YAML::Node& item, const Copy& copy) {
     result_.motors.push_back(motor);
 }
 
+void SystemReader::read_actuator(const YAML::Node& item, const Copy& copy) {
+    ActuatorParameters actuator;
+    bool has_joint = false;
+    read_map(source_, item, "an actuator",
+             {{"name", [&](const YAML::Node& n) { actuator.name = name_in(source_, n, "name", copy); }},
+              {"joint",
+               [&](const YAML::Node& n) {
+                   has_joint = true;
+                   actuator.joint = joint_named(n, "joint", copy);
+                   if (actuator.joint < 0)
+                       source_.refuse(n, "\"joint\" names a joint between fixed bodies, which no actuator can move");
+               }},
+              {"position", [&](const YAML::Node& n) { actuator.position = motion(source_, n, "position"); }},
+              {"speed", [&](const YAML::Node& n) { actuator.speed = motion(source_, n, "speed"); }},
+              {"kp", [&](const YAML::Node& n) { actuator.kp = nonnegative_number(source_, n, "kp"); }},
+              {"kd", [&](const YAML::Node& n) { actuator.kd = nonnegative_number(source_, n, "kd"); }},
+              {"limit", [&](const YAML::Node& n) { actuator.force_limit = nonnegative_number(source_, n, "limit"); }},
+              {"repeat", [](const YAML::Node&) {}}});
+    if (!has_joint) source_.refuse(item, "an actuator lacks the key \"joint\"");
+    take_name(item, others_, "actuator", actuator.name, 0);
+    at(item, [&] { result_.system->add_actuator(actuator); });
+    result_.actuators.push_back(actuator);
+}
+
 void SystemReader::read_spring(const YAML::Node& item, const Copy& copy) {
     SpringParameters spring;
     bool second = false, first_point = false, second_point = false;
@@ -148,7 +220,7 @@ void SystemReader::read_spring(const YAML::Node& item, const Copy& copy) {
     if (!second_point) spring.second_point = position(spring.second);
     take_name(item, others_, "spring", spring.name, 0);
     if (!moves(spring.first) && !moves(spring.second)) {
-        result_.left_out.push_back({fmt::format("spring \"{}\"", spring.name), std::string(between_fixed)});
+        result_.left_out.push_back({fmt::format("spring \"{}\"", spring.name), no_effect(spring.first, spring.second)});
         return;
     }
     at(item, [&] { result_.system->add_spring(spring); });
@@ -187,22 +259,23 @@ void SystemReader::read_bushing(const YAML::Node& item, const Copy& copy) {
     if (!second) source_.refuse(item, fmt::format("bushing \"{}\" lacks the key \"second\"", bushing.name));
     take_name(item, others_, "bushing", bushing.name, 0);
     if (!moves(bushing.first) && !moves(bushing.second)) {
-        result_.left_out.push_back({fmt::format("bushing \"{}\"", bushing.name), std::string(between_fixed)});
+        result_.left_out.push_back(
+            {fmt::format("bushing \"{}\"", bushing.name), no_effect(bushing.first, bushing.second)});
         return;
     }
     at(item, [&] { result_.system->add_bushing(bushing); });
     result_.bushings.push_back(bushing);
 }
 
+std::array<Motion, 3> SystemReader::three_motions(const YAML::Node& node, std::string_view key) {
+    const auto list = elements(source_, node, key);
+    if (list.size() != 3) source_.refuse(node, fmt::format("\"{}\" must be a list of 3 numbers or motions", key));
+    return {motion(source_, list[0], key), motion(source_, list[1], key), motion(source_, list[2], key)};
+}
+
 void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
     LoadParameters load;
     bool body = false, point = false;
-    const auto three_motions = [&](const YAML::Node& node, std::string_view key) {
-        const auto list = elements(source_, node, key);
-        if (list.size() != 3) source_.refuse(node, fmt::format("\"{}\" must be a list of 3 numbers or motions", key));
-        return std::array<Motion, 3>{motion(source_, list[0], key), motion(source_, list[1], key),
-                                     motion(source_, list[2], key)};
-    };
     read_map(source_, item, "a load",
              {{"name", [&](const YAML::Node& n) { load.name = name_in(source_, n, "name", copy); }},
               {"body",
@@ -217,12 +290,15 @@ void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
                    load.point = point_in(source_, n, "point", copy);
                    point = true;
                }},
+              {"follower", [&](const YAML::Node& n) { load.follower = truth(source_, n, "follower"); }},
               {"repeat", [](const YAML::Node&) {}}});
     if (!body) source_.refuse(item, fmt::format("load \"{}\" lacks the key \"body\"", load.name));
     if (!point) load.point = position(load.body);
     take_name(item, others_, "load", load.name, 0);
     if (!moves(load.body)) {
-        result_.left_out.push_back({fmt::format("load \"{}\"", load.name), "its body is fixed"});
+        const bool fixed = load.body == world_body || result_.bodies[static_cast<std::size_t>(load.body)].fixed;
+        result_.left_out.push_back(
+            {fmt::format("load \"{}\"", load.name), fixed ? "its body is fixed" : "the motion of its body is given"});
         return;
     }
     at(item, [&] { result_.system->add_load(load); });

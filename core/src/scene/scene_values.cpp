@@ -83,6 +83,68 @@ Quaternion orientation(const Source& source, const YAML::Node& node) {
     return {std::cos(half), s * axis[0], s * axis[1], s * axis[2]};
 }
 
+namespace {
+
+/// Adds the place to the sentence that a motion is refused with.
+template <class Make>
+Motion made(const Source& source, const YAML::Node& node, Make&& make) {
+    try {
+        return make();
+    } catch (const InputError& error) {
+        source.refuse(node, error.what());
+    }
+}
+
+std::vector<double> list_of_numbers(const Source& source, const YAML::Node& node, std::string_view key) {
+    std::vector<double> result;
+    for (const YAML::Node& one : elements(source, node, key)) result.push_back(finite_number(source, one, key));
+    return result;
+}
+
+Motion table(const Source& source, const YAML::Node& node) {
+    std::vector<double> times, values;
+    Interpolation interpolation = Interpolation::Linear;
+    bool periodic = false;
+    read_map(source, node, "\"table\"",
+             {{"times", [&](const YAML::Node& n) { times = list_of_numbers(source, n, "times"); }},
+              {"values", [&](const YAML::Node& n) { values = list_of_numbers(source, n, "values"); }},
+              {"interpolation",
+               [&](const YAML::Node& n) {
+                   const std::string name = scalar(source, n, "interpolation");
+                   if (name != "linear" && name != "cubic")
+                       source.refuse(n, fmt::format("\"interpolation\" is \"{}\"; it must be linear or cubic", name));
+                   interpolation = name == "cubic" ? Interpolation::Cubic : Interpolation::Linear;
+               }},
+              {"periodic", [&](const YAML::Node& n) { periodic = truth(source, n, "periodic"); }}});
+    return made(source, node, [&] { return Motion::table(times, values, interpolation, periodic); });
+}
+
+Motion polynomial(const Source& source, const YAML::Node& node) {
+    const auto coefficients = list_of_numbers(source, node, "polynomial");
+    return made(source, node, [&] { return Motion::polynomial(coefficients); });
+}
+
+Motion ramp(const Source& source, const YAML::Node& node) {
+    double from = 0.0, start = 0.0;
+    std::int64_t smoothness = 2;
+    std::optional<double> to, duration;
+    read_map(source, node, "\"ramp\"",
+             {{"from", [&](const YAML::Node& n) { from = finite_number(source, n, "from"); }},
+              {"to", [&](const YAML::Node& n) { to = finite_number(source, n, "to"); }},
+              {"start", [&](const YAML::Node& n) { start = finite_number(source, n, "start"); }},
+              {"duration", [&](const YAML::Node& n) { duration = positive_number(source, n, "duration"); }},
+              {"smoothness", [&](const YAML::Node& n) {
+                   smoothness = value<std::int64_t>(source, n, "smoothness", "1 or 2");
+                   if (smoothness != 1 && smoothness != 2)
+                       source.refuse(n, fmt::format("\"smoothness\" is {}; it must be 1 or 2", smoothness));
+               }}});
+    const double end = required(source, node, to, "\"ramp\"", "to"),
+                 time = required(source, node, duration, "\"ramp\"", "duration");
+    return made(source, node, [&] { return Motion::ramp(from, end, start, time, static_cast<int>(smoothness)); });
+}
+
+}  // namespace
+
 Motion motion(const Source& source, const YAML::Node& node, std::string_view key) {
     if (node.IsScalar()) return Motion::constant(finite_number(source, node, key));
     std::optional<Motion> result;
@@ -92,7 +154,10 @@ Motion motion(const Source& source, const YAML::Node& node, std::string_view key
     };
     read_map(
         source, node, fmt::format("\"{}\"", key),
-        {{"constant", [&](const YAML::Node& n) { set(n, Motion::constant(finite_number(source, n, "constant"))); }},
+        {{"table", [&](const YAML::Node& n) { set(n, table(source, n)); }},
+         {"polynomial", [&](const YAML::Node& n) { set(n, polynomial(source, n)); }},
+         {"ramp", [&](const YAML::Node& n) { set(n, ramp(source, n)); }},
+         {"constant", [&](const YAML::Node& n) { set(n, Motion::constant(finite_number(source, n, "constant"))); }},
          {"linear",
           [&](const YAML::Node& n) {
               double start = 0.0;
@@ -113,7 +178,9 @@ Motion motion(const Source& source, const YAML::Node& node, std::string_view key
               set(n, Motion::sine(required(source, n, amplitude, "\"sine\"", "amplitude"),
                                   required(source, n, frequency, "\"sine\"", "frequency"), phase, offset));
           }}});
-    if (!result) source.refuse(node, fmt::format("\"{}\" is empty; it must be constant, linear or sine", key));
+    if (!result)
+        source.refuse(
+            node, fmt::format("\"{}\" is empty; it must be constant, linear, sine, table, polynomial or ramp", key));
     return *result;
 }
 

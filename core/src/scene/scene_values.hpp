@@ -21,7 +21,7 @@ Vector3 vector3(const Source& source, const YAML::Node& node, std::string_view k
 /// [w, x, y, z] or {axis: [x, y, z], angle: degrees}; the result has length one.
 Quaternion orientation(const Source& source, const YAML::Node& node);
 
-/// A number, {constant: c}, {linear: {start, rate}} or {sine: {amplitude, frequency, phase, offset}}.
+/// A number, or a map with one of the keys constant, linear, sine, table, polynomial and ramp (docs/scenes.md).
 Motion motion(const Source& source, const YAML::Node& node, std::string_view key);
 
 /// The elements of a list; refuses anything else.

@@ -27,8 +27,9 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
          [this](const YAML::Node& n) { result_.leave_out = value<bool>(source_, n, "leave_out", "true or false"); }},
         {"limits", [this](const YAML::Node& n) { read_limits(n); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
-    for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
-                             "cables", "beams", "joints", "motors", "springs", "bushings", "loads", "keep_apart"})
+    for (const char* list :
+         {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes", "cables", "beams",
+          "joints", "motors", "actuators", "springs", "bushings", "loads", "keep_apart"})
         all.emplace_back(list, [this, list](const YAML::Node& n) { lists_.insert_or_assign(list, n); });
     return all;
 }
@@ -57,6 +58,7 @@ void SystemReader::build(const YAML::Node& place) {
         missing("bodies", "bodies: [{name: ball, mass: 1, …}]");
     read_items("joints", &SystemReader::read_joint);
     read_items("motors", &SystemReader::read_motor);
+    read_items("actuators", &SystemReader::read_actuator);
     read_items("springs", &SystemReader::read_spring);
     read_items("bushings", &SystemReader::read_bushing);
     read_items("loads", &SystemReader::read_load);
@@ -249,7 +251,16 @@ std::int32_t SystemReader::joint_named(const YAML::Node& node, std::string_view 
 }
 
 bool SystemReader::moves(BodyIndex body) const {
-    return body != world_body && !result_.bodies[static_cast<std::size_t>(body)].fixed;
+    if (body == world_body) return false;
+    const BodyParameters& parameters = result_.bodies[static_cast<std::size_t>(body)];
+    return !parameters.fixed && !parameters.motion;
+}
+
+std::string SystemReader::no_effect(BodyIndex first, BodyIndex second) const {
+    const auto prescribed = [&](BodyIndex body) {
+        return body != world_body && result_.bodies[static_cast<std::size_t>(body)].motion.has_value();
+    };
+    return prescribed(first) || prescribed(second) ? "the motions of both ends are given" : "both ends are fixed";
 }
 
 Vector3 SystemReader::position(BodyIndex body) const {

@@ -44,7 +44,11 @@ private:
     void read_cable(const YAML::Node& item, const Copy& copy);
     void read_beam(const YAML::Node& item, const Copy& copy);
     void read_joint(const YAML::Node& item, const Copy& copy);
+    using Handlers = std::vector<std::pair<std::string_view, Handler>>;
+    /// The keys `damping`, `spring` and `friction`.
+    Handlers coordinate_handlers(CoordinateForces& forces);
     void read_motor(const YAML::Node& item, const Copy& copy);
+    void read_actuator(const YAML::Node& item, const Copy& copy);
     void read_spring(const YAML::Node& item, const Copy& copy);
     void read_bushing(const YAML::Node& item, const Copy& copy);
     void read_load(const YAML::Node& item, const Copy& copy);
@@ -75,7 +79,13 @@ private:
     BodyIndex body_named(const YAML::Node& node, std::string_view key, const Copy& copy);
     /// −1 if the joint was left out.
     std::int32_t joint_named(const YAML::Node& node, std::string_view key, const Copy& copy);
+    BodyMotion read_body_motion(const YAML::Node& node, const Copy& copy);
+    /// A list of three motions.
+    std::array<Motion, 3> three_motions(const YAML::Node& node, std::string_view key);
+    /// Whether forces can move the body.
     [[nodiscard]] bool moves(BodyIndex body) const;
+    /// Why what acts between these two bodies, neither of which forces can move, has no effect.
+    [[nodiscard]] std::string no_effect(BodyIndex first, BodyIndex second) const;
     [[nodiscard]] Vector3 position(BodyIndex body) const;
     /// Notes the name, or refuses it if there is one already.
     void take_name(const YAML::Node& node, Numbers& numbers, std::string_view kind, const std::string& name,

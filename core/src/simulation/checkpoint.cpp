@@ -113,6 +113,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"t", bits({simulation.state.t})},
                                    {"q", bits(simulation.state.q)},
                                    {"v", bits(simulation.state.v)},
+                                   {"turns", bits(simulation.turns)},
                                    {"memory", bits(simulation.memory)},
                                    {"control", bits(simulation.control)},
                                    {"rows_left_out", simulation.rows_left_out},
@@ -138,6 +139,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             one.at("name").get_to(system.name);
             one.at("step").get_to(system.simulation.step);
             system.simulation.state = {number(one.at("t")), numbers(one.at("q")), numbers(one.at("v"))};
+            if (one.contains("turns"))  // older checkpoints have joints without counted turns
+                system.simulation.turns = numbers(one.at("turns"));
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
             system.simulation.sleeping = numbers(one.at("sleeping"));

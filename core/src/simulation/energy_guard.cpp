@@ -32,7 +32,11 @@ EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
 }
 
 bool EnergyGuard::watches(const SimulationTotals& totals) const {
-    return std::isfinite(totals.start_energy) && system_->motors.empty() && system_->loads.empty();
+    const auto& bodies = system_->bodies;
+    const bool driven =
+        !system_->motors.empty() || !system_->actuators.empty() || !system_->loads.empty() ||
+        std::any_of(bodies.begin(), bodies.end(), [](const auto& body) { return body.motion.has_value(); });
+    return std::isfinite(totals.start_energy) && !driven;
 }
 
 double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) const {

@@ -8,8 +8,8 @@ namespace delassus {
 
 struct SimulationTotals;
 
-// Where no motor and no load gives energy, E = K + V never exceeds E₀ in truth: joints and contacts take energy or
-// leave it. Kinetic energy comes from the start or from the potential, so that
+// Where no motor, actuator, load or kinematic body gives energy, E = K + V never exceeds E₀ in truth: joints and
+// contacts take energy or leave it. Kinetic energy comes from the start or from the potential, so that
 //
 //     A = K₀ + max_k (V₀ − V_k)⁺ + W
 //

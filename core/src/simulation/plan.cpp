@@ -66,7 +66,8 @@ public:
 private:
     [[nodiscard]] bool moves(BodyIndex body) const {
         const auto index = static_cast<std::size_t>(body);
-        return body != world_body && (index >= system_.bodies.size() || !system_.bodies[index].fixed);
+        return body != world_body &&
+               (index >= system_.bodies.size() || (!system_.bodies[index].fixed && !system_.bodies[index].motion));
     }
     [[nodiscard]] bool any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second) const {
         for (const BodyIndex a : first)
@@ -138,7 +139,7 @@ private:
     }
 
     void bodies() {
-        std::vector<std::string> fixed, free, moving;
+        std::vector<std::string> fixed, free, moving, prescribed;
         std::set<BodyIndex> held;
         const auto hold = [&](BodyIndex first, BodyIndex second) {
             held.insert(first);
@@ -157,6 +158,9 @@ private:
             if (body.fixed) {
                 fixed.push_back(body.name);
                 moving.pop_back();
+            } else if (body.motion) {
+                prescribed.push_back(body.name);
+                moving.pop_back();
             } else if (!held.contains(static_cast<BodyIndex>(i))) {
                 free.push_back(body.name);
             }
@@ -165,6 +169,10 @@ private:
             keep(counted(moving.size(), "moving body", "moving bodies"), "6 velocities each: " + some_of(moving));
         if (const auto nodes = system_.system->node_count(); nodes > 0)
             keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities for each that moves");
+        if (!prescribed.empty())
+            keep(counted(prescribed.size(), "kinematic body", "kinematic bodies"),
+                 "its motion is given: no columns, its velocity is part of its contacts and joints: " +
+                     some_of(prescribed));
         if (!fixed.empty())
             leave(counted(fixed.size(), "fixed body", "fixed bodies"), "no unknowns, no columns: " + some_of(fixed));
         if (!free.empty() && system_.leave_out)
@@ -205,6 +213,31 @@ private:
             if (std::isinf(motor.force_limit)) continue;
             needs_ |= DELASSUS_CAN_BOX;
             keep(fmt::format("motor \"{}\" as a box row", motor.name), "its force is limited");
+        }
+        joint_forces();
+    }
+    void joint_forces() {
+        std::vector<std::string> springs, frictions;
+        for (const auto& joint : system_.joints) {
+            const auto any = [&](double CoordinateForces::*of) {
+                return joint.slide.*of > 0.0 || joint.turn.*of > 0.0;
+            };
+            if (any(&CoordinateForces::stiffness) || any(&CoordinateForces::damping)) springs.push_back(joint.name);
+            if (any(&CoordinateForces::friction)) frictions.push_back(joint.name);
+        }
+        if (!springs.empty())
+            keep(counted(springs.size(), "joint with a spring or damping", "joints with springs or damping"),
+                 "stiffness and damping are parts of H: " + some_of(springs));
+        if (!frictions.empty()) {
+            needs_ |= DELASSUS_CAN_BOX;
+            keep(counted(frictions.size(), "joint with dry friction", "joints with dry friction"),
+                 "a box row for each coordinate: " + some_of(frictions));
+        }
+        for (const auto& actuator : system_.actuators) {
+            const bool limited = !std::isinf(actuator.force_limit);
+            if (limited) needs_ |= DELASSUS_CAN_BOX | DELASSUS_CAN_COMPLIANCE;
+            keep(fmt::format("actuator \"{}\"{}", actuator.name, limited ? " as a box row with a compliance" : ""),
+                 limited ? "its force is limited" : "its gains are parts of H");
         }
     }
     [[nodiscard]] bool has_limits() const {

@@ -96,6 +96,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         system.system->set_start(equilibrium_->state);
     }
     now_.state = system.system->initial_state();
+    system.system->set_turns(now_.state, {});
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
     measure(now_.state, now_.step);
@@ -230,6 +231,7 @@ const StepRecord& Simulation::step() {
     const StepReport& report = taken.step;
     const std::string place = where();
     now_.state = std::move(next);
+    system_->system->follow(now_.state);
     now_.totals = std::move(judged);
     ++now_.step;
 
@@ -331,6 +333,7 @@ SimulationState Simulation::save() const {
             ++next;
         else
             result.rows_left_out.push_back(row);
+    result.turns = mechanics.turns(now_.state);
     result.memory = timestepper_->save();
     if (control_) result.control = control_->save();
     if (sleeping_) result.sleeping = sleeping_->save();
@@ -354,11 +357,13 @@ void Simulation::load(SimulationState state) {
         throw InputError(fmt::format("the checkpoint of system \"{}\" leaves out rows that the system does not have",
                                      system_->name));
     system_->system->keep_rows(kept);
+    system_->system->set_turns(state.state, state.turns);
     make_method();
     timestepper_->load(state.memory);
     if (control_) control_->load(state.control);
     if (sleeping_) sleeping_->load(state.sleeping);
     now_ = std::move(state);
+    now_.turns.clear();
     now_.memory.clear();
     now_.rows_left_out.clear();
     now_.control.clear();
