@@ -167,7 +167,7 @@ private:
     }
 
     /// a and b for the guess; the impulse of its forces stays in force_.
-    void linearize(const State& begin, double h, int iteration) {
+    void linearize(const State& begin, double h, int iteration, double natural_error) {
         const Eigen::Map<const Vector> v(begin.v.data(), n_);
         move(begin, h, guess_, theta_, at_theta_);
         impulse_of_forces(h);
@@ -186,7 +186,7 @@ private:
             for (std::int32_t row = 0; row < m_; ++row)
                 problem_.b[static_cast<std::size_t>(row)] = rate_[row] - times(row, guess_);
         }
-        contacts_.set_b(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration);
+        contacts_.set_b(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration, natural_error);
     }
 
     /// force_ ← h f at at_theta_, where spinning bodies have their own impulse instead of what they feel alone.
@@ -248,7 +248,7 @@ private:
         scale();
         const bool before = report.solved;
         for (int iteration = 0;; ++iteration) {
-            linearize(begin, h, iteration);
+            linearize(begin, h, iteration, solver.effort().worst_natural);
             if (iteration > 0 && (unchanged() || (iteration >= iterations_ && contacts_.settled()))) return;
             if (iteration == most_iterations) {
                 report.solved = false;

@@ -90,8 +90,9 @@ std::vector<Case> cases() {
                             method.name != "euler_implicit_linearized" && method.name != "trapezoidal_linearized";
         if (newton) options["newton_tolerance"] = "1e-12";
         const auto multipliers = constrained ? method.multipliers : Multipliers::None;
-        result.push_back(
-            {method.name, options, method.order, system, multipliers, method.order == 1 ? (constrained ? 2 : 4) : 1});
+        const bool late = method.name == "moreau_jean" && constrained;  // its asymptotic range
+        const int factor = method.order == 1 ? (constrained ? 2 : 4) : late ? 4 : 1;
+        result.push_back({method.name, options, method.order, system, multipliers, factor});
     };
     for (const auto* system : {"elastic pendulum", "heavy top, reduced"}) {
         for (const auto& method : explicit_ones) add(method, system, false);

@@ -38,7 +38,8 @@ public:
     /// problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones move De Saxcé's terms less.
-    void set_b(Problem& problem, std::span<const double> guess, int iteration);
+    /// natural_error: of the solves so far.
+    void set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error);
     /// Whether the last set_b() left De Saxcé's terms where they were.
     [[nodiscard]] bool settled() const { return settled_; }
 
@@ -71,6 +72,8 @@ private:
         double normal = 0.0;    ///< b of the first row but for what follows from the guess
         double friction = 0.0;  ///< of a contact with De Saxcé's term
         double sliding = -1.0;  ///< the term; negative: not known yet
+        double moved = 0.0;     ///< by which it changed last
+        double wanted = 0.0;    ///< what it should have been before
         bool pushed = false;    ///< in the step before
     };
 
