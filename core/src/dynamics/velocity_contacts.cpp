@@ -46,16 +46,18 @@ namespace delassus {
 // De Saxcé's term s = μ |u_t⁺| stands in b, by which the answer obeys Coulomb's law: with u_t of the guess, until
 // further iterations do not move it. A term that is too large by δ costs the impulse m δ, whose friction changes |u_t|
 // by μ δ: the iteration s ← μ |u_t⁺(s)| contracts by about μ² only, so each contact takes its secant.
+// Where contacts stick and slip in turns, the terms jump for ever. So late ones only fall: with less than μ |u_t| the
+// law lies between Coulomb's and the associated one, and the contact opens at the speed μ |u_t| − s in this step.
 
 namespace {
 
 /// Of the square of a block's rows, beyond which they did not turn along with a smooth motion.
 constexpr double largest_turn_squared = 0.25;
-/// Iterations that move De Saxcé's terms as far as they should go, and the largest slope that they are taken to have.
-constexpr double full_moves = 5.0, steepest = 0.5;
-/// Of these terms: what further iterations may move them by, unless the solver leaves more; after so many iterations
-/// (contacts that stick and slip in turns) the larger share is enough.
-constexpr double settled_share = 1e-6, least_settled_share = 1e-3;
+/// The largest slope that the iteration of De Saxcé's terms is taken to have.
+constexpr double steepest = 0.5;
+/// What further iterations may move them by, as a share, unless the solver leaves more.
+constexpr double settled_share = 1e-6;
+/// After so many iterations they only fall.
 constexpr int patience = 15;
 
 }  // namespace
@@ -179,7 +181,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
 void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
-    const double share = std::max(iteration < patience ? settled_share : least_settled_share, 10.0 * natural_error);
+    const double share = std::max(settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -205,13 +207,18 @@ void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, in
         b += contact.normal;
         if (contact.friction == 0.0) continue;
         const double wanted = contact.friction * std::sqrt(squares);
-        const double change = contact.sliding < 0.0 ? wanted : wanted - contact.sliding;
+        const double last = std::max(contact.sliding, 0.0), change = wanted - last;
         const double enough = share * std::max({wanted, contact.friction * contact.approach, 1e-2 * largest});
-        settled_ = settled_ && std::abs(change) <= enough;
-        const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
-        const double next =
-            std::max(0.0, std::max(contact.sliding, 0.0) + std::min(1.0, full_moves / std::max(iteration, 1)) * change /
-                                                               (1.0 - std::clamp(slope, -steepest, steepest)));
+        double next = wanted;
+        if (iteration < patience) {
+            const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
+            next = std::max(0.0, last + change / (1.0 - std::clamp(slope, -steepest, steepest)));
+            settled_ = settled_ && std::abs(change) <= enough;
+        } else {
+            if (change > 0.0) next = last;
+            if (change < 0.0 && iteration >= 2 * patience) next = 0.0;
+            settled_ = settled_ && change >= -enough;
+        }
         contact.moved = contact.sliding < 0.0 ? 0.0 : next - contact.sliding;
         contact.wanted = wanted;
         contact.sliding = next;

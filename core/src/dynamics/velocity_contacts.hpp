@@ -37,7 +37,7 @@ public:
     /// the last step as a start. coulomb: the solver knows Coulomb's law, else De Saxcé's term stands in b. The rows of
     /// problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
-    /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones move De Saxcé's terms less.
+    /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// natural_error: of the solves so far.
     void set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error);
     /// Whether the last set_b() left De Saxcé's terms where they were.
