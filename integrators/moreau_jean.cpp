@@ -211,13 +211,8 @@ private:
 
     // Right-hand sides in √mass · speed: a by the diagonal of H, b by that of D diag(H)⁻¹ Dᵀ.
     void scale() {
-        diagonal_.setOnes(n_);
-        const auto& H = problem_.H;
-        for (std::int32_t i = 0; i < n_; ++i)
-            for (auto e = H.row_start[static_cast<std::size_t>(i)]; e < H.row_start[static_cast<std::size_t>(i) + 1];
-                 ++e)
-                if (H.column[static_cast<std::size_t>(e)] == i && H.value[static_cast<std::size_t>(e)] > 0.0)
-                    diagonal_[i] = H.value[static_cast<std::size_t>(e)];
+        const std::vector<double> diagonal = diagonal_of(problem_.H);
+        diagonal_ = Eigen::Map<const Vector>(diagonal.data(), n_);
         row_scale_.setZero(problem_.m());
         const auto& D = problem_.D;
         for (std::int32_t j = 0; j < problem_.m(); ++j)

@@ -82,7 +82,8 @@ std::vector<Case> cases() {
         {"generalized_alpha", {{"rho_infinity", "0"}}, 2},
         {"generalized_alpha", {{"rho_infinity", "1"}}, 2, Multipliers::Oscillate},
         {"moreau_jean", {}, 2, Multipliers::Mean},
-        {"moreau_jean", {{"theta", "0.6"}}, 1}};
+        {"moreau_jean", {{"theta", "0.6"}}, 1},
+        {"nonsmooth_generalized_alpha", {}, 2, Multipliers::Mean}};
     std::vector<Case> result;
     const auto add = [&](const Method& method, const std::string& system, bool constrained) {
         auto options = method.options;

@@ -62,6 +62,17 @@ constexpr int patience = 15;
 
 }  // namespace
 
+std::vector<double> diagonal_of(const SparseMatrix& H) {
+    std::vector<double> diagonal(static_cast<std::size_t>(H.rows), 1.0);
+    for (std::size_t row = 0; row < diagonal.size(); ++row)
+        for (auto e = H.row_start[row]; e < H.row_start[row + 1]; ++e) {
+            const auto entry = static_cast<std::size_t>(e);
+            if (static_cast<std::size_t>(H.column[entry]) == row && H.value[entry] > 0.0)
+                diagonal[row] = H.value[entry];
+        }
+    return diagonal;
+}
+
 VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
     : system_(system), settings_(settings), gap_resolution_(system.gap_resolution()) {}
 
@@ -234,6 +245,29 @@ void VelocityContacts::drop_negligible(const Problem& problem, std::vector<doubl
         if (!contacts_[k].along_normal) continue;
         double* impulse = lambda.data() + first_row_ + contacts_[k].row;
         if (impulse[0] <= share * scale) std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
+    }
+}
+
+// A contact pushes steadily if it pushed in the step before and its impulse does not come from the speed with which it
+// closed: that is less than a quarter of what the impulse changes, D diag(H)⁻¹ Dᵀ P in its normal row.
+void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,
+                                          double* result) const {
+    const auto& D = problem.D;
+    const std::vector<double> diagonal = diagonal_of(problem.H);
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        const std::size_t first = first_row_ + contact.row;
+        if (contact.along_normal) {
+            double mobility = 0.0;
+            for (auto e = D.row_start[first]; e < D.row_start[first + 1]; ++e) {
+                const double value = D.value[static_cast<std::size_t>(e)];
+                mobility += value * value / diagonal[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])];
+            }
+            if (!contact.pushed || contact.approach > 0.25 * mobility * lambda[first]) continue;
+        }
+        for (std::size_t row = first; row < first + static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++row)
+            for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
+                result[D.column[static_cast<std::size_t>(e)]] += D.value[static_cast<std::size_t>(e)] * lambda[row];
     }
 }
 

@@ -13,6 +13,9 @@
 
 namespace delassus {
 
+/// The diagonal of H; 1 where it is not positive.
+[[nodiscard]] DELASSUS_API std::vector<double> diagonal_of(const SparseMatrix& H);
+
 /// What a user may choose of contacts on the level of velocities.
 struct VelocityContactSettings {
     double recovery_speed = 0.01;    ///< with which penetration that a step finds is undone at most
@@ -47,6 +50,9 @@ public:
     void drop_negligible(const Problem& problem, std::vector<double>& lambda) const;
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
+
+    /// result += D_Aᵀ P of what pushed steadily: not of impacts. P: impulses, `lambda` of the whole problem; n.
+    void add_steady_impulse(const Problem& problem, const std::vector<double>& lambda, double* result) const;
 
     /// The least gap that the block may have at the end of the step: 0, or less where it penetrated at the beginning.
     [[nodiscard]] double least_gap(std::uint64_t key) const;
