@@ -83,7 +83,7 @@ private:
         assemble(state, h, solver.law() == Law::Coulomb);
         solution_.x = state.v;
         solve(state, h, solver, report);
-        contacts_.drop_negligible(problem_, solution_.lambda);
+        contacts_.drop_negligible(problem_, solution_);
 
         const Vector result = Eigen::Map<const Vector>(solution_.x.data(), n_);
         move(state, h, result, 1.0, end_);

@@ -18,7 +18,7 @@ namespace {
 //
 //     smooth     M ṽ' = f + C_qᵀ λ̃ + D_Aᵀ λ_A,   C(q̃) = 0    by the generalised-α method from (q, v): q̃, ṽ
 //     velocity   H (v⁺ − ṽ) = C_qᵀ P_C + D_Aᵀ (P_A − h λ_A),  C_q v⁺ + C_t = 0,  D_A v⁺ + b ∈ Υ* ⊥ P_A ∈ Υ
-//     position   q⁺ = q̃ ∘ exp(½ h (v⁺ − ṽ)) ∘ exp(x),         C = 0,  g ≥ 0
+//     position   q⁺ = q̃ ∘ exp(½ h (v⁺ − ṽ) + s) ∘ exp(x),     C = 0,  g ≥ 0
 //
 // The smooth part is integrators/generalized_alpha.cpp; its accelerations are remembered, impacts do not enter them.
 // λ_A are the reactions of the last step that pushed steadily: so the smooth part knows, to O(h), what holds a resting
@@ -95,13 +95,14 @@ private:
         smooth_.step(end_, h, solver, report);
         const Vector next = ((1.0 - c_.alpha_f) * load + c_.alpha_f * last - c_.alpha_m * mean) / (1.0 - c_.alpha_m);
         impulse_ = h * (c_.velocity_old * mean + c_.velocity_new * next);
+        shift_ = 0.5 * h * impulse_ - h * h * (c_.position_old * mean + c_.position_new * next);
         last = load;
         mean = next;
         contacts_.collect(state, h, 0.5);
-        if (m_ > 0 || contacts_.any() || !impulse_.isZero(0.0)) {
+        if (contacts_.any() || !impulse_.isZero(0.0)) {
             assemble(h, solver.law() == Law::Coulomb);
             solve(solver, report);
-            move(h);
+            move(h, solver, report);
             require_finite(state, end_, h, name);
             projection_.project(state, end_, h, problem_.H, contacts_, solver, report, name);
         }
@@ -156,13 +157,26 @@ private:
                 break;
             }
         }
-        contacts_.drop_negligible(problem_, solution_.lambda);
+        contacts_.drop_negligible(problem_, solution_);
     }
 
     /// end_ ← with what impulses add.
-    void move(double h) {
-        delta_.resize(static_cast<std::size_t>(n_));
-        for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = 0.5 * h * (solution_.x[i] - end_.v[i]);
+    void move(double h, StepSolver& solver, StepReport& report) {
+        delta_.assign(static_cast<std::size_t>(n_), 0.0);
+        if (!shift_.isZero(0.0)) {
+            shift_problem_.name = "shift";
+            shift_problem_.H = problem_.H;
+            shift_problem_.D = SparseMatrix::zero(0, n_);
+            shift_problem_.a.assign(shift_.begin(), shift_.end());
+            shift_solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
+            shift_solution_.lambda.clear();
+            if (!solver.solve(shift_problem_, shift_solution_, false)) {
+                report.solved = false;
+                report.message = solver.effort().unsolved;
+            }
+            delta_ = shift_solution_.x;
+        }
+        for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] += 0.5 * h * (solution_.x[i] - end_.v[i]);
         system_.increment(end_.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
     }
@@ -193,7 +207,9 @@ private:
     std::int32_t n_, m_;
     // D_Aᵀ λ_A of the step to come and of the last one, and A as a force; n.
     std::array<Vector, 3> loads_;
-    Vector impulse_;  // of these in the smooth part of a step
+    Vector impulse_, shift_;  // I and H s of the step
+    Problem shift_problem_;
+    Solution shift_solution_;
     MatrixAssembler H_, D_;
     Problem problem_;
     Solution solution_;

@@ -44,7 +44,7 @@ TEST(Energy, NeverGrowsWithImplicitEuler) {
 }
 
 TEST(Energy, StaysWithTheTrapezoidalRule) {
-    for (const char* method : {"trapezoidal", "trapezoidal_linearized", "newmark"})
+    for (const char* method : {"trapezoidal", "trapezoidal_linearized", "newmark", "moreau_jean"})
         for (const double omega : frequencies)
             for (const auto& start : starts(omega)) {
                 LinearOscillators system(omega, 0.5 * omega, start);

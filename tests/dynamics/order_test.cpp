@@ -83,7 +83,7 @@ std::vector<Case> cases() {
         {"generalized_alpha", {{"rho_infinity", "1"}}, 2, Multipliers::Oscillate},
         {"moreau_jean", {}, 2, Multipliers::Mean},
         {"moreau_jean", {{"theta", "0.6"}}, 1},
-        {"nonsmooth_generalized_alpha", {}, 2, Multipliers::Mean}};
+        {"nonsmooth_generalized_alpha", {}, 2}};
     std::vector<Case> result;
     const auto add = [&](const Method& method, const std::string& system, bool constrained) {
         auto options = method.options;

@@ -237,34 +237,41 @@ void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, in
     }
 }
 
-void VelocityContacts::drop_negligible(const Problem& problem, std::vector<double>& lambda) const {
-    constexpr double share = 1e-9;
+// An interior point leaves impulses above 0 where nothing pushes: they change the speed of their row by next to nothing
+// beside the speed with which it opens.
+void VelocityContacts::drop_negligible(const Problem& problem, Solution& solution) {
+    constexpr double share = 1e-6, share_of_momentum = 1e-9;
     double scale = 0.0;
     for (const double momentum : problem.a) scale = std::max(scale, std::abs(momentum));
+    const std::vector<double> diagonal = diagonal_of(problem.H);
+    const auto& D = problem.D;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        if (!contacts_[k].along_normal) continue;
-        double* impulse = lambda.data() + first_row_ + contacts_[k].row;
-        if (impulse[0] <= share * scale) std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
+        Contact& contact = contacts_[k];
+        if (!contact.along_normal) continue;
+        const std::size_t first = first_row_ + contact.row;
+        double opening = problem.b[first] - std::max(contact.sliding, 0.0), mobility = 0.0;
+        for (auto e = D.row_start[first]; e < D.row_start[first + 1]; ++e) {
+            const double value = D.value[static_cast<std::size_t>(e)];
+            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
+            opening += value * solution.x[column];
+            mobility += value * value / diagonal[column];
+        }
+        double* impulse = solution.lambda.data() + first;
+        contact.change = mobility * impulse[0];
+        if (impulse[0] <= share_of_momentum * scale || contact.change <= share * opening)
+            std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
     }
 }
 
 // A contact pushes steadily if it pushed in the step before and its impulse does not come from the speed with which it
-// closed: that is less than a quarter of what the impulse changes, D diag(H)⁻¹ Dᵀ P in its normal row.
+// closed: that is less than a quarter of the change that the impulse makes.
 void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,
                                           double* result) const {
     const auto& D = problem.D;
-    const std::vector<double> diagonal = diagonal_of(problem.H);
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const std::size_t first = first_row_ + contact.row;
-        if (contact.along_normal) {
-            double mobility = 0.0;
-            for (auto e = D.row_start[first]; e < D.row_start[first + 1]; ++e) {
-                const double value = D.value[static_cast<std::size_t>(e)];
-                mobility += value * value / diagonal[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])];
-            }
-            if (!contact.pushed || contact.approach > 0.25 * mobility * lambda[first]) continue;
-        }
+        if (contact.along_normal && (!contact.pushed || contact.approach > 0.25 * contact.change)) continue;
         for (std::size_t row = first; row < first + static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++row)
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 result[D.column[static_cast<std::size_t>(e)]] += D.value[static_cast<std::size_t>(e)] * lambda[row];

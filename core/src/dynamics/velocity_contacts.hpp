@@ -46,8 +46,8 @@ public:
     /// Whether the last set_b() left De Saxcé's terms where they were.
     [[nodiscard]] bool settled() const { return settled_; }
 
-    /// Takes impulses that a solver leaves where nothing pushes for none. lambda: of the whole problem.
-    void drop_negligible(const Problem& problem, std::vector<double>& lambda) const;
+    /// Takes impulses that a solver leaves where nothing pushes for none. solution: of the whole problem.
+    void drop_negligible(const Problem& problem, Solution& solution);
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
@@ -80,6 +80,7 @@ private:
         double sliding = -1.0;  ///< the term; negative: not known yet
         double moved = 0.0;     ///< by which it changed last
         double wanted = 0.0;    ///< what it should have been before
+        double change = 0.0;    ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
         bool pushed = false;    ///< in the step before
     };
 
