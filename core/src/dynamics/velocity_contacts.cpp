@@ -249,14 +249,16 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
         Contact& contact = contacts_[k];
         if (!contact.along_normal) continue;
         const std::size_t first = first_row_ + contact.row;
-        double opening = problem.b[first] - std::max(contact.sliding, 0.0), mobility = 0.0;
+        double speed = 0.0, mobility = 0.0;
         for (auto e = D.row_start[first]; e < D.row_start[first + 1]; ++e) {
             const double value = D.value[static_cast<std::size_t>(e)];
             const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
-            opening += value * solution.x[column];
+            speed += value * solution.x[column];
             mobility += value * value / diagonal[column];
         }
+        const double opening = speed + problem.b[first] - std::max(contact.sliding, 0.0);
         double* impulse = solution.lambda.data() + first;
+        contact.end_speed = speed + rows_.rows()[contact.row].rate;
         contact.change = mobility * impulse[0];
         if (impulse[0] <= share_of_momentum * scale || contact.change <= share * opening)
             std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
@@ -278,6 +280,17 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
     }
 }
 
+// A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.
+void VelocityContacts::report_closing(const Contact& contact, StepReport& report) const {
+    const double begin = -contact.approach, end = contact.end_speed;
+    if (!(contact.gap > 0.0) || contact.gap + 0.5 * h_ * (begin + end) >= -gap_resolution_) return;
+    const double curvature = (end - begin) / h_;
+    const double root = std::sqrt(std::max(begin * begin - 2.0 * curvature * contact.gap, 0.0));
+    if (root <= report.impact_speed) return;
+    report.impact_speed = root;
+    report.impact_time = std::min(2.0 * contact.gap / (root - begin), h_);
+}
+
 // A contact that closed is one that pushes and did not in the step before; it closes after g/|u⁻|, or with at least g/h
 // where it was slower at first. Gaps are reported as they were at the beginning of the step.
 void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& report) {
@@ -290,7 +303,11 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         const auto rows = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
         for (std::size_t i = 0; i < std::min<std::size_t>(rows, 3); ++i) acted.force[i] = lambda[first + i] / h_;
         if (lambda[first] != 0.0) ++report.active_blocks;
-        if (!contact.along_normal || !(lambda[first] > 0.0)) continue;
+        if (!contact.along_normal) continue;
+        if (!(lambda[first] > 0.0)) {
+            report_closing(contact, report);
+            continue;
+        }
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
         if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
             report.impact_speed = speed;

@@ -72,20 +72,22 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
-        bool turns = false;     ///< b has what its rows turn until the end of the step
-        double gap = 0.0;       ///< at the beginning
-        double approach = 0.0;  ///< speed with which it closes there
-        double normal = 0.0;    ///< b of the first row but for what follows from the guess
-        double friction = 0.0;  ///< of a contact with De Saxcé's term
-        double sliding = -1.0;  ///< the term; negative: not known yet
-        double moved = 0.0;     ///< by which it changed last
-        double wanted = 0.0;    ///< what it should have been before
-        double change = 0.0;    ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
-        bool pushed = false;    ///< in the step before
+        bool turns = false;      ///< b has what its rows turn until the end of the step
+        double gap = 0.0;        ///< at the beginning
+        double approach = 0.0;   ///< speed with which it closes there
+        double normal = 0.0;     ///< b of the first row but for what follows from the guess
+        double friction = 0.0;   ///< of a contact with De Saxcé's term
+        double sliding = -1.0;   ///< the term; negative: not known yet
+        double moved = 0.0;      ///< by which it changed last
+        double wanted = 0.0;     ///< what it should have been before
+        double end_speed = 0.0;  ///< of the normal row
+        double change = 0.0;     ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        bool pushed = false;     ///< in the step before
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
+    void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
 
     DynamicalSystem& system_;
