@@ -35,13 +35,9 @@ const RegisterTimestepper generalized_alpha_row{
      .unilateral = false,
      .order = 2,
      .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
-         const double rho = values[newton_option_count].real;
-         const double alpha_m = (2.0 * rho - 1.0) / (1.0 + rho), alpha_f = rho / (1.0 + rho);
-         const double gamma = 0.5 + alpha_f - alpha_m;
-         auto coefficients = ImplicitCoefficients::newmark(gamma, 0.25 * (gamma + 0.5) * (gamma + 0.5));
-         coefficients.alpha_m = alpha_m;
-         coefficients.alpha_f = alpha_f;
-         return std::make_unique<ImplicitMethod>(system, coefficients, newton_settings("generalized_alpha", values));
+         return std::make_unique<ImplicitMethod>(
+             system, ImplicitCoefficients::generalized_alpha(values[newton_option_count].real),
+             newton_settings("generalized_alpha", values));
      }}};
 
 }  // namespace

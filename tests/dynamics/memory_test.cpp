@@ -5,6 +5,7 @@
 #include "support/order.hpp"
 #include "support/systems/elastic_pendulum.hpp"
 #include "support/systems/heavy_top.hpp"
+#include "support/systems/planar_block.hpp"
 #include "support/systems/planar_pendulum.hpp"
 
 namespace delassus::tests::memory_test {
@@ -53,6 +54,19 @@ TEST_P(Memory, AResumedRunHasTheSameBits) {
     expect_same_bits(pendulum, GetParam(), 0.01);
 }
 
+// A block that slides, with contacts in reach: their impulses and what follows from them are part of the memory.
+TEST_P(Memory, AResumedRunWithContactsHasTheSameBits) {
+    PlanarBlock block({.inertia = 5.0 / 12.0,
+                       .gravity = {3.0, -9.0},
+                       .drag = 0.3,
+                       .friction = 0.5,
+                       .restitution = 0.3,
+                       .corners = {{-1.0, -0.5}, {1.0, -0.5}}},
+                      {0.0, {0.0, 0.6, 0.1}, {3.0, 0.0, 0.0}});
+    for (const auto& info : timesteppers())
+        if (info.name == GetParam().name && info.unilateral) expect_same_bits(block, GetParam(), 0.01);
+}
+
 // After a restart the state alone decides.
 TEST_P(Memory, ARestartForgets) {
     PlanarPendulum pendulum;
@@ -78,7 +92,8 @@ INSTANTIATE_TEST_SUITE_P(Methods, Memory,
                                          Method{"trapezoidal", {}}, Method{"trapezoidal_linearized", {}},
                                          Method{"newmark", {}}, Method{"hht", {}}, Method{"generalized_alpha", {}},
                                          Method{"generalized_alpha", {{"reuse", "adaptive"}}},
-                                         Method{"generalized_alpha", {{"reuse", "modified"}}}),
+                                         Method{"generalized_alpha", {{"reuse", "modified"}}},
+                                         Method{"moreau_jean", {}}, Method{"nonsmooth_generalized_alpha", {}}),
                          [](const auto& chosen) { return testing::PrintToString(chosen.param); });
 
 TEST(MemoryErrors, AMemoryThatDoesNotFitIsRefused) {
@@ -109,12 +124,13 @@ TEST(Refusals, ExplicitMethodsTakeNoConstraints) {
     PlanarPendulum pendulum;
     const std::string others =
         " takes no constraints; the system has 1 rows of them. Can: euler_implicit, euler_implicit_linearized, "
-        "generalized_alpha, hht, newmark, trapezoidal, trapezoidal_linearized";
+        "generalized_alpha, hht, moreau_jean, newmark, nonsmooth_generalized_alpha, trapezoidal, "
+        "trapezoidal_linearized";
     expect_refusal("rk4", pendulum, {}, "rk4" + others);
     expect_refusal("euler_explicit", pendulum, {}, "euler_explicit" + others);
 }
 
-TEST(Refusals, OnlyTheLinearizedEulerMethodTakesContacts) {
+TEST(Refusals, OthersTakeNoContacts) {
     class Stopped : public ElasticPendulum {
         [[nodiscard]] bool has_unilateral() const override { return true; }
     } system;
@@ -124,7 +140,7 @@ TEST(Refusals, OnlyTheLinearizedEulerMethodTakesContacts) {
             info.name, system, {},
             info.name +
                 " takes no contacts, stops, dry friction of joints or force limits, which the system has. Can: "
-                "euler_implicit_linearized");
+                "euler_implicit_linearized, moreau_jean, nonsmooth_generalized_alpha");
     }
 }
 

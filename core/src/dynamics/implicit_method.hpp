@@ -26,6 +26,16 @@ struct ImplicitCoefficients {
         return {0.5 - beta, beta, 1.0 - gamma, gamma, 0.0, 0.0};
     }
 
+    /// Chung and Hulbert's, by the factor ρ_∞ of infinite frequencies (integrators/generalized_alpha.cpp).
+    static ImplicitCoefficients generalized_alpha(double rho) {
+        const double alpha_m = (2.0 * rho - 1.0) / (1.0 + rho), alpha_f = rho / (1.0 + rho);
+        const double gamma = 0.5 + alpha_f - alpha_m;
+        auto coefficients = newmark(gamma, 0.25 * (gamma + 0.5) * (gamma + 0.5));
+        coefficients.alpha_m = alpha_m;
+        coefficients.alpha_f = alpha_f;
+        return coefficients;
+    }
+
     /// Whether accelerations of the step before enter: the first step then needs consistent ones.
     [[nodiscard]] bool remembers() const {
         return position_old != 0.0 || velocity_old != 0.0 || alpha_m != 0.0 || alpha_f != 0.0;
@@ -48,6 +58,8 @@ public:
     ImplicitMethod(DynamicalSystem& system, ImplicitCoefficients coefficients, NewtonSettings settings);
 
     void restart() override;
+    /// A force beside the system's, n, in the steps to come.
+    void set_load(Vector load) { newton_.set_load(std::move(load)); }
     [[nodiscard]] int order() const override { return c_.order(); }
     /// Of these methods, only implicit Euler remembers nothing.
     [[nodiscard]] bool damps_at_once() const override { return !c_.remembers(); }

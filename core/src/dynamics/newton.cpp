@@ -53,6 +53,7 @@ bool Newton::evaluate(const State& begin, StepPoint& point, StepResidual& residu
     residual.constraint.setZero(m_);
     system_.multiply_mass(point.state, 1.0, point.acceleration.data(), residual.inertia.data());
     system_.add_force(point.state, 1.0, residual.force.data());
+    if (load_.size() > 0) residual.force += load_;
     if (m_ > 0) {
         jacobian(point.state).transpose_multiply_add(1.0, point.lambda.data(), residual.reaction.data());
         system_.constraint(point.state, residual.constraint.data());

@@ -58,6 +58,9 @@ public:
     /// system outlives it.
     Newton(DynamicalSystem& system, NewtonSettings settings);
 
+    /// A force beside f, n, which stays during a step; empty: none.
+    void set_load(Vector load) { load_ = std::move(load); }
+
     /// point.state.q ← q ∘ exp(delta), and the residual there. False if a number in it is not finite.
     bool evaluate(const State& begin, StepPoint& point, StepResidual& residual);
 
@@ -99,6 +102,7 @@ private:
     MatrixAssembler rates_, H_, D_;
     std::vector<DiagonalBlock3> blocks_;
     Kept kept_;
+    Vector load_;
     Vector root_, row_scale_;  // √H_ii, and 1/√(D H_ii⁻¹ Dᵀ)_jj
 };
 

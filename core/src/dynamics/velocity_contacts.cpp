@@ -1,0 +1,455 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/velocity_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/linear_problem.hpp"
+#include "problem/copy_cone.hpp"
+
+namespace delassus {
+
+// ---- Where D is taken ----
+//
+// The velocities at the end of the step shall obey u⁺ = D(q⁺) v⁺, and the impulse P acts along D(q(t))ᵀ over the step.
+// A problem has one D for both. With D taken at q̄ = q ∘ exp(θ h v) the impulse has the direction of the middle of the
+// step (θ = ½: an error of order h² in a step of smooth motion, for P = O(h)), and the row is made that of the end by
+//
+//     u⁺ = D̄ v⁺ + (D(q⁺) − D̄) ṽ⁺,      D(q⁺) − D̄ ≈ (1 − θ)/θ (D̄ − D(q))
+//
+// with the guess ṽ⁺ of v⁺ (of the last iteration). So contacts are looked for twice, at q and at q̄, and paired by keys.
+// The term counts for contacts that pushed in the step before, which is where rows turn along with a smooth motion. A
+// contact that closes gets its impulse in the configuration D̄ alone: then u⁺ = −e u⁻ with one D on both sides, and e ≤
+// 1 gains no energy. It does not count either where rows changed by more than a turn of a smooth motion explains: the
+// tangents of a contact may jump.
+//
+// ---- The law ----
+//
+// With the gap g and the speed u⁻ at the beginning of the step, b of a normal row is (Moreau 1988; Jean 1999; Acary and
+// Brogliato 2008, ch. 10)
+//
+//     closed, g ≤ 0:                            b = 0:                        u⁺ ≥ 0
+//     closing with restitution, g + h u⁻ ≤ 0:   b = e u⁻:                     u⁺ ≥ −e u⁻
+//     else                                      b = (g + (1 − θ) h u⁻)/(θ h): g + (1 − θ) h u⁻ + θ h u⁺ ≥ 0
+//
+// but not below 0 in the last case. There the gap at the end of the step, g⁺ to first order, stays open: an inelastic
+// contact lands with g⁺ = 0, and loses what is left of its speed in the next step. If it were stopped in one step, half
+// the way would remain open, and the body would fall through it again, with a speed of the order √h. A contact with
+// restitution would lose by such a row what it is to return; so it is left alone until it closes at its own speed (b
+// has −u⁻ besides), and what it penetrates by acceleration, below ½ a h², is undone in the positions.
+//
+// Gaps nearer to 0 than the resolution are 0.
+//
+// ---- Friction ----
+//
+// The associated law on the level of velocities would lift a sliding contact at the speed μ |u_t| in each step. So
+// De Saxcé's term s = μ |u_t⁺| stands in b, by which the answer obeys Coulomb's law: with u_t of the guess, until
+// further iterations do not move it. A term that is too large by δ costs the impulse m δ, whose friction changes |u_t|
+// by μ δ: the iteration s ← μ |u_t⁺(s)| contracts by about μ² only, so each contact takes its secant.
+// Where contacts stick and slip in turns, the terms jump for ever. So late ones only fall: with less than μ |u_t| the
+// law lies between Coulomb's and the associated one, and the contact opens at the speed μ |u_t| − s in this step.
+
+namespace {
+
+/// Of the square of a block's rows, beyond which they did not turn along with a smooth motion.
+constexpr double largest_turn_squared = 0.25;
+/// The largest slope that the iteration of De Saxcé's terms is taken to have.
+constexpr double steepest = 0.5;
+/// What further iterations may move them by, as a share, unless the solver leaves more.
+constexpr double settled_share = 1e-6;
+/// After so many iterations they only fall.
+constexpr int patience = 15;
+
+}  // namespace
+
+std::vector<double> diagonal_of(const SparseMatrix& H) {
+    std::vector<double> diagonal(static_cast<std::size_t>(H.rows), 1.0);
+    for (std::size_t row = 0; row < diagonal.size(); ++row)
+        for (auto e = H.row_start[row]; e < H.row_start[row + 1]; ++e) {
+            const auto entry = static_cast<std::size_t>(e);
+            if (static_cast<std::size_t>(H.column[entry]) == row && H.value[entry] > 0.0)
+                diagonal[row] = H.value[entry];
+        }
+    return diagonal;
+}
+
+VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
+    : system_(system), settings_(settings), gap_resolution_(system.gap_resolution()) {}
+
+void VelocityContacts::collect(const State& begin, double h, double theta) {
+    h_ = h;
+    theta_ = theta;
+    before_.clear();
+    rows_.clear();
+    keys_.clear();
+    deepest_ = 0.0;
+    if (!system_.has_unilateral()) return;
+    before_.measure_speeds_at(begin.v.data());
+    rows_.measure_speeds_at(begin.v.data());
+    system_.collect_unilateral(begin, h, before_);
+    std::size_t row = 0;
+    for (std::size_t k = 0; k < before_.blocks().size(); ++k) {
+        const auto& block = before_.blocks()[k];
+        if (block.compliance > 0.0)
+            throw Unsupported(
+                "actuators with a limit need the timestepper euler_implicit_linearized; without a limit any takes "
+                "them");
+        keys_.push_back({block.key, k, row});
+        if (block.along_normal()) deepest_ = std::min(deepest_, before_.rows()[row].gap);
+        row += static_cast<std::size_t>(block.cone.rows);
+    }
+    const auto by_key = [](const Before& a, const Before& b) { return a.key < b.key; };
+    if (!std::is_sorted(keys_.begin(), keys_.end(), by_key)) std::sort(keys_.begin(), keys_.end(), by_key);
+    middle_ = begin;
+    delta_.resize(begin.v.size());
+    for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = theta * h * begin.v[i];
+    system_.increment(begin.q.data(), delta_.data(), middle_.q.data());
+    system_.collect_unilateral(middle_, h, rows_);
+}
+
+/// Null where there is none, or several: then nothing tells them apart.
+const VelocityContacts::Before* VelocityContacts::find_before(std::uint64_t key) const {
+    const auto found = std::lower_bound(keys_.begin(), keys_.end(), key,
+                                        [](const Before& entry, std::uint64_t wanted) { return entry.key < wanted; });
+    if (found == keys_.end() || found->key != key) return nullptr;
+    if (found + 1 != keys_.end() && (found + 1)->key == key) return nullptr;
+    return &*found;
+}
+
+/// Whether rows of rows_ are those of before_, but for a turn that a smooth motion explains.
+bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const {
+    double change = 0.0, size = 0.0;
+    for (std::int32_t i = 0; i < rows; ++i) {
+        const auto k = row + static_cast<std::size_t>(i), l = before + static_cast<std::size_t>(i);
+        auto e = static_cast<std::size_t>(rows_.row_start()[k]), f = static_cast<std::size_t>(before_.row_start()[l]);
+        const auto e_end = static_cast<std::size_t>(rows_.row_start()[k + 1]);
+        const auto f_end = static_cast<std::size_t>(before_.row_start()[l + 1]);
+        while (e < e_end || f < f_end) {
+            const bool now = e < e_end && (f == f_end || rows_.column()[e] <= before_.column()[f]);
+            const bool then = f < f_end && (e == e_end || before_.column()[f] <= rows_.column()[e]);
+            const double a = now ? rows_.value()[e++] : 0.0, b = then ? before_.value()[f++] : 0.0;
+            change += (a - b) * (a - b);
+            size += a * a;
+        }
+    }
+    return change <= largest_turn_squared * size;
+}
+
+void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const {
+    const double gap = contact.gap - std::clamp(contact.gap, -gap_resolution_, gap_resolution_);
+    const double speed = -contact.approach;
+    contact.normal = 0.0;
+    if (block.restitution > 0.0 && speed < -settings_.restitution_speed) {
+        const bool closes = gap + h_ * speed <= 0.0;
+        contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
+                                : std::max(gap + (1.0 - theta_) * h_ * speed, 0.0) / (theta_ * h_) - speed;
+        if (closes) contact.turns = contact.turns && contact.pushed;
+    } else if (gap > 0.0) {
+        contact.normal = std::max(gap + (1.0 - theta_) * h_ * speed, 0.0) / (theta_ * h_);
+    }
+}
+
+void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, bool coulomb) {
+    first_row_ = problem.b.size();
+    coulomb_ = coulomb;
+    settled_ = true;
+    contacts_.clear();
+    kept_.begin_walk();
+    const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
+    std::size_t row = 0;
+    std::size_t cone = problem.cones.size();
+    problem.cones.resize(cone + rows_.blocks().size());
+    problem.b.resize(first_row_ + rows_.rows().size(), 0.0);
+    lambda.resize(problem.b.size(), 0.0);
+    for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
+        const auto& block = rows_.blocks()[k];
+        const auto size = static_cast<std::size_t>(block.cone.rows);
+        Cone& target = problem.cones[cone++];
+        copy_cone(block.cone, target);
+        for (auto* bounds : {&target.lo, &target.hi})
+            for (double& bound : *bounds) bound *= h_;
+        Contact& contact = contacts_.emplace_back();
+        contact.row = row;
+        contact.along_normal = block.along_normal();
+        const ContactPoint* point = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
+        contact.pushed = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
+        const Before* before = find_before(block.key);
+        if (before && before_.blocks()[before->block].cone.rows != block.cone.rows) before = nullptr;
+        if (before) {
+            contact.before = before->row;
+            contact.gap = before_.rows()[before->row].gap;
+            contact.approach = -before_.blocks()[before->block].speed;
+            contact.turns =
+                (contact.pushed || !contact.along_normal) && nearly_equal(row, before->row, block.cone.rows);
+        } else {
+            contact.gap = rows_.rows()[row].gap - theta_ * h_ * block.speed;
+            contact.approach = -block.speed;
+        }
+        if (contact.along_normal) set_normal(block, contact, block.speed);
+        if (block.cone.kind == ConeKind::Friction && block.cone.parameters[0] > 0.0 && !coulomb)
+            contact.friction = block.cone.parameters[0];
+        row += size;
+    }
+    rows_.move_into(problem.D);
+}
+
+void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error) {
+    const auto& D = problem.D;
+    settled_ = true;
+    const double share = std::max(settled_share, 10.0 * natural_error);
+    double largest = 0.0;
+    for (const double speed : guess) largest = std::max(largest, std::abs(speed));
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[k];
+        const auto size = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
+        double squares = 0.0;
+        for (std::size_t i = 0; i < size; ++i) {
+            const std::size_t row = first_row_ + contact.row + i;
+            double here = 0.0;
+            for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
+                const auto entry = static_cast<std::size_t>(e);
+                here += D.value[entry] * guess[static_cast<std::size_t>(D.column[entry])];
+            }
+            double& b = problem.b[row];
+            b = rows_.rows()[contact.row + i].rate;
+            if (contact.turns) {
+                const std::size_t then = contact.before + i;
+                b += (1.0 - theta_) / theta_ * (here - before_.speed(then, guess.data()) + before_.rows()[then].rate);
+            }
+            if (i > 0) squares += (here + b) * (here + b);
+        }
+        double& b = problem.b[first_row_ + contact.row];
+        b += contact.normal;
+        if (contact.friction == 0.0) continue;
+        const double wanted = contact.friction * std::sqrt(squares);
+        const double last = std::max(contact.sliding, 0.0), change = wanted - last;
+        const double enough = share * std::max({wanted, contact.friction * contact.approach, 1e-2 * largest});
+        double next = wanted;
+        if (iteration < patience) {
+            const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
+            next = std::max(0.0, last + change / (1.0 - std::clamp(slope, -steepest, steepest)));
+            settled_ = settled_ && std::abs(change) <= enough;
+        } else {
+            if (change > 0.0) next = last;
+            if (change < 0.0 && iteration >= 2 * patience) next = 0.0;
+            settled_ = settled_ && change >= -enough;
+        }
+        contact.moved = contact.sliding < 0.0 ? 0.0 : next - contact.sliding;
+        contact.wanted = wanted;
+        contact.sliding = next;
+        b += contact.sliding;
+    }
+}
+
+// An interior point leaves impulses above 0 where nothing pushes: they change the speed of their row by next to nothing
+// beside the speed with which it opens.
+void VelocityContacts::drop_negligible(const Problem& problem, Solution& solution) {
+    constexpr double share = 1e-6, share_of_momentum = 1e-9;
+    double scale = 0.0;
+    for (const double momentum : problem.a) scale = std::max(scale, std::abs(momentum));
+    const std::vector<double> diagonal = diagonal_of(problem.H);
+    const auto& D = problem.D;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[k];
+        if (!contact.along_normal) continue;
+        const std::size_t first = first_row_ + contact.row;
+        double speed = 0.0, mobility = 0.0;
+        for (auto e = D.row_start[first]; e < D.row_start[first + 1]; ++e) {
+            const double value = D.value[static_cast<std::size_t>(e)];
+            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
+            speed += value * solution.x[column];
+            mobility += value * value / diagonal[column];
+        }
+        const double opening = speed + problem.b[first] - std::max(contact.sliding, 0.0);
+        double* impulse = solution.lambda.data() + first;
+        contact.end_speed = speed + rows_.rows()[contact.row].rate;
+        contact.change = mobility * impulse[0];
+        if (impulse[0] <= share_of_momentum * scale || contact.change <= share * opening)
+            std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
+    }
+}
+
+// A contact pushes steadily if it pushed in the step before and its impulse does not come from the speed with which it
+// closed: that is less than a quarter of the change that the impulse makes.
+void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,
+                                          double* result) const {
+    const auto& D = problem.D;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        const std::size_t first = first_row_ + contact.row;
+        if (contact.along_normal && (!contact.pushed || contact.approach > 0.25 * contact.change)) continue;
+        for (std::size_t row = first; row < first + static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++row)
+            for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
+                result[D.column[static_cast<std::size_t>(e)]] += D.value[static_cast<std::size_t>(e)] * lambda[row];
+    }
+}
+
+// A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.
+void VelocityContacts::report_closing(const Contact& contact, StepReport& report) const {
+    const double begin = -contact.approach, end = contact.end_speed;
+    if (!(contact.gap > 0.0) || contact.gap + 0.5 * h_ * (begin + end) >= -gap_resolution_) return;
+    const double curvature = (end - begin) / h_;
+    const double root = std::sqrt(std::max(begin * begin - 2.0 * curvature * contact.gap, 0.0));
+    if (root <= report.impact_speed) return;
+    report.impact_speed = root;
+    report.impact_time = std::min(2.0 * contact.gap / (root - begin), h_);
+}
+
+// A contact that closed is one that pushes and did not in the step before; it closes after g/|u⁻|, or with at least g/h
+// where it was slower at first. Gaps are reported as they were at the beginning of the step.
+void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& report) {
+    report.unilateral_blocks = static_cast<std::int32_t>(contacts_.size());
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        const std::size_t first = first_row_ + contact.row;
+        BlockReaction& acted = report.reactions.emplace_back();
+        acted.key = rows_.blocks()[k].key;
+        const auto rows = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
+        for (std::size_t i = 0; i < std::min<std::size_t>(rows, 3); ++i) acted.force[i] = lambda[first + i] / h_;
+        if (lambda[first] != 0.0) ++report.active_blocks;
+        if (!contact.along_normal) continue;
+        if (!(lambda[first] > 0.0)) {
+            report_closing(contact, report);
+            continue;
+        }
+        const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
+        if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
+            report.impact_speed = speed;
+            report.impact_time = contact.approach < 0.0 ? h_ : gap / speed;
+        }
+    }
+    kept_.keep(rows_.blocks(), rows_.contacts(), std::span(lambda).subspan(first_row_));
+    const std::size_t first_contact = contacts_.size() - rows_.contacts().size();
+    for (std::size_t k = 0; k < rows_.contacts().size(); ++k)
+        rows_.contacts()[k].gap = contacts_[first_contact + k].gap;
+    report.contacts.swap(rows_.contacts());
+}
+
+// A new point of bodies that overlap already must not push them apart at once.
+double VelocityContacts::least_gap(std::uint64_t key) const {
+    const Before* found = find_before(key);
+    const double before = found ? before_.rows()[found->row].gap : deepest_;
+    return std::min(0.0, before + settings_.recovery_speed * h_);
+}
+
+// ---- Positions ----
+//
+// On the level of velocities constraints drift by O(h³) a step, and a contact that closed penetrates by up to
+// (1 − θ) h |u⁻|. The least motion x in the norm of H that undoes it solves
+//
+//     H x − Dᵀ ν = 0,      C + C_q x = 0,      g + D_n x ≥ g_least  ⊥  ν ≥ 0
+//
+// at the end of the step, without friction: the part on positions of Brüls, Acary and Cardona (CMAME 281, 2014), of
+// which Gear, Gupta and Leimkuhler's is the one without contacts. H contains the stiffness, so that elastic bodies move
+// as a whole. What is solved for is the speed x/h. g_least bounds how fast a penetration is undone that the step began
+// with. The energy that it gives is −f·x.
+
+PositionProjection::PositionProjection(DynamicalSystem& system)
+    : system_(system),
+      blocks_(system.constraint_blocks()),
+      n_(system.n()),
+      m_(system.m()),
+      resolution_(system.gap_resolution()),
+      constraint_(static_cast<std::size_t>(m_)) {}
+
+/// The problem; whether there is anything to undo.
+bool PositionProjection::assemble(const State& end, double h, const VelocityContacts& contacts) {
+    double off = 0.0, least = 0.0;
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) off = std::max(off, std::abs(C));
+    rows_.clear();
+    if (contacts.any()) {
+        rows_.measure_speeds_at(nullptr);
+        system_.collect_unilateral(end, h, rows_);
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            const double gap = rows_.rows()[row].gap;
+            if (block.along_normal() && gap < 0.0) least = std::max(least, contacts.least_gap(block.key) - gap);
+            row += static_cast<std::size_t>(block.cone.rows);
+        }
+    }
+    if (off <= resolution_ && least <= resolution_) return false;
+    const auto m = static_cast<std::size_t>(m_);
+    std::int32_t count = 0;
+    problem_.b.assign(constraint_.begin(), constraint_.end());
+    problem_.cones.clear();
+    for (const std::int32_t rows : blocks_) problem_.cones.push_back(Cone::free(rows));
+    // Gaps wider than this are out of reach of what moves by about `off` and `least`.
+    const double reach = 10.0 * std::max(off, least) + resolution_;
+    const auto for_each_near = [&](const auto& visit) {
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            if (block.along_normal() && rows_.rows()[row].gap < reach) visit(block, row);
+            row += static_cast<std::size_t>(block.cone.rows);
+        }
+    };
+    for_each_near([&](const auto&, std::size_t) { ++count; });
+    D_.begin(m_ + count, n_);
+    if (m_ > 0) system_.add_constraint_jacobian(end, 0, D_);
+    for_each_near([&](const auto& block, std::size_t row) {
+        const auto target = static_cast<std::int32_t>(problem_.b.size());
+        for (auto e = rows_.row_start()[row]; e < rows_.row_start()[row + 1]; ++e)
+            D_.add(target, rows_.column()[static_cast<std::size_t>(e)], rows_.value()[static_cast<std::size_t>(e)]);
+        problem_.b.push_back(rows_.rows()[row].gap - contacts.least_gap(block.key));
+        problem_.cones.push_back(Cone::nonnegative(1));
+    });
+    for (std::size_t i = 0; i < problem_.b.size(); ++i) problem_.b[i] /= h;
+    D_.finish_into(problem_.D);
+    return problem_.b.size() > m || off > resolution_;
+}
+
+void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
+                                 const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
+                                 std::string_view method) {
+    if (!assemble(end, h, contacts)) return;
+    problem_.name = "position";
+    problem_.law = Law::Associated;
+    problem_.H = H;
+    problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.lambda.assign(problem_.b.size(), 0.0);
+    if (!solver.solve(problem_, solution_, true)) {
+        report.solved = false;
+        report.message = solver.effort().unsolved;
+    }
+    ++report.newton_iterations;
+    delta_ = solution_.x;
+    for (double& entry : delta_) entry *= h;
+    const auto pushed = [](double impulse) { return impulse > 0.0; };
+    if (std::any_of(solution_.lambda.begin() + m_, solution_.lambda.end(), pushed)) {
+        force_.assign(static_cast<std::size_t>(n_), 0.0);
+        system_.add_force(end, 1.0, force_.data());
+        double work = 0.0;
+        for (std::size_t i = 0; i < force_.size(); ++i) work -= force_[i] * delta_[i];
+        report.recovered += std::max(work, 0.0);
+    }
+    system_.increment(end.q.data(), delta_.data(), end.q.data());
+    require_finite(begin, end, h, method);
+}
+
+// ---- Options ----
+
+std::vector<OptionInfo> velocity_contact_options() {
+    return {{.key = "recovery_speed",
+             .type = DELASSUS_OPTION_REAL,
+             .default_value = "-1",
+             .minimum = -1.0,
+             .maximum = HUGE_VAL,
+             .unit = "m/s",
+             .doc = "largest speed with which penetration that a step finds is undone, in the positions; negative: a "
+                    "hundredth of the speed that a fall through the size of the shapes gives"},
+            {.key = "restitution_speed",
+             .type = DELASSUS_OPTION_REAL,
+             .default_value = "0",
+             .minimum = 0.0,
+             .maximum = HUGE_VAL,
+             .unit = "m/s",
+             .doc = "contacts that close slower than this do not bounce"}};
+}
+
+VelocityContactSettings velocity_contact_settings(const DynamicalSystem& system, const OptionValue& recovery_speed,
+                                                  const OptionValue& restitution_speed) {
+    return {recovery_speed.real < 0.0 ? system.recovery_speed() : recovery_speed.real, restitution_speed.real};
+}
+
+}  // namespace delassus

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Contacts, stops and bounded motors on the level of velocities, for timesteppers of order 2 (internal).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/timestepper.hpp"
+#include "dynamics/kept_impulses.hpp"
+
+namespace delassus {
+
+/// The diagonal of H; 1 where it is not positive.
+[[nodiscard]] DELASSUS_API std::vector<double> diagonal_of(const SparseMatrix& H);
+
+/// What a user may choose of contacts on the level of velocities.
+struct VelocityContactSettings {
+    double recovery_speed = 0.01;    ///< with which penetration that a step finds is undone at most
+    double restitution_speed = 0.0;  ///< contacts that close slower do not bounce
+};
+
+/// The rows of the unilateral blocks in a step's problem [H −Dᵀ; D 0] for the velocities at its end, and their law:
+/// D v⁺ + b ∈ Υ*. The derivation is in velocity_contacts.cpp.
+class DELASSUS_API VelocityContacts {
+public:
+    /// system outlives it.
+    VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings);
+
+    void restart() { kept_.clear(); }
+
+    /// Collects the rows of a step of size h from `begin`: their gaps there, D at begin.q ∘ exp(θ h v); θ in (0, 1].
+    void collect(const State& begin, double h, double theta);
+    /// Whether there are any.
+    [[nodiscard]] bool any() const { return !rows_.blocks().empty(); }
+
+    /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows, and to lambda the impulses of
+    /// the last step as a start. coulomb: the solver knows Coulomb's law, else De Saxcé's term stands in b. The rows of
+    /// problem.D are used again until the next collect().
+    void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
+    /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
+    /// natural_error: of the solves so far.
+    void set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error);
+    /// Whether the last set_b() left De Saxcé's terms where they were.
+    [[nodiscard]] bool settled() const { return settled_; }
+
+    /// Takes impulses that a solver leaves where nothing pushes for none. solution: of the whole problem.
+    void drop_negligible(const Problem& problem, Solution& solution);
+    /// What acted, into the report, and kept for the next step; hands the contacts to the report.
+    void finish(const std::vector<double>& lambda, StepReport& report);
+
+    /// result += D_Aᵀ P of what pushed steadily: not of impacts. P: impulses, `lambda` of the whole problem; n.
+    void add_steady_impulse(const Problem& problem, const std::vector<double>& lambda, double* result) const;
+
+    /// The least gap that the block may have at the end of the step: 0, or less where it penetrated at the beginning.
+    [[nodiscard]] double least_gap(std::uint64_t key) const;
+
+    /// The impulses kept from step to step, for checkpoints.
+    void append_to(std::vector<double>& memory) const { kept_.append_to(memory); }
+    void load(std::span<const double> memory) { kept_.load(memory); }
+
+private:
+    /// A block at the beginning of the step.
+    struct Before {
+        std::uint64_t key;
+        std::size_t block, row;  ///< its number in before_, and its first row
+    };
+    /// A block of the problem.
+    struct Contact {
+        std::size_t row = 0;     ///< its first one in rows_
+        std::size_t before = 0;  ///< its first one in before_, where it turns
+        bool along_normal = false;
+        bool turns = false;      ///< b has what its rows turn until the end of the step
+        double gap = 0.0;        ///< at the beginning
+        double approach = 0.0;   ///< speed with which it closes there
+        double normal = 0.0;     ///< b of the first row but for what follows from the guess
+        double friction = 0.0;   ///< of a contact with De Saxcé's term
+        double sliding = -1.0;   ///< the term; negative: not known yet
+        double moved = 0.0;      ///< by which it changed last
+        double wanted = 0.0;     ///< what it should have been before
+        double end_speed = 0.0;  ///< of the normal row
+        double change = 0.0;     ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        bool pushed = false;     ///< in the step before
+    };
+
+    [[nodiscard]] const Before* find_before(std::uint64_t key) const;
+    [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
+    void report_closing(const Contact& contact, StepReport& report) const;
+    void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
+
+    DynamicalSystem& system_;
+    VelocityContactSettings settings_;
+    double gap_resolution_;
+    double h_ = 0.0, theta_ = 0.5;
+    UnilateralRows before_, rows_;  // at the beginning; at the point where D is taken
+    std::vector<Before> keys_;      // of before_, ascending
+    double deepest_ = 0.0;          // the least gap of before_, ≤ 0
+    std::vector<Contact> contacts_;
+    State middle_;
+    std::vector<double> delta_;
+    KeptImpulses kept_;
+    std::size_t first_row_ = 0;  // in the problem
+    bool coulomb_ = false, settled_ = true;
+};
+
+/// Moves positions at the end of a step onto the constraints: C = 0, and no gap below what the step may leave.
+class DELASSUS_API PositionProjection {
+public:
+    /// system outlives it.
+    explicit PositionProjection(DynamicalSystem& system);
+
+    /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
+    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite.
+    void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
+                 StepSolver& solver, StepReport& report, std::string_view method);
+
+private:
+    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+
+    DynamicalSystem& system_;
+    std::vector<std::int32_t> blocks_;
+    std::int32_t n_, m_;
+    double resolution_;
+    UnilateralRows rows_;
+    MatrixAssembler D_;
+    Problem problem_;
+    Solution solution_;
+    std::vector<double> constraint_, delta_, force_;
+};
+
+/// The rows of the options `recovery_speed` and `restitution_speed`, and what their values say.
+std::vector<OptionInfo> velocity_contact_options();
+VelocityContactSettings velocity_contact_settings(const DynamicalSystem& system, const OptionValue& recovery_speed,
+                                                  const OptionValue& restitution_speed);
+
+}  // namespace delassus
