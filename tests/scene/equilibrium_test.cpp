@@ -261,7 +261,7 @@ TEST(Equilibrium, WhatHasNoneIsRefusedInASentence) {
                     "at t = 0"));
     EXPECT_TRUE(has(refusal(with("") + "joints: [{name: j, kind: revolute, second: b}]\n"
                                        "motors: [{name: m, joint: j, speed: true, motion: 0, force_limit: 1}]\n"),
-                    "force limit"));
+                    "no motors and actuators with a limit"));
     EXPECT_TRUE(has(refusal("start: given\n" + with("")), "must be equilibrium"));
     EXPECT_TRUE(has(refusal("start: {equilibrium: {load_steps: 0}}\n" + with("")), "from 1 to"));
 #ifdef DELASSUS_HAS_FCL

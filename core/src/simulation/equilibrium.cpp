@@ -32,8 +32,8 @@ void require_nothing_touches(MultibodySystem& mechanics, const State& state, Uni
     for (const auto& block : rows.blocks()) {
         if (block.cone.kind == ConeKind::Box)
             throw Unsupported(
-                "the search for an equilibrium takes no motors with a force limit; give the motor a motion without "
-                "one");
+                "the search for an equilibrium takes no motors and actuators with a limit and no friction in joints; "
+                "leave them out of the scene, or give motors and actuators no limit");
         if (rows.rows()[row].gap < -mechanics.gap_resolution())
             throw Unsupported(fmt::format(
                 "under {:.4g} of the loads a contact or a stop closes, and the search for an equilibrium takes none; "
