@@ -10,6 +10,7 @@
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/velocity_contacts.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -507,21 +508,8 @@ private:
 const RegisterTimestepper euler_implicit_linearized_row{
     {.name = "euler_implicit_linearized",
      .description = "linearised implicit Euler for contacts, impacts and constraints; one problem a step",
-     .options = {{.key = "recovery_speed",
-                  .type = DELASSUS_OPTION_REAL,
-                  .default_value = "-1",
-                  .minimum = -1.0,
-                  .maximum = HUGE_VAL,
-                  .unit = "m/s",
-                  .doc = "largest speed with which penetration is corrected; negative: a hundredth of the speed that "
-                         "a fall through the size of the shapes gives"},
-                 {.key = "restitution_speed",
-                  .type = DELASSUS_OPTION_REAL,
-                  .default_value = "0",
-                  .minimum = 0.0,
-                  .maximum = HUGE_VAL,
-                  .unit = "m/s",
-                  .doc = "contacts that close slower than this do not bounce"},
+     .options = {recovery_speed_option(),
+                 restitution_speed_option(),
                  {.key = "jacobian",
                   .type = DELASSUS_OPTION_CHOICE,
                   .default_value = "symmetric",

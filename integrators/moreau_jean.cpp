@@ -304,7 +304,7 @@ private:
 };
 
 std::vector<OptionInfo> options() {
-    std::vector<OptionInfo> rows = {
+    return {
         {.key = "theta",
          .type = DELASSUS_OPTION_REAL,
          .default_value = "0.5",
@@ -323,10 +323,10 @@ std::vector<OptionInfo> options() {
          .default_value = "1e-10",
          .minimum = 0.0,
          .maximum = 0.1,
-         .doc = "no further iteration where it would change the right-hand sides by less than this share"}};
-    for (OptionInfo& row : velocity_contact_options()) rows.push_back(std::move(row));
-    rows.push_back(linearization_option());
-    return rows;
+         .doc = "no further iteration where it would change the right-hand sides by less than this share"},
+        recovery_speed_option(),
+        restitution_speed_option(),
+        linearization_option()};
 }
 
 const RegisterTimestepper moreau_jean_row{

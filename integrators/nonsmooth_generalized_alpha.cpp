@@ -218,14 +218,14 @@ private:
 };
 
 std::vector<OptionInfo> nonsmooth_options() {
-    std::vector<OptionInfo> own = velocity_contact_options();
-    own.push_back({.key = "rho_infinity",
-                   .type = DELASSUS_OPTION_REAL,
-                   .default_value = "0.8",
-                   .minimum = 0.0,
-                   .maximum = 1.0,
-                   .doc = "factor of the highest frequencies in a step; 0: gone at once, 1: no damping"});
-    return newton_options(std::move(own));
+    return newton_options({recovery_speed_option(),
+                           restitution_speed_option(),
+                           {.key = "rho_infinity",
+                            .type = DELASSUS_OPTION_REAL,
+                            .default_value = "0.8",
+                            .minimum = 0.0,
+                            .maximum = 1.0,
+                            .doc = "factor of the highest frequencies in a step; 0: gone at once, 1: no damping"}});
 }
 
 const RegisterTimestepper nonsmooth_generalized_alpha_row{

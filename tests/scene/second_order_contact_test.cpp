@@ -111,6 +111,37 @@ TEST_P(SecondOrderContact, PenetrationIsUndoneSlowly) {
     EXPECT_NEAR(run.simulation.totals().recovered, g * 0.05, 1e-3);
 }
 
+/// A disc of 2 kg m² that turns at 3 rad/s on a hinge.
+std::string disc(const char* method, const char* friction, const char* actuators) {
+    return fmt::format(
+        "step: 0.01\nend: 2\nintegrator: {}\ngravity: [0, 0, 0]\n"
+        "bodies: [{{name: disc, mass: 1, inertia: {{xx: 1, yy: 1, zz: 2}}, angular_velocity: [0, 0, 3]}}]\n"
+        "joints: [{{name: hinge, kind: revolute, second: disc, axis: [0, 0, 1], friction: {}}}]\n{}",
+        method, friction, actuators);
+}
+
+// 4 Nm stop it after 1.5 s, at 2.25 rad.
+TEST_P(SecondOrderContact, DryFrictionOfAJointStopsADisc) {
+    Running run(parse_scene(disc(GetParam(), "4", ""), "s"));
+    run.finish();
+    const auto& turn = run.pose("disc").orientation;
+    EXPECT_NEAR(2.0 * std::atan2(turn[3], turn[0]), 2.25, 1e-3);
+    EXPECT_NEAR(run.velocities("disc")[1][2], 0.0, 1e-9);
+}
+
+TEST_P(SecondOrderContact, RefusesActuatorsWithALimit) {
+    const auto with = [&](const char* limit) {
+        return parse_scene(
+            disc(GetParam(), "0", fmt::format("actuators: [{{name: a, joint: hinge, kd: 4{}}}]\n", limit).c_str()),
+            "s");
+    };
+    Running free(with(""));
+    free.finish();
+    EXPECT_NEAR(free.velocities("disc")[1][2], 3.0 * std::exp(-4.0), 2e-3);
+    Running limited(with(", limit: 2"));
+    EXPECT_THROW(limited.finish(), Unsupported);
+}
+
 TEST_P(SecondOrderContact, ArePlannedForAndRefuseToSleep) {
     Scene scene = example("box_on_incline");
     EXPECT_EQ(make_plan(scene, registry()).size(), 2U);

@@ -429,22 +429,26 @@ void PositionProjection::project(const State& begin, State& end, double h, const
 
 // ---- Options ----
 
-std::vector<OptionInfo> velocity_contact_options() {
-    return {{.key = "recovery_speed",
-             .type = DELASSUS_OPTION_REAL,
-             .default_value = "-1",
-             .minimum = -1.0,
-             .maximum = HUGE_VAL,
-             .unit = "m/s",
-             .doc = "largest speed with which penetration that a step finds is undone, in the positions; negative: a "
-                    "hundredth of the speed that a fall through the size of the shapes gives"},
-            {.key = "restitution_speed",
-             .type = DELASSUS_OPTION_REAL,
-             .default_value = "0",
-             .minimum = 0.0,
-             .maximum = HUGE_VAL,
-             .unit = "m/s",
-             .doc = "contacts that close slower than this do not bounce"}};
+OptionInfo recovery_speed_option() {
+    return {.key = "recovery_speed",
+            .type = DELASSUS_OPTION_REAL,
+            .default_value = "-1",
+            .minimum = -1.0,
+            .maximum = HUGE_VAL,
+            .unit = "m/s",
+            .doc =
+                "largest speed with which penetration that a step finds is undone; negative: a hundredth of the speed "
+                "that a fall through the size of the shapes gives"};
+}
+
+OptionInfo restitution_speed_option() {
+    return {.key = "restitution_speed",
+            .type = DELASSUS_OPTION_REAL,
+            .default_value = "0",
+            .minimum = 0.0,
+            .maximum = HUGE_VAL,
+            .unit = "m/s",
+            .doc = "contacts that close slower than this do not bounce"};
 }
 
 VelocityContactSettings velocity_contact_settings(const DynamicalSystem& system, const OptionValue& recovery_speed,

@@ -130,8 +130,9 @@ private:
     std::vector<double> constraint_, delta_, force_;
 };
 
-/// The rows of the options `recovery_speed` and `restitution_speed`, and what their values say.
-std::vector<OptionInfo> velocity_contact_options();
+/// The options of timesteppers that take contacts, and what their values say.
+OptionInfo recovery_speed_option();
+OptionInfo restitution_speed_option();
 VelocityContactSettings velocity_contact_settings(const DynamicalSystem& system, const OptionValue& recovery_speed,
                                                   const OptionValue& restitution_speed);
 

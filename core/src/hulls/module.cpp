@@ -33,7 +33,9 @@ public:
         std::fflush(stream_);
     }
     ~Qhull() {
-        qh_freeqhull(&state_, qh_ALL);
+        qh_freeqhull(&state_, !qh_ALL);  // what is long; the rest lies in buffers
+        int left = 0, left_bytes = 0;
+        qh_memfreeshort(&state_, &left, &left_bytes);
         std::fclose(stream_);
         std::free(text_);
     }
