@@ -132,7 +132,8 @@ TEST_P(SecondOrderContact, DryFrictionOfAJointStopsADisc) {
 TEST_P(SecondOrderContact, RefusesActuatorsWithALimit) {
     const auto with = [&](const char* limit) {
         return parse_scene(
-            disc(GetParam(), "0", fmt::format("actuators: [{{name: a, joint: hinge, kd: 4{}}}]\n", limit).c_str()),
+            disc(GetParam(), "0",
+                 fmt::format("actuators: [{{name: a, joint: hinge, speed: 0, kd: 4{}}}]\n", limit).c_str()),
             "s");
     };
     Running free(with(""));
