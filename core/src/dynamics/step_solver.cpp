@@ -94,11 +94,19 @@ StepSolver::~StepSolver() = default;
 
 RestingParts::~RestingParts() = default;
 
+namespace {
+
+/// The kinds that rows of scenes can have: a cone that only tests know is none of them.
+constexpr std::uint64_t cones_of_scenes =
+    sdk::cones_that([](const sdk::ConeOperations& row) { return row.kind <= DELASSUS_CONE_FRICTION; });
+
+}  // namespace
+
 void StepSolver::leave_nothing_out() {
     auto& self = *implementation_;
     self.leaves_out = false;
     self.also_needs = DELASSUS_CAN_H_DEFINITE;
-    if (self.config.name == auto_name) self.also_needs |= sdk::all_cones;
+    if (self.config.name == auto_name) self.also_needs |= cones_of_scenes;
 }
 
 bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
