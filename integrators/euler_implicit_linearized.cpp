@@ -10,6 +10,7 @@
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "problem/copy_cone.hpp"
 
@@ -127,7 +128,7 @@ private:
         assemble_unilateral(state, h);
 
         estimate_error(state, solver);
-        find_untouched();
+        untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
         double scale = 0.0;
@@ -453,18 +454,6 @@ private:
         penetrating_.push_back({block, rows_.rows()[row].rate, recovery, penetrating_value_.size()});
     }
 
-    /// Of spins_, those whose body no force but weight and no row of D acts on.
-    void find_untouched() {
-        untouched_.clear();
-        if (spins_.empty()) return;
-        held_.assign(static_cast<std::size_t>(n_), false);
-        for (const std::int32_t column : problem_.D.column) held_[column] = true;
-        for (const FreeSpin& spin : spins_) {
-            const auto first = held_.begin() + spin.column;
-            if (spin.alone && std::find(first, first + 3, true) == first + 3) untouched_.push_back(&spin);
-        }
-    }
-
     void keep(const std::vector<double>& lambda, double h) {
         last_h_ = h;
         multipliers_.resize(static_cast<std::size_t>(m_));
@@ -494,8 +483,7 @@ private:
     std::vector<Approach> approaches_;     // likewise
     std::vector<Sliding> sliding_;
     std::vector<FreeSpin> spins_, end_spins_;
-    std::vector<const FreeSpin*> untouched_;
-    std::vector<bool> held_;  // columns that D touches
+    UntouchedSpins untouched_;
     std::vector<Penetrating> penetrating_;
     std::vector<std::int32_t> penetrating_column_;
     std::vector<double> penetrating_value_;

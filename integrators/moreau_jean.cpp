@@ -7,6 +7,7 @@
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 
 namespace delassus {
@@ -152,18 +153,7 @@ private:
             for (std::size_t i = 0; i < multipliers_.size(); ++i) solution_.lambda[i] = last_h_ * multipliers_[i];
         contacts_.collect(begin, h, theta_);
         contacts_.append_to(problem_, solution_.lambda, coulomb);
-        find_untouched();
-    }
-
-    /// Of spins_, those whose body no force but weight and no row of D acts on.
-    void find_untouched() {
-        if (spins_.empty()) return;
-        held_.assign(static_cast<std::size_t>(n_), false);
-        for (const std::int32_t column : problem_.D.column) held_[static_cast<std::size_t>(column)] = true;
-        for (const FreeSpin& spin : spins_) {
-            const auto first = held_.begin() + spin.column;
-            if (spin.alone && std::find(first, first + 3, true) == first + 3) untouched_.push_back(&spin);
-        }
+        untouched_.find(spins_, problem_.D, n_);
     }
 
     /// a and b for the guess; the impulse of its forces stays in force_.
@@ -295,8 +285,7 @@ private:
     Solution solution_;
     State at_theta_, end_;
     std::vector<FreeSpin> spins_, theta_spins_;
-    std::vector<const FreeSpin*> untouched_;
-    std::vector<bool> held_;             // columns that D touches
+    UntouchedSpins untouched_;
     Vector guess_, force_, rate_;        // ṽ⁺, h f̃ there, C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_;  // ṽ⁺ and h f̃ of the last problem
     std::vector<double> last_a_, last_b_;

@@ -36,16 +36,23 @@ inline double dot(const double* x, const double* y, std::int32_t count) {
 
 }  // namespace
 
+double EnvelopeFactor::work(const std::vector<std::int32_t>& first) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+        const double length = static_cast<double>(i) - first[i] + 1.0;
+        sum += 0.5 * length * length;
+    }
+    return sum;
+}
+
 void EnvelopeFactor::analyze(std::vector<std::int32_t> first) {
     first_ = std::move(first);
     offset_.resize(first_.size());
     std::ptrdiff_t used = 0;
-    work_ = 0.0;
     for (std::size_t i = 0; i < first_.size(); ++i) {
         const auto length = static_cast<std::ptrdiff_t>(i) - first_[i] + 1;
         offset_[i] = used - first_[i];
         used += length;
-        work_ += 0.5 * static_cast<double>(length * length);
     }
     value_.resize(static_cast<std::size_t>(used));
 }

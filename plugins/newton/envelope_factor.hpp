@@ -16,8 +16,8 @@ public:
     /// first: of each row, its first column, at most the row itself.
     void analyze(std::vector<std::int32_t> first);
 
-    /// Multiplications of a factorisation, about.
-    [[nodiscard]] double work() const { return work_; }
+    /// Multiplications of a factorisation in such an envelope, about.
+    [[nodiscard]] static double work(const std::vector<std::int32_t>& first);
 
     /// Entry j of the returned pointer is that of column j; first ≤ j ≤ row.
     [[nodiscard]] double* row(std::int32_t row) { return value_.data() + offset_[static_cast<std::size_t>(row)]; }
@@ -36,7 +36,6 @@ private:
     std::vector<std::int32_t> first_;
     std::vector<std::ptrdiff_t> offset_;  // of column 0, which need not exist
     std::vector<double> value_;
-    double work_ = 0.0;
 };
 
 }  // namespace delassus::newton

@@ -28,7 +28,7 @@ const char* unfit_compliance(const sdk::ProblemView& problem);
 
 /// One friction block, or one row of another kind.
 struct Piece {
-    enum class State : std::uint8_t { Unknown, Lower, Upper, Zero, Inside, Sliding };
+    enum class State : std::uint8_t { Lower, Upper, Zero, Inside, Sliding };
 
     std::int32_t first, rows;
     bool friction;

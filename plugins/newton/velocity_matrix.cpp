@@ -53,12 +53,7 @@ void VelocityMatrix::analyze(const sdk::ProblemView& problem, const std::vector<
             auto& least = first[static_cast<std::size_t>(index_[clique.index + static_cast<std::size_t>(k)])];
             least = std::min(least, index_[clique.index]);
         }
-    double work = 0.0;
-    for (std::int32_t i = 0; i < n_; ++i) {
-        const double length = i - first[static_cast<std::size_t>(i)] + 1;
-        work += 0.5 * length * length;
-    }
-    by_envelope_ = work <= most_work;
+    by_envelope_ = EnvelopeFactor::work(first) <= most_work;
     if (by_envelope_) {
         envelope_.analyze(std::move(first));
     } else {

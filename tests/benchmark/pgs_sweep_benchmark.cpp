@@ -37,7 +37,7 @@ void time_sweeps(benchmark::State& state, delassus::Problem problem, const Way& 
     N.analyze(view);
     N.factorize(view);
     delassus::pgs::Model model;
-    model.build(view, N, true, false, way.ordering);
+    model.build(view, N, true, false, way.local == Local::Exact, way.ordering);
     model.set_right_hand_side(view, N);
     delassus::pgs::SweepState sweep;
     model.state_of(delassus::sdk::Vector::Zero(view.m), sweep);

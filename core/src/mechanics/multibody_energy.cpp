@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Energy and momentum of a state of a multibody system.
+#include "mechanics/multibody_implementation.hpp"
+
+namespace delassus {
+
+using mechanics::array;
+using mechanics::vector;
+using mechanics::Vector3d;
+
+double MultibodySystem::kinetic_energy(const State& state) const {
+    const auto& self = *implementation_;
+    double energy = 0.0;
+    for (const auto& body : self.bodies) {
+        if (body.column < 0) continue;
+        const Eigen::Map<const Vector3d> v(state.v.data() + body.column), omega(state.v.data() + body.column + 3);
+        energy += 0.5 * body.parameters.mass * v.squaredNorm() + 0.5 * omega.dot(body.inertia * omega);
+    }
+    for (const auto& node : self.nodes)
+        if (node.column >= 0)
+            energy +=
+                0.5 * node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column).squaredNorm();
+    return energy;
+}
+
+std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
+    const auto& self = *implementation_;
+    self.place(state);
+    Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
+    for (std::size_t k = 0; k < self.bodies.size(); ++k) {
+        if (self.bodies[k].column < 0) continue;
+        const auto& place = self.at[static_cast<BodyIndex>(k)];
+        const Vector3d p = self.bodies[k].parameters.mass * place.v;
+        linear += p;
+        angular += place.x.cross(p) + place.A * (self.bodies[k].inertia * place.omega);
+    }
+    for (const auto& node : self.nodes) {
+        if (node.column < 0) continue;
+        const Vector3d p = node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column);
+        linear += p;
+        angular += Eigen::Map<const Vector3d>(state.q.data() + node.position).cross(p);
+    }
+    return {array(linear), array(angular)};
+}
+
+double MultibodySystem::energy(const State& state) const {
+    const auto& self = *implementation_;
+    self.place(state);
+    const Vector3d gravity = self.load_factor * vector(self.gravity);
+    double energy = kinetic_energy(state);
+    for (std::size_t k = 0; k < self.bodies.size(); ++k)
+        if (self.bodies[k].column >= 0)
+            energy -= self.bodies[k].parameters.mass * gravity.dot(self.at[static_cast<BodyIndex>(k)].x);
+    for (const auto& node : self.nodes)
+        if (node.column >= 0)
+            energy -= node.parameters.mass * gravity.dot(Eigen::Map<const Vector3d>(state.q.data() + node.position));
+    self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
+    self.for_each_spring([&](const auto& spring) {
+        if (!spring.potential) return;
+        const double stretch = spring.row.value(self.at, state.t);
+        energy += 0.5 * spring.stiffness * stretch * stretch;
+    });
+    return energy;
+}
+
+}  // namespace delassus
