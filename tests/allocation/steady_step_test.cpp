@@ -58,6 +58,7 @@ long steady_allocations(MultibodySystem& system, const std::string& method, bool
     const Registry registry;
     SolverConfig config;
     config.name = DELASSUS_QUIET_PLUGIN;
+    config.law = Law::Associated;
     config.tolerance = 1e-8;
     StepSolver solver(registry, config);
     const auto stepper = make_timestepper(method, system);

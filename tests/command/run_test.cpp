@@ -284,12 +284,14 @@ TEST(Plan, SaysWhatIsLeftOutAndWhy) {
 
 TEST(Plan, SaysWhoComesLater) {
     const auto plan = Json::parse(run_command("plan --json " + scene("brick_wall")).out).at("systems")[0];
-    ASSERT_EQ(plan.at("solvers").size(), 1U) << plan;
+    ASSERT_FALSE(plan.at("solvers").empty()) << plan;
     const auto later = plan.at("later_solvers").get<std::set<std::string>>();
     EXPECT_FALSE(later.empty());
-    EXPECT_FALSE(later.contains(plan.at("solvers")[0].get<std::string>()));
     const auto run = mapped("run " + scene("brick_wall") + " --end 0.02");
-    EXPECT_TRUE(run.contains(plan.at("solvers")[0].get<std::string>() + ".so"));
+    for (const auto& solver : plan.at("solvers").get<std::vector<std::string>>()) {
+        EXPECT_FALSE(later.contains(solver));
+        EXPECT_TRUE(run.contains(solver + ".so"));
+    }
     for (const auto& name : later) EXPECT_FALSE(run.contains(name + ".so")) << name;
     // Whoever is named is alone.
     const auto named = Json::parse(run_command("plan --json " + scene("brick_wall") + " --solver pgs").out);

@@ -38,6 +38,7 @@ protected:
         SolverConfig chosen;
         chosen.name = name;
         chosen.tolerance = 1e-10;
+        chosen.law = Law::Associated;
         return chosen;
     }
     Registry registry;
@@ -136,7 +137,7 @@ TEST_F(StepSolverTest, ChoosesBySolversThatCan) {
     ASSERT_TRUE(solver.solve(generate_chain({}), solution, false));
     EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod"}));
     ASSERT_TRUE(solver.solve(generate_box_stack({}), solution, false));
-    EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod", "ipm"}));
+    EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod", "pgs", "ssn"}));
     StepSolver wrong(registry, config("cholmod"));
     EXPECT_THROW(wrong.solve(generate_box_stack({}), solution, false), Unsupported);
 }

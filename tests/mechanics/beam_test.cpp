@@ -197,13 +197,14 @@ TEST(Beam, IsTheElastica) {
     struct Case {
         double load, w, u;  // P L²/(E I)
     };
-    for (const auto& [load, w, u] : {Case{1.0, 0.30172, 0.05643}, Case{10.0, 0.81061, 0.55500}}) {
+    for (const Case& known : {Case{1.0, 0.30172, 0.05643}, Case{10.0, 0.81061, 0.55500}}) {
+        const double load = known.load;
         const auto error = [&](int elements) {
             auto beam = cantilever(elements);
             beam.section.area = 1e-2;  // hardly stretches
             Pose tip;
             rest_under(beam, {0.0, load * young * beam.section.inertia_z, 0.0}, {}, 4, tip);
-            return std::hypot(tip.position[1] - w, 1.0 - tip.position[0] - u);
+            return std::hypot(tip.position[1] - known.w, 1.0 - tip.position[0] - known.u);
         };
         const double coarse = error(6), fine = error(18);
         RecordProperty("load_" + std::to_string(static_cast<int>(load)),

@@ -88,7 +88,7 @@ Vector3d after_impact(const std::string& law, double slide, double phase, double
 }
 
 TEST(Defaults, RestitutionIsMetAtAnyPhaseOfTheStep) {
-    for (const char* law : {"", "coulomb"})
+    for (const char* law : {"", "associated"})
         for (const double phase : {0.0, 0.13, 0.35, 0.5, 0.6, 0.77, 0.99}) {
             SCOPED_TRACE(fmt::format("{} {}", law, phase));
             // Friction stops the sliding: 5/7 of the speed stays (a solid sphere, 2/5 m r²).
@@ -204,6 +204,36 @@ TEST(Defaults, AnInelasticImpactUnderCoulombsLawDoesNotBounce) {
     EXPECT_NEAR(v[2], 0.0, 1e-7);
     EXPECT_NEAR(v[0], 5.0 / 7.0, 1e-3);  // μ m u = 0.3 is more than the 2/7 that stops the sliding
     EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+}
+
+// A block thrown along the ground neither leaves it nor floats, as the associated law has it, and stops after v/(μ g).
+TEST(Defaults, ScenesObeyExactCoulomb) {
+    const std::string scene =
+        "step: 0.00137\nend: 0.5\nmaterials: {m: {friction: 0.37}}\nbodies:\n"
+        "- {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n"
+        "- {name: block, density: 1200, position: [0.1, 0.2, 0.05], velocity: [1.234567, -0.5, 0], "
+        "shapes: [{box: {size: [0.3, 0.2, 0.1]}, material: m}]}\n";
+    auto run = run_of(scene);
+    const double speed = std::hypot(1.234567, 0.5), deceleration = 0.37 * 9.81;
+    double highest = 0.0;
+    while (!run.simulation.finished()) {
+        run.simulation.step();
+        highest = std::max(highest, run.pose("block").position[2]);
+    }
+    EXPECT_NEAR(highest, 0.05, 1e-8);
+    const Vector3 at = run.pose("block").position;
+    EXPECT_NEAR(std::hypot(at[0] - 0.1, at[1] - 0.2), 0.5 * speed * speed / deceleration, speed * 0.00137);
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+    try {
+        run_of("solver: spg\n" + scene);
+        FAIL() << "spg knows the associated law only";
+    } catch (const Unsupported& refusal) {
+        EXPECT_NE(std::string(refusal.what()).find("write \"law: associated\" in \"solver\""), std::string::npos)
+            << refusal.what();
+    }
+    auto named = run_of("solver: {name: spg, law: associated}\n" + scene);
+    named.simulation.step();
+    EXPECT_GT(named.pose("block").position[2], 0.05 + 1e-5);
 }
 
 // ---- Chosen steps ----

@@ -191,7 +191,7 @@ TEST(ExampleScene, PileStaysInItsBoxAndComesToRest) {
         EXPECT_GT(at[2], 0.1 - 1e-4) << body.name;
         EXPECT_LT(length(run.velocities(body.name)[0]), 0.2) << body.name;
     }
-    EXPECT_LT(run.simulation.totals().worst_penetration, 1e-4);
+    EXPECT_LT(run.simulation.totals().worst_penetration, 2e-4);
     EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
 }
 

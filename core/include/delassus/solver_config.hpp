@@ -16,9 +16,10 @@
 namespace delassus {
 
 /// The friction law of scenes that name none.
-inline constexpr Law law_of_scenes = Law::Associated;
+inline constexpr Law law_of_scenes = Law::Coulomb;
 
-/// The chosen solver and its limits. An absent value keeps the default of SolveSettings, or the problem's own law.
+/// The chosen solver and its limits. An absent value keeps the default of SolveSettings. An
+/// absent law is the problem's own, in scenes law_of_scenes.
 struct SolverConfig {
     std::string name;     ///< a plugin's name, "auto", or the path of a shared library; empty if not given
     OptionTexts options;  ///< the plugin's, and "finish" and "finish_at" of the framework (docs/configuration.md)

@@ -77,7 +77,7 @@ public:
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
     DELASSUS_API bool solve(Problem&& problem, Solution& solution, bool warm_start);
 
-    /// The law of friction by which problems are solved.
+    /// The law of friction by which problems are solved, whatever theirs: the configured one, else law_of_scenes.
     [[nodiscard]] DELASSUS_API Law law() const;
 
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;

@@ -118,7 +118,7 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
 // long as bodies keep their neighbours, the k-th of the next, and what was prepared and analysed for it is used again.
 bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     auto& self = *implementation_;
-    if (self.config.law) problem.law = *self.config.law;
+    problem.law = law();
     if (on_problem) on_problem(problem);
     self.settings.cancelled = cancelled;
     self.method_error = method_error;
@@ -286,7 +286,7 @@ double StepSolver::Implementation::tolerance_for(const PreparedProblem& part,
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
     const auto part_of = [this](const Problem& part) {
         PreparedProblem prepared(part, implementation_->also_needs);
-        if (const auto law = implementation_->config.law) prepared.set_law(*law);
+        prepared.set_law(law());
         return Part{part.n(), part.m(), prepared.structure(), prepared.needs()};
     };
     if (!implementation_->leaves_out || problem.m() == 0 || !Islands::can_part(problem)) return {part_of(problem)};

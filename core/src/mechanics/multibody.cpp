@@ -32,7 +32,7 @@ Matrix3d tensor(const Inertia& J) {
 void check_inertia(const std::string& name, const Matrix3d& J) {
     refuse_unless(J.allFinite(), "the inertia of body", name, "is not finite");
     const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(J, Eigen::EigenvaluesOnly);
-    const Vector3d moments = solver.eigenvalues();
+    const Vector3d& moments = solver.eigenvalues();
     refuse_unless(moments[0] > 0.0, "the inertia of body", name, "is not positive definite");
     refuse_unless(
         moments[2] <= (moments[0] + moments[1]) * (1.0 + 1e-9), "the inertia of body", name,

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <utility>
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/simulation.hpp"
+#include "simulation/touching.hpp"
 #include "solver/auto_solver.hpp"
 
 namespace delassus {
@@ -30,65 +30,6 @@ std::string some_of(const std::vector<std::string>& names) {
     if (names.size() > most) text += fmt::format(" and {} more", names.size() - most);
     return text;
 }
-
-/// Which shapes can touch which: the pairs of materials, each with its friction, of two shapes of different bodies of
-/// which at least one moves and which are not kept apart.
-class Touching {
-public:
-    explicit Touching(const SceneSystem& system) : system_(system), apart_(system.apart.begin(), system.apart.end()) {
-        const auto& shapes = system.system->shapes();
-        shape_moves_ = std::any_of(shapes.begin(), shapes.end(), [&](const Shape& shape) { return moves(shape.body); });
-        // Shapes by material and body: equal ones behave equally.
-        std::map<std::int32_t, std::set<BodyIndex>> bodies;
-        for (std::size_t i = 0; i < shapes.size(); ++i) bodies[system.shape_material[i]].insert(shapes[i].body);
-        // Nodes do not touch one another: all of them are as one more body.
-        for (const auto material : system.node_contact_material) {
-            nodes_touch_ = shape_moves_ = true;
-            bodies[material].insert(static_cast<BodyIndex>(system.bodies.size()));
-        }
-        for (auto first = bodies.begin(); first != bodies.end(); ++first)
-            for (auto second = first; second != bodies.end(); ++second)
-                if (any_pair(first->second, second->second))
-                    pairs_.push_back({first->first, second->first, friction(first->first, second->first)});
-    }
-
-    struct Pair {
-        std::int32_t first, second;
-        double friction;
-    };
-    [[nodiscard]] const std::vector<Pair>& pairs() const { return pairs_; }
-    /// Whether the system makes a collision detector: see MultibodySystem::finish().
-    [[nodiscard]] bool detects() const {
-        return shape_moves_ && (nodes_touch_ || system_.system->shapes().size() >= 2);
-    }
-    [[nodiscard]] bool nodes_touch() const { return nodes_touch_; }
-
-private:
-    [[nodiscard]] bool moves(BodyIndex body) const {
-        const auto index = static_cast<std::size_t>(body);
-        return body != world_body &&
-               (index >= system_.bodies.size() || (!system_.bodies[index].fixed && !system_.bodies[index].motion));
-    }
-    [[nodiscard]] bool any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second) const {
-        for (const BodyIndex a : first)
-            for (const BodyIndex b : second)
-                if (a != b && (moves(a) || moves(b)) && !apart_.contains({std::min(a, b), std::max(a, b)})) return true;
-        return false;
-    }
-    [[nodiscard]] double friction(std::int32_t first, std::int32_t second) const {
-        double result = std::sqrt(system_.materials[static_cast<std::size_t>(first)].contact.friction *
-                                  system_.materials[static_cast<std::size_t>(second)].contact.friction);
-        for (const auto& pair : system_.material_pairs)
-            if (pair.first == std::min(first, second) && pair.second == std::max(first, second))
-                result = pair.contact.friction;
-        return result;
-    }
-
-    const SceneSystem& system_;
-    std::set<std::array<BodyIndex, 2>> apart_;
-    bool shape_moves_ = false, nodes_touch_ = false;
-    std::vector<Pair> pairs_;
-};
 
 /// The reason where a scene asks for it.
 constexpr const char* everything = "leave_out is false: as if the scene needed everything";
@@ -257,12 +198,11 @@ private:
             leave("collision detection",
                   system_.system->shapes().empty() ? "no body has a shape" : "no two shapes could ever meet");
         }
-        bool friction = false;
+        const bool friction = touching_.friction() || (!touching_.pairs().empty() && !system_.leave_out);
         for (const auto& pair : touching_.pairs()) {
             const auto& first = system_.materials[static_cast<std::size_t>(pair.first)].name;
             const auto& second = system_.materials[static_cast<std::size_t>(pair.second)].name;
             if (pair.friction > 0.0 || !system_.leave_out) {
-                friction = true;
                 keep(fmt::format("friction cones of 3 rows, {} on {}", first, second),
                      pair.friction > 0.0 ? fmt::format("friction {:.4g}", pair.friction) : everything);
             } else {

@@ -11,6 +11,7 @@
 #include "simulation/energy_guard.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
+#include "simulation/touching.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
 #include "support/frames.hpp"
@@ -60,6 +61,23 @@ void require_usable(const SolverEffort& effort) {
                                       effort.worst_miss));
 }
 
+/// Throws Unsupported if the solver that the scene names does not know the law of its friction: said here, as the first
+/// contact may come late.
+void require_law(const SceneSystem& system, const Registry& registry, Law law) {
+    const std::string& name = system.solver.name;
+    if (name.empty() || name == auto_name || !Touching(system).friction()) return;
+    const bool coulomb = law == Law::Coulomb;
+    const PluginInfo info = is_library_path(name) ? registry.load(name)->info() : solver_info(registry, name);
+    const std::uint64_t needs = DELASSUS_CAN_FRICTION | (coulomb ? DELASSUS_CAN_COULOMB : DELASSUS_CAN_ASSOCIATED);
+    const bool knows_other = info.missing(DELASSUS_CAN_FRICTION) == 0 && info.missing(needs) != 0;
+    if (!knows_other) return;
+    throw Unsupported(
+        fmt::format("{} does not know {}, which {}; write \"law: {}\" in \"solver\", or name auto or one of {}",
+                    info.name, coulomb ? "exact Coulomb friction" : "the associated law of friction",
+                    system.solver.law ? "the scene asks for" : "is the law of scenes that name none",
+                    coulomb ? "associated" : "coulomb", fmt::join(registry.capable(needs), ", ")));
+}
+
 std::string describe(const Assembly& change) {
     return fmt::format(
         "bodies were moved by up to {:.3g} m and {:.3g} rad, and their velocities changed by up to {:.3g} "
@@ -77,6 +95,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         SolverConfig solver = system.solver;
         if (solver.name.empty()) solver.name = auto_name;
         check_solver(registry, solver);
+        require_law(system, registry, solver_->law());
         assembly_ = system.system->assemble();
         make_method();
         if (system.sleeping) {

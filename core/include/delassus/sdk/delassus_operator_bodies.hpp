@@ -143,9 +143,11 @@ DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia_by_panels(const Problem
 // D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
 DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& problem) {
     inverse_.half_solve_rows(problem.D, whitened_);
-    const auto& [start, column, value] = whitened_;
+    const auto& start = whitened_.start;
+    const auto& value = whitened_.value;
     // Rows of one contact mostly have the same columns.
-    const auto product = [&, columns = column.data(), values = value.data()](std::int32_t row, std::int32_t other) {
+    const auto product = [&start, columns = whitened_.column.data(), values = value.data()](std::int32_t row,
+                                                                                            std::int32_t other) {
         auto i = start[static_cast<std::size_t>(row)], k = start[static_cast<std::size_t>(other)];
         const auto end = start[static_cast<std::size_t>(row) + 1], last = start[static_cast<std::size_t>(other) + 1];
         double sum = 0.0;
