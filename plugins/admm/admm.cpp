@@ -41,8 +41,8 @@ void Admm::factorize(const sdk::ProblemView& problem) {
 
 sdk::Outcome Admm::solve(const sdk::ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
                          sdk::MutableVectorView lambda) {
-    // A warm start keeps the penalty that the last solve ended with, a cold one is reproducible.
-    if (!request.warm_start()) resolvent_.set_penalty(initial_penalty_);
+    // Not the penalty that the last solve ended with: a run that goes on from a checkpoint has to take the same path.
+    resolvent_.set_penalty(initial_penalty_);
     const sdk::Vector r = scaling_.free_velocity(problem);
     law_.load(problem, scaling_.scale());
     resolvent_.load(problem, r);

@@ -19,7 +19,6 @@ void Anderson::reset(Eigen::Index size, int memory) {
     gram_.resize(memory, memory);
     f_.resize(size);
     F_.resize(size);
-    position_ = 0;
     clear();
 }
 

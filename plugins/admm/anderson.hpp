@@ -18,7 +18,7 @@ public:
     void reset(Eigen::Index size, int memory);
 
     /// Forgets all differences; the next point pushed starts anew.
-    void clear() { count_ = 0, has_point_ = false; }
+    void clear() { count_ = 0, position_ = 0, has_point_ = false; }
 
     /// Takes a point's f and F (y itself is F − f).
     void push(const sdk::Vector& f, const sdk::Vector& F);
