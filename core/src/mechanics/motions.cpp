@@ -190,10 +190,11 @@ Motion Motion::table(const std::vector<double>& times, const std::vector<double>
 Motion Motion::polynomial(const std::vector<double>& coefficients) {
     if (coefficients.empty() || !all_finite(coefficients))
         throw InputError("a polynomial needs one finite coefficient or more");
-    const auto value = coefficients, rate = derivative(value), acceleration = derivative(rate),
-               integral = antiderivative(value);
-    return {[=](double t) { return horner(value, t); }, [=](double t) { return horner(rate, t); },
-            [=](double t) { return horner(acceleration, t); }, [=](double t) { return horner(integral, t); }};
+    const auto rate = derivative(coefficients), acceleration = derivative(rate),
+               integral = antiderivative(coefficients);
+    return {[coefficients](double t) { return horner(coefficients, t); }, [rate](double t) { return horner(rate, t); },
+            [acceleration](double t) { return horner(acceleration, t); },
+            [integral](double t) { return horner(integral, t); }};
 }
 
 // With s from 0 to 1: 3 s² − 2 s³ has rate 0 at both ends, 10 s³ − 15 s⁴ + 6 s⁵ also the second derivative 0.
