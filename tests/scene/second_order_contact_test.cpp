@@ -31,7 +31,8 @@ protected:
         return read_scene(example_scene(name), overrides);
     }
 };
-INSTANTIATE_TEST_SUITE_P(Methods, SecondOrderContact, testing::Values("moreau_jean", "nonsmooth_generalized_alpha"),
+INSTANTIATE_TEST_SUITE_P(Methods, SecondOrderContact,
+                         testing::Values("moreau_jean", "nonsmooth_generalized_alpha", "linearly_implicit_trapezoidal"),
                          [](const auto& chosen) { return chosen.param; });
 
 TEST_P(SecondOrderContact, ABoxSticksOrSlidesOnAnIncline) {

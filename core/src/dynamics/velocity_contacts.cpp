@@ -40,6 +40,15 @@ namespace delassus {
 //
 // Gaps nearer to 0 than the resolution are 0.
 //
+// What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
+// (below), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ) u⁻ + θ u⁺), is
+//
+//     closed, or pushed in the step before:     b = (g + (1 − θ) h u⁻)/(2 θ h),      b ≥ −η
+//
+// with the recovery speed η. Then u⁻ = −g/(θ h) from the step before, and for θ = ½ the gap is gone in one step
+// (dynamics/theta_method.cpp has the same for constraints). u⁻ counts up to that size; more of it is a contact that
+// closes, and b = 0.
+//
 // ---- Friction ----
 //
 // The associated law on the level of velocities would lift a sliding contact at the speed μ |u_t| in each step. So
@@ -48,6 +57,12 @@ namespace delassus {
 // by μ δ: the iteration s ← μ |u_t⁺(s)| contracts by about μ² only, so each contact takes its secant.
 // Where contacts stick and slip in turns, the terms jump for ever. So late ones only fall: with less than μ |u_t| the
 // law lies between Coulomb's and the associated one, and the contact opens at the speed μ |u_t| − s in this step.
+//
+// `once` takes s of the guess alone, which is off by O(h²) while a contact slides: the contact opens or closes at that
+// speed, and the gap is g⁺ = ½ h (μ |u_t⁺| − s) = O(h³), since the row above takes back what the step before left. No
+// energy comes of it: the impulse does the work P·u⁺ = −P_n (s + b). Where the guess has turned round against u_t⁻, the
+// contact comes to rest in this step, and s = 0. A contact that bounces needs its s to leave at e u⁻ and not at some
+// other speed: this one iterates as above. One that lands without bouncing takes another step for it.
 
 namespace {
 
@@ -55,22 +70,21 @@ namespace {
 constexpr double largest_turn_squared = 0.25;
 /// The largest slope that the iteration of De Saxcé's terms is taken to have.
 constexpr double steepest = 0.5;
-/// What further iterations may move them by, as a share, unless the solver leaves more.
-constexpr double settled_share = 1e-6;
+/// What further iterations may move them by, as a share, unless the solver leaves more; and of an impact by `once`.
+constexpr double settled_share = 1e-6, settled_share_once = 1e-4;
 /// After so many iterations they only fall.
 constexpr int patience = 15;
 
 }  // namespace
 
-std::vector<double> diagonal_of(const SparseMatrix& H) {
-    std::vector<double> diagonal(static_cast<std::size_t>(H.rows), 1.0);
+void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal) {
+    diagonal.assign(static_cast<std::size_t>(H.rows), 1.0);
     for (std::size_t row = 0; row < diagonal.size(); ++row)
         for (auto e = H.row_start[row]; e < H.row_start[row + 1]; ++e) {
             const auto entry = static_cast<std::size_t>(e);
             if (static_cast<std::size_t>(H.column[entry]) == row && H.value[entry] > 0.0)
                 diagonal[row] = H.value[entry];
         }
-    return diagonal;
 }
 
 VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
@@ -87,6 +101,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     before_.measure_speeds_at(begin.v.data());
     rows_.measure_speeds_at(begin.v.data());
     system_.collect_unilateral(begin, h, before_);
+    begin_speeds_ = begin.v.data();
     std::size_t row = 0;
     for (std::size_t k = 0; k < before_.blocks().size(); ++k) {
         const auto& block = before_.blocks()[k];
@@ -137,15 +152,21 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
 
 void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const {
     const double gap = contact.gap - std::clamp(contact.gap, -gap_resolution_, gap_resolution_);
-    const double speed = -contact.approach;
+    const double speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
     contact.normal = 0.0;
-    if (block.restitution > 0.0 && speed < -settings_.restitution_speed) {
+    const bool corrects = settings_.once && contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap);
+    if (block.restitution > 0.0 && speed < -settings_.restitution_speed && !corrects) {
         const bool closes = gap + h_ * speed <= 0.0;
+        contact.bounces = closes && !contact.pushed;
         contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
-                                : std::max(gap + (1.0 - theta_) * h_ * speed, 0.0) / (theta_ * h_) - speed;
+                                : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
         if (closes) contact.turns = contact.turns && contact.pushed;
+    } else if (settings_.once && (gap <= 0.0 || contact.pushed)) {
+        const double wanted = gap + std::clamp(drift, -std::abs(gap), std::abs(gap));
+        contact.normal = std::max(wanted / (2.0 * theta_ * h_), -settings_.recovery_speed);
+        contact.recovery = std::max(-contact.normal, 0.0);
     } else if (gap > 0.0) {
-        contact.normal = std::max(gap + (1.0 - theta_) * h_ * speed, 0.0) / (theta_ * h_);
+        contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_);
     }
 }
 
@@ -177,6 +198,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         if (before && before_.blocks()[before->block].cone.rows != block.cone.rows) before = nullptr;
         if (before) {
             contact.before = before->row;
+            contact.known = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
             contact.turns =
@@ -193,18 +215,21 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     rows_.move_into(problem.D);
 }
 
-void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error) {
+void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
+                             double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
-    const double share = std::max(settled_share, 10.0 * natural_error);
+    const double share = std::max(settings_.once ? settled_share_once : settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
+        const std::size_t first = first_row_ + contact.row;
+        if (settings_.once && iteration > 0 && (!contact.bounces || !(solution.lambda[first] > 0.0))) continue;
         const auto size = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
-        double squares = 0.0;
+        double squares = 0.0, along = 0.0;  // of the sliding speed at the end; that times the one at the beginning
         for (std::size_t i = 0; i < size; ++i) {
-            const std::size_t row = first_row_ + contact.row + i;
+            const std::size_t row = first + i;
             double here = 0.0;
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
                 const auto entry = static_cast<std::size_t>(e);
@@ -216,29 +241,41 @@ void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, in
                 const std::size_t then = contact.before + i;
                 b += (1.0 - theta_) / theta_ * (here - before_.speed(then, guess.data()) + before_.rows()[then].rate);
             }
-            if (i > 0) squares += (here + b) * (here + b);
+            if (i == 0) continue;
+            squares += (here + b) * (here + b);
+            if (settings_.once && contact.known) along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
         }
-        double& b = problem.b[first_row_ + contact.row];
+        double& b = problem.b[first];
         b += contact.normal;
         if (contact.friction == 0.0) continue;
         const double wanted = contact.friction * std::sqrt(squares);
-        const double last = std::max(contact.sliding, 0.0), change = wanted - last;
-        const double enough = share * std::max({wanted, contact.friction * contact.approach, 1e-2 * largest});
-        double next = wanted;
-        if (iteration < patience) {
-            const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
-            next = std::max(0.0, last + change / (1.0 - std::clamp(slope, -steepest, steepest)));
-            settled_ = settled_ && std::abs(change) <= enough;
+        if (settings_.once && iteration == 0) {
+            contact.sliding = along < 0.0 ? 0.0 : wanted;
+            contact.moved = contact.sliding;
+            contact.wanted = contact.sliding;
         } else {
-            if (change > 0.0) next = last;
-            if (change < 0.0 && iteration >= 2 * patience) next = 0.0;
-            settled_ = settled_ && change >= -enough;
+            const double enough = share * std::max({wanted, contact.friction * contact.approach, 1e-2 * largest});
+            set_sliding_term(contact, wanted, enough, iteration);
         }
-        contact.moved = contact.sliding < 0.0 ? 0.0 : next - contact.sliding;
-        contact.wanted = wanted;
-        contact.sliding = next;
         b += contact.sliding;
     }
+}
+
+void VelocityContacts::set_sliding_term(Contact& contact, double wanted, double enough, int iteration) {
+    const double last = std::max(contact.sliding, 0.0), change = wanted - last;
+    double next = wanted;
+    if (iteration < patience) {
+        const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
+        next = std::max(0.0, last + change / (1.0 - std::clamp(slope, -steepest, steepest)));
+        settled_ = settled_ && std::abs(change) <= enough;
+    } else {
+        if (change > 0.0) next = last;
+        if (change < 0.0 && iteration >= 2 * patience) next = 0.0;
+        settled_ = settled_ && change >= -enough;
+    }
+    contact.moved = contact.sliding < 0.0 ? 0.0 : next - contact.sliding;
+    contact.wanted = wanted;
+    contact.sliding = next;
 }
 
 // An interior point leaves impulses above 0 where nothing pushes: they change the speed of their row by next to nothing
@@ -247,7 +284,7 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
     constexpr double share = 1e-6, share_of_momentum = 1e-9;
     double scale = 0.0;
     for (const double momentum : problem.a) scale = std::max(scale, std::abs(momentum));
-    const std::vector<double> diagonal = diagonal_of(problem.H);
+    diagonal_of(problem.H, diagonal_);
     const auto& D = problem.D;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
@@ -258,7 +295,7 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
             const double value = D.value[static_cast<std::size_t>(e)];
             const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
             speed += value * solution.x[column];
-            mobility += value * value / diagonal[column];
+            mobility += value * value / diagonal_[column];
         }
         const double opening = speed + problem.b[first] - std::max(contact.sliding, 0.0);
         double* impulse = solution.lambda.data() + first;
@@ -269,15 +306,13 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
     }
 }
 
-// A contact pushes steadily if it pushed in the step before and its impulse does not come from the speed with which it
-// closed: that is less than a quarter of the change that the impulse makes.
 void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,
                                           double* result) const {
     const auto& D = problem.D;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const std::size_t first = first_row_ + contact.row;
-        if (contact.along_normal && (!contact.pushed || contact.approach > 0.25 * contact.change)) continue;
+        if (contact.along_normal && !contact.steady()) continue;
         for (std::size_t row = first; row < first + static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++row)
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 result[D.column[static_cast<std::size_t>(e)]] += D.value[static_cast<std::size_t>(e)] * lambda[row];
@@ -293,6 +328,15 @@ void VelocityContacts::report_closing(const Contact& contact, StepReport& report
     if (root <= report.impact_speed) return;
     report.impact_speed = root;
     report.impact_time = std::min(2.0 * contact.gap / (root - begin), h_);
+}
+
+bool VelocityContacts::landed(const Solution& solution) const {
+    return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& contact) {
+        if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.steady())
+            return false;
+        const double gap = contact.gap + h_ * ((theta_ - 1.0) * contact.approach + theta_ * contact.end_speed);
+        return gap < std::min(contact.gap, 0.0) - gap_resolution_;
+    });
 }
 
 // A contact that closed is one that pushes and did not in the step before; it closes after g/|u⁻|, or with at least g/h
@@ -312,6 +356,8 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
             report_closing(contact, report);
             continue;
         }
+        report.recovered +=
+            lambda[first] * std::clamp(0.5 * (contact.end_speed - contact.approach), 0.0, contact.recovery);
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
         if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
             report.impact_speed = speed;

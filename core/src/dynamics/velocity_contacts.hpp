@@ -14,12 +14,15 @@
 namespace delassus {
 
 /// The diagonal of H; 1 where it is not positive.
-[[nodiscard]] DELASSUS_API std::vector<double> diagonal_of(const SparseMatrix& H);
+DELASSUS_API void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal);
 
 /// What a user may choose of contacts on the level of velocities.
 struct VelocityContactSettings {
     double recovery_speed = 0.01;    ///< with which penetration that a step finds is undone at most
     double restitution_speed = 0.0;  ///< contacts that close slower do not bounce
+    /// One problem a step: gaps are corrected by the speeds of their rows, and De Saxcé's terms are those of the guess,
+    /// but for contacts that bounce. Otherwise gaps are left to PositionProjection.
+    bool once = false;
 };
 
 /// The rows of the unilateral blocks in a step's problem [H −Dᵀ; D 0] for the velocities at its end, and their law:
@@ -41,13 +44,16 @@ public:
     /// problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
-    /// natural_error: of the solves so far.
-    void set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error);
+    /// solution: of the last iteration; natural_error: of the solves so far.
+    void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
+               double natural_error);
     /// Whether the last set_b() left De Saxcé's terms where they were.
     [[nodiscard]] bool settled() const { return settled_; }
 
     /// Takes impulses that a solver leaves where nothing pushes for none. solution: of the whole problem.
     void drop_negligible(const Problem& problem, Solution& solution);
+    /// Whether a contact that closed in this step is left overlapping by more than it was.
+    [[nodiscard]] bool landed(const Solution& solution) const;
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
@@ -72,6 +78,7 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
+        bool known = false;      ///< it is in before_
         bool turns = false;      ///< b has what its rows turn until the end of the step
         double gap = 0.0;        ///< at the beginning
         double approach = 0.0;   ///< speed with which it closes there
@@ -82,13 +89,20 @@ private:
         double wanted = 0.0;     ///< what it should have been before
         double end_speed = 0.0;  ///< of the normal row
         double change = 0.0;     ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        double recovery = 0.0;   ///< speed with which it is pushed apart
         bool pushed = false;     ///< in the step before
+        bool bounces = false;    ///< b has restitution
+
+        /// Its impulse does not come from the speed with which it closed: less than a quarter of the change is due to
+        /// that. Of a contact that pushes.
+        [[nodiscard]] bool steady() const { return pushed && approach <= 0.25 * change; }
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
+    void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;
     VelocityContactSettings settings_;
@@ -99,9 +113,10 @@ private:
     double deepest_ = 0.0;          // the least gap of before_, ≤ 0
     std::vector<Contact> contacts_;
     State middle_;
-    std::vector<double> delta_;
+    std::vector<double> delta_, diagonal_;
     KeptImpulses kept_;
-    std::size_t first_row_ = 0;  // in the problem
+    const double* begin_speeds_ = nullptr;  // of the step; until its end
+    std::size_t first_row_ = 0;             // in the problem
     bool coulomb_ = false, settled_ = true;
 };
 
