@@ -16,13 +16,11 @@ namespace delassus {
 // (Moreau 1988; Jean, CMAME 177, 1999; Acary and Brogliato 2008, ch. 10; for forces linear in q and v this is their
 // θ f⁺ + (1 − θ) f, so that θ = ½ is the trapezoidal rule as well as the midpoint rule). The matrix
 //
-//     H = M + θ h R + θ² h² (K + G),      H v⁺ − Dᵀ P = H ṽ⁺ + M(q̃_θ) (v − ṽ⁺) + h f̃_θ
+//     H = M + θ h R + θ² h² K,      H v⁺ − Dᵀ P = H ṽ⁺ + M(q̃_θ) (v − ṽ⁺) + h f̃_θ
 //
 // makes it a problem [H −Dᵀ; D 0] with the cones of contacts about a guess ṽ⁺. Its answer is off by (H − the true
 // derivative) (v⁺ − ṽ⁺) and by the square of (v⁺ − ṽ⁺). H is the symmetric part of the derivative, without the
-// gyroscopic part. G is the definite part of the stiffness −∂(C_qᵀ λ)/∂q of the reactions of the last step
-// (DynamicalSystem::add_definite_constraint_stiffness), which holds a light body across a heavy pull: without it the
-// direction of C_qᵀ P is explicit in v⁺, and unstable from h √(P l/J) ≈ 2 on.
+// gyroscopic part and without the turns of C_qᵀ P.
 //
 // Constraints hold on the level of velocities, C_q(q⁺) v⁺ + C_t = 0, contacts likewise (dynamics/velocity_contacts.cpp,
 // which says where D is taken). λ is P/h, the mean over the step: as a value at its end it is of order 1.
@@ -87,7 +85,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     require_step(system_, state, h, settings_.name);
     solver.method_error = {};
     find_spins(state, h);
-    if (settings_.linearly_implicit) extrapolate(h);
+    extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
     if (settings_.linearly_implicit) {
         solve_once(state, h, solver, report);
@@ -103,7 +101,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
     if (!settings_.linearly_implicit || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
-    if (settings_.linearly_implicit) remember_change(result_, h);
+    remember_change(result_, h);
     last_h_ = h;
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;
@@ -146,7 +144,7 @@ void ThetaMethod::find_spins(const State& begin, double h) {
     system_.free_spins(at_theta_, 0.0, theta_spins_);  // for the torques alone
 }
 
-// ---- The guess of the linearly implicit method ----
+// ---- The guess ----
 //
 // The accelerations of the last two steps, less what spins by itself, say how velocities change in this one. Of each
 // entry the one nearer to 0 is taken, or 0 where their signs differ. In a smooth motion either is off by O(h), and the
@@ -180,10 +178,6 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
         system_.add_damping(at_theta_, theta_ * h, Tangent::Symmetric, H_);
         system_.add_stiffness(at_theta_, theta_ * theta_ * h * h, Tangent::Symmetric, H_);
     }
-    G_.begin(n_, n_);
-    if (!multipliers_.empty())
-        system_.add_definite_constraint_stiffness(at_theta_, multipliers_.data(), theta_ * theta_ * h * h, G_);
-    H_.add_matrix(G_.finish());
     H_.finish_into(problem_.H);
     D_.begin(m_, n_);
     if (m_ > 0) system_.add_constraint_jacobian(at_theta_, 0, D_);
@@ -345,13 +339,12 @@ bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
     return false;
 }
 
-// The linear model of the last problem had h f = h f̃ − (H − M − θ² h² G) (v⁺ − ṽ⁺).
+// The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).
 void ThetaMethod::judge_linearization(const State& begin, double h, const Vector& result, StepReport& report) {
     move(begin, h, result, theta_, at_theta_);
     back_ = result - solved_from_;
     linear_ = solved_force_;
     problem_.H.multiply_add(-1.0, back_.data(), linear_.data());
-    G_.finish().multiply_add(1.0, back_.data(), linear_.data());
     system_.multiply_mass(at_theta_, 1.0, back_.data(), linear_.data());
     impulse_of_forces(h);
     const auto n = static_cast<std::size_t>(n_);

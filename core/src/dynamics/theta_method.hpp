@@ -68,7 +68,7 @@ private:
     std::vector<Cone> cones_;
     std::int32_t n_, m_;
     double last_h_ = 0.0;
-    MatrixAssembler H_, D_, G_;
+    MatrixAssembler H_, D_;
     Problem problem_;
     Solution solution_;
     State at_theta_, end_;

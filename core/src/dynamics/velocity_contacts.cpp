@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/velocity_contacts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -22,6 +24,18 @@ namespace delassus {
 // contact that closes gets its impulse in the configuration D̄ alone: then u⁺ = −e u⁻ with one D on both sides, and e ≤
 // 1 gains no energy. It does not count either where rows changed by more than a turn of a smooth motion explains: the
 // tangents of a contact may jump.
+//
+// Rates, those of bodies with a given motion, are means over the step that rows are collected for: at q over all of it,
+// at q̄ over the rest (1 − θ) h. So they belong to t + h/2 and t + (1 + θ) h/2, and the same formula gives the rate at
+// the end.
+//
+// ---- Servos with a limit ----
+//
+// A row with a compliance c is the law of a force τ = (−rate − u)/c between bounds, u being a speed (UnilateralRows).
+// The mean force of a step is the one at θ, so the row is that of a step of size θ h from its beginning, with the speed
+// u_θ = D̄ ((1 − θ) v + θ v⁺). With P = h τ,
+//
+//     D̄ v⁺ + ((1 − θ) D̄ v + rate)/θ + c/(θ h) P = 0
 //
 // ---- The law ----
 //
@@ -70,6 +84,8 @@ namespace {
 constexpr double largest_turn_squared = 0.25;
 /// The largest slope that the iteration of De Saxcé's terms is taken to have.
 constexpr double steepest = 0.5;
+/// Of a step, from the point where D is taken to its end, at least.
+constexpr double shortest_rest = 0.05;
 /// What further iterations may move them by, as a share, unless the solver leaves more; and of an impact by `once`.
 constexpr double settled_share = 1e-6, settled_share_once = 1e-4;
 /// After so many iterations they only fall.
@@ -84,6 +100,29 @@ void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal) {
             const auto entry = static_cast<std::size_t>(e);
             if (static_cast<std::size_t>(H.column[entry]) == row && H.value[entry] > 0.0)
                 diagonal[row] = H.value[entry];
+        }
+}
+
+void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blocks,
+                    std::span<const double> compliances) {
+    SparseMatrix& E = problem.E;
+    const bool any = std::any_of(compliances.begin(), compliances.end(), [](double value) { return value > 0.0; });
+    if (!any && E.rows == 0) return;
+    E.rows = E.columns = any ? problem.m() : 0;
+    E.row_start.assign(1, 0);
+    E.column.clear();
+    E.value.clear();
+    if (!any) return;
+    std::int32_t row = problem.m();
+    for (const auto& block : blocks) row -= block.cone.rows;
+    E.row_start.assign(static_cast<std::size_t>(row) + 1, 0);
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+        for (std::int32_t i = 0; i < blocks[k].cone.rows; ++i, ++row) {
+            if (compliances[k] > 0.0) {
+                E.column.push_back(row);
+                E.value.push_back(compliances[k]);
+            }
+            E.row_start.push_back(static_cast<std::int32_t>(E.value.size()));
         }
 }
 
@@ -103,23 +142,24 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     system_.collect_unilateral(begin, h, before_);
     begin_speeds_ = begin.v.data();
     std::size_t row = 0;
+    bool compliant = false;
     for (std::size_t k = 0; k < before_.blocks().size(); ++k) {
         const auto& block = before_.blocks()[k];
-        if (block.compliance > 0.0)
-            throw Unsupported(
-                "actuators with a limit need the timestepper euler_implicit_linearized; without a limit any takes "
-                "them");
+        compliant = compliant || block.compliance > 0.0;
         keys_.push_back({block.key, k, row});
         if (block.along_normal()) deepest_ = std::min(deepest_, before_.rows()[row].gap);
         row += static_cast<std::size_t>(block.cone.rows);
     }
     const auto by_key = [](const Before& a, const Before& b) { return a.key < b.key; };
     if (!std::is_sorted(keys_.begin(), keys_.end(), by_key)) std::sort(keys_.begin(), keys_.end(), by_key);
+    servos_.clear();
+    if (compliant) system_.collect_unilateral(begin, theta * h, servos_);
     middle_ = begin;
+    middle_.t += theta * h;
     delta_.resize(begin.v.size());
     for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = theta * h * begin.v[i];
     system_.increment(begin.q.data(), delta_.data(), middle_.q.data());
-    system_.collect_unilateral(middle_, h, rows_);
+    system_.collect_unilateral(middle_, std::max(1.0 - theta, shortest_rest) * h, rows_);
 }
 
 /// Null where there is none, or several: then nothing tells them apart.
@@ -129,6 +169,19 @@ const VelocityContacts::Before* VelocityContacts::find_before(std::uint64_t key)
     if (found == keys_.end() || found->key != key) return nullptr;
     if (found + 1 != keys_.end() && (found + 1)->key == key) return nullptr;
     return &*found;
+}
+
+/// Finds the row of a servo in servos_; its entry of E.
+double VelocityContacts::set_servo(std::uint64_t key, Contact& contact) const {
+    std::size_t row = 0;
+    for (const auto& block : servos_.blocks()) {
+        if (block.key == key) {
+            contact.servo = &servos_.rows()[row];
+            return block.compliance / (theta_ * h_);
+        }
+        row += static_cast<std::size_t>(block.cone.rows);
+    }
+    throw InputError("a system gave a row with a compliance within a step that it had not at its beginning");
 }
 
 /// Whether rows of rows_ are those of before_, but for a turn that a smooth motion explains.
@@ -175,6 +228,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     coulomb_ = coulomb;
     settled_ = true;
     contacts_.clear();
+    compliances_.clear();
     kept_.begin_walk();
     const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
     std::size_t row = 0;
@@ -208,11 +262,13 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.approach = -block.speed;
         }
         if (contact.along_normal) set_normal(block, contact, block.speed);
+        compliances_.push_back(block.compliance > 0.0 ? set_servo(block.key, contact) : 0.0);
         if (block.cone.kind == ConeKind::Friction && block.cone.parameters[0] > 0.0 && !coulomb)
             contact.friction = block.cone.parameters[0];
         row += size;
     }
     rows_.move_into(problem.D);
+    set_compliance(problem, rows_.blocks(), compliances_);
 }
 
 void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
@@ -237,7 +293,13 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
             }
             double& b = problem.b[row];
             b = rows_.rows()[contact.row + i].rate;
-            if (contact.turns) {
+            if (contact.servo) {
+                double speed = 0.0;
+                for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
+                    speed +=
+                        D.value[static_cast<std::size_t>(e)] * begin_speeds_[D.column[static_cast<std::size_t>(e)]];
+                b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
+            } else if (contact.turns) {
                 const std::size_t then = contact.before + i;
                 b += (1.0 - theta_) / theta_ * (here - before_.speed(then, guess.data()) + before_.rows()[then].rate);
             }
@@ -471,6 +533,21 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     }
     system_.increment(end.q.data(), delta_.data(), end.q.data());
     require_finite(begin, end, h, method);
+    require_nearer(begin, end, h, method);
+}
+
+// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is no more than ten
+// times the resolution may be rounding.
+void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
+    double off = 0.0, left = 0.0;
+    for (std::size_t i = 0; i < constraint_.size(); ++i) off = std::max(off, std::abs(constraint_[i]));
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) left = std::max(left, std::abs(C));
+    if (left <= 0.5 * off || left <= 10.0 * resolution_ + 1e-9) return;
+    throw StepFailure(fmt::format(
+        "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
+        "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",
+        method, begin.t, h, off, left));
 }
 
 // ---- Options ----

@@ -16,6 +16,11 @@ namespace delassus {
 /// The diagonal of H; 1 where it is not positive.
 DELASSUS_API void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal);
 
+/// E of a problem whose last rows are those of these blocks: diagonal, compliances[k] in each row of the k-th; absent
+/// where all are 0.
+DELASSUS_API void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blocks,
+                                 std::span<const double> compliances);
+
 /// What a user may choose of contacts on the level of velocities.
 struct VelocityContactSettings {
     double recovery_speed = 0.01;    ///< with which penetration that a step finds is undone at most
@@ -90,8 +95,9 @@ private:
         double end_speed = 0.0;  ///< of the normal row
         double change = 0.0;     ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
         double recovery = 0.0;   ///< speed with which it is pushed apart
-        bool pushed = false;     ///< in the step before
-        bool bounces = false;    ///< b has restitution
+        const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
+        bool pushed = false;                         ///< in the step before
+        bool bounces = false;                        ///< b has restitution
 
         /// Its impulse does not come from the speed with which it closed: less than a quarter of the change is due to
         /// that. Of a contact that pushes.
@@ -99,6 +105,7 @@ private:
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
+    [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
@@ -108,9 +115,11 @@ private:
     VelocityContactSettings settings_;
     double gap_resolution_;
     double h_ = 0.0, theta_ = 0.5;
-    UnilateralRows before_, rows_;  // at the beginning; at the point where D is taken
-    std::vector<Before> keys_;      // of before_, ascending
-    double deepest_ = 0.0;          // the least gap of before_, ≤ 0
+    UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken
+    UnilateralRows servos_;            // those of a step of size θ h, if there are any
+    std::vector<double> compliances_;  // entries of E; of each block
+    std::vector<Before> keys_;         // of before_, ascending
+    double deepest_ = 0.0;             // the least gap of before_, ≤ 0
     std::vector<Contact> contacts_;
     State middle_;
     std::vector<double> delta_, diagonal_;
@@ -127,12 +136,14 @@ public:
     explicit PositionProjection(DynamicalSystem& system);
 
     /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
-    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite.
+    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite or does not
+    /// bring the constraints nearer to 0.
     void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
                  StepSolver& solver, StepReport& report, std::string_view method);
 
 private:
     [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+    void require_nearer(const State& begin, const State& end, double h, std::string_view method);
 
     DynamicalSystem& system_;
     std::vector<std::int32_t> blocks_;
