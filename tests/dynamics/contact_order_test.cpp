@@ -382,6 +382,42 @@ TEST_P(SecondOrder, OfARodThatFallsOverAndSlides) {
     EXPECT_LT(measured.error, 1e-5);
 }
 
+TEST(LinearlyImplicit, TakesOneProblemAStepButForTheFirst) {
+    const auto problems = [](DynamicalSystem& system, double end, int steps) {
+        std::vector<int> solved;
+        advance(system, "linearly_implicit_trapezoidal", {}, end, steps,
+                [&](const State&, const StepReport& report) { solved.push_back(report.newton_iterations); });
+        return solved;
+    };
+    const auto expect_one = [](const std::vector<int>& solved, const char* what) {
+        EXPECT_EQ(solved[0], 2) << what;
+        EXPECT_EQ(std::count(solved.begin() + 1, solved.end(), 1), static_cast<long>(solved.size()) - 1) << what;
+    };
+    auto slides = sliding_block(0.7, 2.0);
+    expect_one(problems(slides, 0.9, 50), "sliding");
+    auto rocks = rocking_block(-0.3, -0.5);
+    expect_one(problems(rocks, 0.3, 50), "rocking");
+    SlidingRod rod;
+    expect_one(problems(rod, 0.4, 50), "rod");
+    // A ball that lands without bouncing overlaps the ground by what is left of the step: a second problem, once.
+    auto lands = ball(0.0, 0.0, 1.0);
+    const auto solved = problems(lands, 0.6, 100);
+    EXPECT_LE(std::count(solved.begin() + 1, solved.end(), 2), 1);
+    EXPECT_EQ(std::count_if(solved.begin(), solved.end(), [](int count) { return count > 2; }), 0);
+}
+
+// An oblique impact of a ball without spin: it leaves at e u⁻, and sliding loses μ (1 + e) u⁻.
+TEST_P(SecondOrder, AnObliqueImpactObeysBothLaws) {
+    for (const double friction : {0.1, 0.3}) {
+        PlanarBlock system(
+            {.inertia = 1e9, .gravity = {0.0, 0.0}, .friction = friction, .restitution = 0.8, .corners = {{0.0, 0.0}}},
+            {0.0, {0.0, 0.055, 0.0}, {2.0, -1.0, 0.0}});
+        const State state = advance(system, GetParam(), {}, 0.1, 10);
+        EXPECT_NEAR(state.v[1], 0.8, 1e-3) << friction;
+        EXPECT_NEAR(state.v[0], 2.0 - friction * 1.8, 1e-3) << friction;
+    }
+}
+
 /// Error and number of steps where the steps follow from a tolerance.
 struct Chosen {
     State state;

@@ -41,6 +41,7 @@ struct KeptPart {
 /// pattern again.
 struct KeptKind {
     std::string name;
+    Problem given;                // a copy of what solve() must not change
     std::deque<KeptPart> parts;   // by the number of the part
     std::vector<Solver> solvers;  // instances by the number of the part
 };
@@ -95,7 +96,6 @@ struct StepSolver::Implementation {
     Solution before;                 // the start of the part that is solved
     std::set<std::string> loaded;
     Islands islands;
-    Problem given;  // a copy of what solve() must not change
     Solution start;
     std::span<const double> method_error;
     SolverEffort effort;
@@ -123,8 +123,9 @@ void StepSolver::leave_nothing_out() {
 }
 
 bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
-    implementation_->given = problem;
-    return solve(std::move(implementation_->given), solution, warm_start);
+    Problem& given = implementation_->kind(problem.name).given;
+    given = problem;
+    return solve(std::move(given), solution, warm_start);
 }
 
 // The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as

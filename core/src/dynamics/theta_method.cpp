@@ -85,7 +85,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     require_step(system_, state, h, settings_.name);
     solver.method_error = {};
     find_spins(state, h);
-    extrapolate(h);
+    if (settings_.linearly_implicit) extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
     if (settings_.linearly_implicit) {
         solve_once(state, h, solver, report);
@@ -101,7 +101,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
     if (!settings_.linearly_implicit || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
-    remember_change(result_, h);
+    if (settings_.linearly_implicit) remember_change(result_, h);
     last_h_ = h;
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;
@@ -144,7 +144,7 @@ void ThetaMethod::find_spins(const State& begin, double h) {
     system_.free_spins(at_theta_, 0.0, theta_spins_);  // for the torques alone
 }
 
-// ---- The guess ----
+// ---- The guess of the linearly implicit method ----
 //
 // The accelerations of the last two steps, less what spins by itself, say how velocities change in this one. Of each
 // entry the one nearer to 0 is taken, or 0 where their signs differ. In a smooth motion either is off by O(h), and the
@@ -183,7 +183,7 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     if (m_ > 0) system_.add_constraint_jacobian(at_theta_, 0, D_);
     D_.finish_into(problem_.D);
     problem_.b.assign(static_cast<std::size_t>(m_), 0.0);
-    problem_.cones.resize(cones_.size());
+    if (problem_.cones.size() < cones_.size()) problem_.cones.resize(cones_.size());
     for (std::size_t k = 0; k < cones_.size(); ++k) copy_cone(cones_[k], problem_.cones[k]);
     solution_.lambda.assign(static_cast<std::size_t>(m_), 0.0);
     for (std::size_t i = 0; i < multipliers_.size(); ++i) solution_.lambda[i] = last_h_ * multipliers_[i];

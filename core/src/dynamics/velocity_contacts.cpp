@@ -127,7 +127,10 @@ void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blo
 }
 
 VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
-    : system_(system), settings_(settings), gap_resolution_(system.gap_resolution()) {}
+    : system_(system),
+      settings_(settings),
+      gap_resolution_(system.gap_resolution()),
+      bilateral_cones_(system.constraint_blocks().size()) {}
 
 void VelocityContacts::collect(const State& begin, double h, double theta) {
     h_ = h;
@@ -232,7 +235,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     kept_.begin_walk();
     const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
     std::size_t row = 0;
-    std::size_t cone = problem.cones.size();
+    std::size_t cone = bilateral_cones_;
     problem.cones.resize(cone + rows_.blocks().size());
     problem.b.resize(first_row_ + rows_.rows().size(), 0.0);
     lambda.resize(problem.b.size(), 0.0);
@@ -301,7 +304,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                 b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
             } else if (contact.turns) {
                 const std::size_t then = contact.before + i;
-                b += (1.0 - theta_) / theta_ * (here - before_.speed(then, guess.data()) + before_.rows()[then].rate);
+                b += (1.0 - theta_) / theta_ * (here + b - before_.speed(then, guess.data()));
             }
             if (i == 0) continue;
             squares += (here + b) * (here + b);

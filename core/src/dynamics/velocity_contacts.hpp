@@ -44,9 +44,9 @@ public:
     /// Whether there are any.
     [[nodiscard]] bool any() const { return !rows_.blocks().empty(); }
 
-    /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows, and to lambda the impulses of
-    /// the last step as a start. coulomb: the solver knows Coulomb's law, else De Saxcé's term stands in b. The rows of
-    /// problem.D are used again until the next collect().
+    /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows (cones beyond theirs are those of
+    /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
+    /// law, else De Saxcé's term stands in b. The rows of problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// solution: of the last iteration; natural_error: of the solves so far.
@@ -114,6 +114,7 @@ private:
     DynamicalSystem& system_;
     VelocityContactSettings settings_;
     double gap_resolution_;
+    std::size_t bilateral_cones_;
     double h_ = 0.0, theta_ = 0.5;
     UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken
     UnilateralRows servos_;            // those of a step of size θ h, if there are any
