@@ -339,6 +339,7 @@ private:
         for (std::int32_t i = 0; i < m_; ++i) lambda[i] = multipliers_.empty() ? 0.0 : last_h_ * multipliers_[i];
         first_row_.clear();
         approaches_.clear();
+        compliances_.clear();
         penetrating_.clear();
         penetrating_column_.clear();
         penetrating_value_.clear();
@@ -366,32 +367,12 @@ private:
                 if (const double gap = rows_.rows()[row].gap; gap < 0.0)
                     keep_penetrating(k, row, std::min(-gap / h, recovery_speed_));
             }
+            compliances_.push_back(block.compliance / h);
             first_row_.push_back(row);
             approaches_.push_back({std::max(rows_.rows()[row].gap, 0.0), -block.speed, block.along_normal(), pushed});
             row += block.cone.rows;
         }
-        assemble_compliance(h);
-    }
-
-    // E is absent where no row is compliant.
-    void assemble_compliance(double h) {
-        SparseMatrix& E = problem_.E;
-        const auto blocks = rows_.blocks();
-        const bool any = std::any_of(blocks.begin(), blocks.end(), [](const auto& b) { return b.compliance > 0.0; });
-        if (!any && E.rows == 0) return;
-        E.rows = E.columns = any ? static_cast<std::int32_t>(problem_.b.size()) : 0;
-        E.row_start.assign(any ? static_cast<std::size_t>(m_) + 1 : 1, 0);
-        E.column.clear();
-        E.value.clear();
-        if (!any) return;
-        for (const auto& block : blocks)
-            for (std::int32_t i = 0; i < block.cone.rows; ++i) {
-                if (block.compliance > 0.0) {
-                    E.column.push_back(static_cast<std::int32_t>(E.row_start.size()) - 1);
-                    E.value.push_back(block.compliance / h);
-                }
-                E.row_start.push_back(static_cast<std::int32_t>(E.value.size()));
-            }
+        set_compliance(problem_, rows_.blocks(), compliances_);
     }
 
     /// Restitution and De Saxcé's term in the first b of a contact, whose first row of D_A is `row`.
@@ -481,6 +462,7 @@ private:
     bool follows_sliding_ = false;         // De Saxcé's term in all contacts
     std::vector<std::int32_t> first_row_;  // of the blocks of rows_, in their order
     std::vector<Approach> approaches_;     // likewise
+    std::vector<double> compliances_;      // likewise, entries of E
     std::vector<Sliding> sliding_;
     std::vector<FreeSpin> spins_, end_spins_;
     UntouchedSpins untouched_;

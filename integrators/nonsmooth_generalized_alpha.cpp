@@ -142,7 +142,7 @@ private:
         const bool before = report.solved;
         const int least = contacts_.any() ? 2 : 1;
         for (int iteration = 0;; ++iteration) {
-            contacts_.set_b(problem_, solution_.x, iteration, solver.effort().worst_natural);
+            contacts_.set_b(problem_, solution_, solution_.x, iteration, solver.effort().worst_natural);
             if (iteration >= least && contacts_.settled()) break;
             if (iteration == most_iterations) {
                 report.solved = false;

@@ -98,13 +98,19 @@ void add_chain(MultibodySystem& system, int links) {
     }
 }
 
-TEST(SteadySteps, OfJointedBodiesAllocateNothing) {
+/// Methods whose steady steps allocate nothing.
+class SteadySteps : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Methods, SteadySteps,
+                         testing::Values("euler_implicit_linearized", "moreau_jean", "linearly_implicit_trapezoidal"),
+                         [](const auto& chosen) { return std::string(chosen.param); });
+
+TEST_P(SteadySteps, OfJointedBodiesAllocateNothing) {
     MultibodySystem system;
     add_chain(system, 3);
-    EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", false), 0);
+    EXPECT_EQ(steady_allocations(system, GetParam(), false), 0);
 }
 
-TEST(SteadySteps, OfServosAndDryJointsOnAKinematicBodyAllocateNothing) {
+TEST_P(SteadySteps, OfServosAndDryJointsOnAKinematicBodyAllocateNothing) {
     MultibodySystem system;
     BodyParameters base;
     base.name = "base";
@@ -127,20 +133,20 @@ TEST(SteadySteps, OfServosAndDryJointsOnAKinematicBodyAllocateNothing) {
     servo.kd = 5.0;
     servo.force_limit = 20.0;
     system.add_actuator(servo);
-    EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", false), 0);
+    EXPECT_EQ(steady_allocations(system, GetParam(), false), 0);
 }
 
-TEST(SteadySteps, OfFreeBodiesAllocateNothing) {
+TEST_P(SteadySteps, OfFreeBodiesAllocateNothing) {
     MultibodySystem system;
     BodyParameters stone;
     stone.name = "stone";
     stone.inertia = {1.0, 2.0, 2.5, 0.0, 0.0, 0.0};
     stone.angular_velocity = {1.0, 2.0, 3.0};
     system.add_body(stone);
-    EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", false), 0);
+    EXPECT_EQ(steady_allocations(system, GetParam(), false), 0);
 }
 
-TEST(SteadySteps, OfRestingBodiesAllocateNothingInTheSolversPart) {
+TEST_P(SteadySteps, OfRestingBodiesAllocateNothingInTheSolversPart) {
 #ifndef DELASSUS_HAS_FCL
     GTEST_SKIP() << "this build has no collision";
 #endif
@@ -161,12 +167,12 @@ TEST(SteadySteps, OfRestingBodiesAllocateNothingInTheSolversPart) {
         system.add_shape(sphere, stone);
     }
     system.set_envelope(0.05);
-    EXPECT_EQ(steady_allocations(system, "euler_implicit_linearized", true), 0);
+    EXPECT_EQ(steady_allocations(system, GetParam(), true), 0);
     EXPECT_EQ(contacts, 2U);
 }
 
 // The count works: an allocation is seen.
-TEST(SteadySteps, TheCountSeesAnAllocation) {
+TEST(Counting, TheCountSeesAnAllocation) {
     allocations = 0;
     counting = true;
     std::vector<double> one(100);
@@ -176,7 +182,7 @@ TEST(SteadySteps, TheCountSeesAnAllocation) {
 }
 
 #else
-TEST(SteadySteps, AreCountedWithoutSanitizersOnly) {
+TEST(Counting, IsDoneWithoutSanitizersOnly) {
     GTEST_SKIP() << "the address sanitizer has a malloc of its own";
 }
 #endif

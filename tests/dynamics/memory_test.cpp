@@ -93,7 +93,8 @@ INSTANTIATE_TEST_SUITE_P(Methods, Memory,
                                          Method{"newmark", {}}, Method{"hht", {}}, Method{"generalized_alpha", {}},
                                          Method{"generalized_alpha", {{"reuse", "adaptive"}}},
                                          Method{"generalized_alpha", {{"reuse", "modified"}}},
-                                         Method{"moreau_jean", {}}, Method{"nonsmooth_generalized_alpha", {}}),
+                                         Method{"moreau_jean", {}}, Method{"nonsmooth_generalized_alpha", {}},
+                                         Method{"linearly_implicit_trapezoidal", {}}),
                          [](const auto& chosen) { return testing::PrintToString(chosen.param); });
 
 TEST(MemoryErrors, AMemoryThatDoesNotFitIsRefused) {
@@ -124,7 +125,8 @@ TEST(Refusals, ExplicitMethodsTakeNoConstraints) {
     PlanarPendulum pendulum;
     const std::string others =
         " takes no constraints; the system has 1 rows of them. Can: euler_implicit, euler_implicit_linearized, "
-        "generalized_alpha, hht, moreau_jean, newmark, nonsmooth_generalized_alpha, trapezoidal, "
+        "generalized_alpha, hht, linearly_implicit_trapezoidal, moreau_jean, newmark, nonsmooth_generalized_alpha, "
+        "trapezoidal, "
         "trapezoidal_linearized";
     expect_refusal("rk4", pendulum, {}, "rk4" + others);
     expect_refusal("euler_explicit", pendulum, {}, "euler_explicit" + others);
@@ -140,7 +142,7 @@ TEST(Refusals, OthersTakeNoContacts) {
             info.name, system, {},
             info.name +
                 " takes no contacts, stops, dry friction of joints or force limits, which the system has. Can: "
-                "euler_implicit_linearized, moreau_jean, nonsmooth_generalized_alpha");
+                "euler_implicit_linearized, linearly_implicit_trapezoidal, moreau_jean, nonsmooth_generalized_alpha");
     }
 }
 

@@ -83,15 +83,18 @@ std::vector<Case> cases() {
         {"generalized_alpha", {{"rho_infinity", "1"}}, 2, Multipliers::Oscillate},
         {"moreau_jean", {}, 2, Multipliers::Mean},
         {"moreau_jean", {{"theta", "0.6"}}, 1},
-        {"nonsmooth_generalized_alpha", {}, 2}};
+        {"nonsmooth_generalized_alpha", {}, 2},
+        {"linearly_implicit_trapezoidal", {{"linearization_limit", "inf"}}, 2, Multipliers::Mean}};
     std::vector<Case> result;
     const auto add = [&](const Method& method, const std::string& system, bool constrained) {
         auto options = method.options;
         const bool newton = method.order != 4 && method.name != "euler_explicit" &&
-                            method.name != "euler_implicit_linearized" && method.name != "trapezoidal_linearized";
+                            method.name != "euler_implicit_linearized" && method.name != "trapezoidal_linearized" &&
+                            method.name != "linearly_implicit_trapezoidal";
         if (newton) options["newton_tolerance"] = "1e-12";
         const auto multipliers = constrained ? method.multipliers : Multipliers::None;
-        const bool late = method.name == "moreau_jean" && constrained;  // its asymptotic range
+        const bool late = (method.name == "moreau_jean" && constrained) ||
+                          method.name == "linearly_implicit_trapezoidal";  // their asymptotic range
         const int factor = method.order == 1 ? (constrained ? 2 : 4) : late ? 4 : 1;
         result.push_back({method.name, options, method.order, system, multipliers, factor});
     };

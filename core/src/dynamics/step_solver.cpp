@@ -37,6 +37,15 @@ struct KeptPart {
     Solution solution;
 };
 
+/// What is kept of the problems of one name: a method that solves several kinds of problems in a step finds its own
+/// pattern again.
+struct KeptKind {
+    std::string name;
+    Problem given;                // a copy of what solve() must not change
+    std::deque<KeptPart> parts;   // by the number of the part
+    std::vector<Solver> solvers;  // instances by the number of the part
+};
+
 struct StepSolver::Implementation {
     Implementation(const Registry& known, SolverConfig chosen)
         : registry(known), config(std::move(chosen)), settings(config.settings()) {
@@ -44,14 +53,20 @@ struct StepSolver::Implementation {
         if (config.name == auto_name) config.options.try_emplace("simulation", "true");
     }
 
-    Solver& solver(std::size_t instance) {
-        while (solvers.size() <= instance) solvers.push_back(make_solver(registry, config));
-        return solvers[instance];
+    KeptKind& kind(const std::string& name) {
+        for (KeptKind& known : kinds)
+            if (known.name == name) return known;
+        kinds.emplace_back().name = name;
+        return kinds.back();
+    }
+    Solver& solver(KeptKind& kind, std::size_t instance) {
+        while (kind.solvers.size() <= instance) kind.solvers.push_back(make_solver(registry, config));
+        return kind.solvers[instance];
     }
 
     /// Takes the arrays of the problem and leaves others.
     /// columns: of the part in the whole problem.
-    bool solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number,
+    bool solve_part(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start, std::size_t number,
                     std::span<const std::int32_t> columns);
     /// Of a part, where the method makes this error: see docs/tolerance.md.
     [[nodiscard]] double tolerance_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
@@ -76,13 +91,11 @@ struct StepSolver::Implementation {
     std::uint64_t also_needs = 0;  ///< of every problem, where nothing is left out
     SolverConfig config;
     SolveSettings settings;
-    std::vector<Solver> solvers;     // instances by the number of the part
+    std::deque<KeptKind> kinds;      // few
     std::optional<Solver> fallback;  // `auto`, where the configured solver is another
     Solution before;                 // the start of the part that is solved
     std::set<std::string> loaded;
     Islands islands;
-    std::deque<KeptPart> parts;  // by the number of the part
-    Problem given;               // a copy of what solve() must not change
     Solution start;
     std::span<const double> method_error;
     SolverEffort effort;
@@ -110,8 +123,9 @@ void StepSolver::leave_nothing_out() {
 }
 
 bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_start) {
-    implementation_->given = problem;
-    return solve(std::move(implementation_->given), solution, warm_start);
+    Problem& given = implementation_->kind(problem.name).given;
+    given = problem;
+    return solve(std::move(given), solution, warm_start);
 }
 
 // The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as
@@ -124,14 +138,15 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     self.method_error = method_error;
     ++self.effort.solves;
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
+    KeptKind& kind = self.kind(problem.name);
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
     if (!self.leaves_out || m == 0 || !Islands::can_part(problem))
-        return self.solve_part(problem, solution, warm_start, 0, {});
+        return self.solve_part(kind, problem, solution, warm_start, 0, {});
 
     self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
     if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
-        return self.solve_part(problem, solution, warm_start, 0, {});
+        return self.solve_part(kind, problem, solution, warm_start, 0, {});
     if (!warm_start) {
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
@@ -140,8 +155,8 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     std::fill(solution.lambda.begin(), solution.lambda.end(), 0.0);  // of rows that belong to no part
     bool solved = true;
     for (std::size_t number = 0; number < list.size(); ++number) {
-        if (number == self.parts.size()) self.parts.emplace_back();
-        KeptPart& part = self.parts[number];
+        if (number == kind.parts.size()) kind.parts.emplace_back();
+        KeptPart& part = kind.parts[number];
         self.islands.take(list[number], self.start, part.solution);
         const std::uint64_t identity = resting && !list[number].cones.empty() ? self.islands.identity(list[number]) : 0;
         if (identity != 0 && resting->rests(list[number].columns, identity)) {
@@ -149,7 +164,8 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
             ++self.effort.resting_parts;
         } else {
             self.islands.part(list[number], part.data);
-            solved = self.solve_part(part.data, part.solution, warm_start, number, list[number].columns) && solved;
+            solved =
+                self.solve_part(kind, part.data, part.solution, warm_start, number, list[number].columns) && solved;
             if (identity != 0) resting->solved(list[number].columns, identity, part.solution.x);
         }
         self.islands.put(list[number], part.solution, solution);
@@ -157,10 +173,10 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     return solved;
 }
 
-bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution, bool warm_start, std::size_t number,
-                                            std::span<const std::int32_t> columns) {
-    if (number == parts.size()) parts.emplace_back();
-    auto& kept = parts[number].prepared;
+bool StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start,
+                                            std::size_t number, std::span<const std::int32_t> columns) {
+    if (number == kind.parts.size()) kind.parts.emplace_back();
+    auto& kept = kind.parts[number].prepared;
     if (!kept) {
         kept.emplace(std::move(problem), also_needs);
         problem = {};
@@ -181,7 +197,7 @@ bool StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
         solution.lambda.clear();
         return true;
     }
-    Solver& solver = this->solver(number % most_instances);
+    Solver& solver = this->solver(kind, number % most_instances);
     SolveSettings part_settings = settings;
     part_settings.tolerance = tolerance_for(prepared, columns);
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;

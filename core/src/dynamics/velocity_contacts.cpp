@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/velocity_contacts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -23,6 +25,18 @@ namespace delassus {
 // 1 gains no energy. It does not count either where rows changed by more than a turn of a smooth motion explains: the
 // tangents of a contact may jump.
 //
+// Rates, those of bodies with a given motion, are means over the step that rows are collected for: at q over all of it,
+// at q̄ over the rest (1 − θ) h. So they belong to t + h/2 and t + (1 + θ) h/2, and the same formula gives the rate at
+// the end.
+//
+// ---- Servos with a limit ----
+//
+// A row with a compliance c is the law of a force τ = (−rate − u)/c between bounds, u being a speed (UnilateralRows).
+// The mean force of a step is the one at θ, so the row is that of a step of size θ h from its beginning, with the speed
+// u_θ = D̄ ((1 − θ) v + θ v⁺). With P = h τ,
+//
+//     D̄ v⁺ + ((1 − θ) D̄ v + rate)/θ + c/(θ h) P = 0
+//
 // ---- The law ----
 //
 // With the gap g and the speed u⁻ at the beginning of the step, b of a normal row is (Moreau 1988; Jean 1999; Acary and
@@ -40,6 +54,15 @@ namespace delassus {
 //
 // Gaps nearer to 0 than the resolution are 0.
 //
+// What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
+// (below), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ) u⁻ + θ u⁺), is
+//
+//     closed, or pushed in the step before:     b = (g + (1 − θ) h u⁻)/(2 θ h),      b ≥ −η
+//
+// with the recovery speed η. Then u⁻ = −g/(θ h) from the step before, and for θ = ½ the gap is gone in one step
+// (dynamics/theta_method.cpp has the same for constraints). u⁻ counts up to that size; more of it is a contact that
+// closes, and b = 0.
+//
 // ---- Friction ----
 //
 // The associated law on the level of velocities would lift a sliding contact at the speed μ |u_t| in each step. So
@@ -48,6 +71,12 @@ namespace delassus {
 // by μ δ: the iteration s ← μ |u_t⁺(s)| contracts by about μ² only, so each contact takes its secant.
 // Where contacts stick and slip in turns, the terms jump for ever. So late ones only fall: with less than μ |u_t| the
 // law lies between Coulomb's and the associated one, and the contact opens at the speed μ |u_t| − s in this step.
+//
+// `once` takes s of the guess alone, which is off by O(h²) while a contact slides: the contact opens or closes at that
+// speed, and the gap is g⁺ = ½ h (μ |u_t⁺| − s) = O(h³), since the row above takes back what the step before left. No
+// energy comes of it: the impulse does the work P·u⁺ = −P_n (s + b). Where the guess has turned round against u_t⁻, the
+// contact comes to rest in this step, and s = 0. A contact that bounces needs its s to leave at e u⁻ and not at some
+// other speed: this one iterates as above. One that lands without bouncing takes another step for it.
 
 namespace {
 
@@ -55,26 +84,53 @@ namespace {
 constexpr double largest_turn_squared = 0.25;
 /// The largest slope that the iteration of De Saxcé's terms is taken to have.
 constexpr double steepest = 0.5;
-/// What further iterations may move them by, as a share, unless the solver leaves more.
-constexpr double settled_share = 1e-6;
+/// Of a step, from the point where D is taken to its end, at least.
+constexpr double shortest_rest = 0.05;
+/// What further iterations may move them by, as a share, unless the solver leaves more; and of an impact by `once`.
+constexpr double settled_share = 1e-6, settled_share_once = 1e-4;
 /// After so many iterations they only fall.
 constexpr int patience = 15;
 
 }  // namespace
 
-std::vector<double> diagonal_of(const SparseMatrix& H) {
-    std::vector<double> diagonal(static_cast<std::size_t>(H.rows), 1.0);
+void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal) {
+    diagonal.assign(static_cast<std::size_t>(H.rows), 1.0);
     for (std::size_t row = 0; row < diagonal.size(); ++row)
         for (auto e = H.row_start[row]; e < H.row_start[row + 1]; ++e) {
             const auto entry = static_cast<std::size_t>(e);
             if (static_cast<std::size_t>(H.column[entry]) == row && H.value[entry] > 0.0)
                 diagonal[row] = H.value[entry];
         }
-    return diagonal;
+}
+
+void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blocks,
+                    std::span<const double> compliances) {
+    SparseMatrix& E = problem.E;
+    const bool any = std::any_of(compliances.begin(), compliances.end(), [](double value) { return value > 0.0; });
+    if (!any && E.rows == 0) return;
+    E.rows = E.columns = any ? problem.m() : 0;
+    E.row_start.assign(1, 0);
+    E.column.clear();
+    E.value.clear();
+    if (!any) return;
+    std::int32_t row = problem.m();
+    for (const auto& block : blocks) row -= block.cone.rows;
+    E.row_start.assign(static_cast<std::size_t>(row) + 1, 0);
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+        for (std::int32_t i = 0; i < blocks[k].cone.rows; ++i, ++row) {
+            if (compliances[k] > 0.0) {
+                E.column.push_back(row);
+                E.value.push_back(compliances[k]);
+            }
+            E.row_start.push_back(static_cast<std::int32_t>(E.value.size()));
+        }
 }
 
 VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
-    : system_(system), settings_(settings), gap_resolution_(system.gap_resolution()) {}
+    : system_(system),
+      settings_(settings),
+      gap_resolution_(system.gap_resolution()),
+      bilateral_cones_(system.constraint_blocks().size()) {}
 
 void VelocityContacts::collect(const State& begin, double h, double theta) {
     h_ = h;
@@ -87,24 +143,26 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     before_.measure_speeds_at(begin.v.data());
     rows_.measure_speeds_at(begin.v.data());
     system_.collect_unilateral(begin, h, before_);
+    begin_speeds_ = begin.v.data();
     std::size_t row = 0;
+    bool compliant = false;
     for (std::size_t k = 0; k < before_.blocks().size(); ++k) {
         const auto& block = before_.blocks()[k];
-        if (block.compliance > 0.0)
-            throw Unsupported(
-                "actuators with a limit need the timestepper euler_implicit_linearized; without a limit any takes "
-                "them");
+        compliant = compliant || block.compliance > 0.0;
         keys_.push_back({block.key, k, row});
         if (block.along_normal()) deepest_ = std::min(deepest_, before_.rows()[row].gap);
         row += static_cast<std::size_t>(block.cone.rows);
     }
     const auto by_key = [](const Before& a, const Before& b) { return a.key < b.key; };
     if (!std::is_sorted(keys_.begin(), keys_.end(), by_key)) std::sort(keys_.begin(), keys_.end(), by_key);
+    servos_.clear();
+    if (compliant) system_.collect_unilateral(begin, theta * h, servos_);
     middle_ = begin;
+    middle_.t += theta * h;
     delta_.resize(begin.v.size());
     for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = theta * h * begin.v[i];
     system_.increment(begin.q.data(), delta_.data(), middle_.q.data());
-    system_.collect_unilateral(middle_, h, rows_);
+    system_.collect_unilateral(middle_, std::max(1.0 - theta, shortest_rest) * h, rows_);
 }
 
 /// Null where there is none, or several: then nothing tells them apart.
@@ -114,6 +172,19 @@ const VelocityContacts::Before* VelocityContacts::find_before(std::uint64_t key)
     if (found == keys_.end() || found->key != key) return nullptr;
     if (found + 1 != keys_.end() && (found + 1)->key == key) return nullptr;
     return &*found;
+}
+
+/// Finds the row of a servo in servos_; its entry of E.
+double VelocityContacts::set_servo(std::uint64_t key, Contact& contact) const {
+    std::size_t row = 0;
+    for (const auto& block : servos_.blocks()) {
+        if (block.key == key) {
+            contact.servo = &servos_.rows()[row];
+            return block.compliance / (theta_ * h_);
+        }
+        row += static_cast<std::size_t>(block.cone.rows);
+    }
+    throw InputError("a system gave a row with a compliance within a step that it had not at its beginning");
 }
 
 /// Whether rows of rows_ are those of before_, but for a turn that a smooth motion explains.
@@ -137,15 +208,21 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
 
 void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const {
     const double gap = contact.gap - std::clamp(contact.gap, -gap_resolution_, gap_resolution_);
-    const double speed = -contact.approach;
+    const double speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
     contact.normal = 0.0;
-    if (block.restitution > 0.0 && speed < -settings_.restitution_speed) {
+    const bool corrects = settings_.once && contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap);
+    if (block.restitution > 0.0 && speed < -settings_.restitution_speed && !corrects) {
         const bool closes = gap + h_ * speed <= 0.0;
+        contact.bounces = closes && !contact.pushed;
         contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
-                                : std::max(gap + (1.0 - theta_) * h_ * speed, 0.0) / (theta_ * h_) - speed;
+                                : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
         if (closes) contact.turns = contact.turns && contact.pushed;
+    } else if (settings_.once && (gap <= 0.0 || contact.pushed)) {
+        const double wanted = gap + std::clamp(drift, -std::abs(gap), std::abs(gap));
+        contact.normal = std::max(wanted / (2.0 * theta_ * h_), -settings_.recovery_speed);
+        contact.recovery = std::max(-contact.normal, 0.0);
     } else if (gap > 0.0) {
-        contact.normal = std::max(gap + (1.0 - theta_) * h_ * speed, 0.0) / (theta_ * h_);
+        contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_);
     }
 }
 
@@ -154,10 +231,11 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     coulomb_ = coulomb;
     settled_ = true;
     contacts_.clear();
+    compliances_.clear();
     kept_.begin_walk();
     const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
     std::size_t row = 0;
-    std::size_t cone = problem.cones.size();
+    std::size_t cone = bilateral_cones_;
     problem.cones.resize(cone + rows_.blocks().size());
     problem.b.resize(first_row_ + rows_.rows().size(), 0.0);
     lambda.resize(problem.b.size(), 0.0);
@@ -177,6 +255,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         if (before && before_.blocks()[before->block].cone.rows != block.cone.rows) before = nullptr;
         if (before) {
             contact.before = before->row;
+            contact.known = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
             contact.turns =
@@ -186,25 +265,30 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.approach = -block.speed;
         }
         if (contact.along_normal) set_normal(block, contact, block.speed);
+        compliances_.push_back(block.compliance > 0.0 ? set_servo(block.key, contact) : 0.0);
         if (block.cone.kind == ConeKind::Friction && block.cone.parameters[0] > 0.0 && !coulomb)
             contact.friction = block.cone.parameters[0];
         row += size;
     }
     rows_.move_into(problem.D);
+    set_compliance(problem, rows_.blocks(), compliances_);
 }
 
-void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error) {
+void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
+                             double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
-    const double share = std::max(settled_share, 10.0 * natural_error);
+    const double share = std::max(settings_.once ? settled_share_once : settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
+        const std::size_t first = first_row_ + contact.row;
+        if (settings_.once && iteration > 0 && (!contact.bounces || !(solution.lambda[first] > 0.0))) continue;
         const auto size = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
-        double squares = 0.0;
+        double squares = 0.0, along = 0.0;  // of the sliding speed at the end; that times the one at the beginning
         for (std::size_t i = 0; i < size; ++i) {
-            const std::size_t row = first_row_ + contact.row + i;
+            const std::size_t row = first + i;
             double here = 0.0;
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
                 const auto entry = static_cast<std::size_t>(e);
@@ -212,33 +296,51 @@ void VelocityContacts::set_b(Problem& problem, std::span<const double> guess, in
             }
             double& b = problem.b[row];
             b = rows_.rows()[contact.row + i].rate;
-            if (contact.turns) {
+            if (contact.servo) {
+                double speed = 0.0;
+                for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
+                    speed +=
+                        D.value[static_cast<std::size_t>(e)] * begin_speeds_[D.column[static_cast<std::size_t>(e)]];
+                b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
+            } else if (contact.turns) {
                 const std::size_t then = contact.before + i;
-                b += (1.0 - theta_) / theta_ * (here - before_.speed(then, guess.data()) + before_.rows()[then].rate);
+                b += (1.0 - theta_) / theta_ * (here + b - before_.speed(then, guess.data()));
             }
-            if (i > 0) squares += (here + b) * (here + b);
+            if (i == 0) continue;
+            squares += (here + b) * (here + b);
+            if (settings_.once && contact.known) along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
         }
-        double& b = problem.b[first_row_ + contact.row];
+        double& b = problem.b[first];
         b += contact.normal;
         if (contact.friction == 0.0) continue;
         const double wanted = contact.friction * std::sqrt(squares);
-        const double last = std::max(contact.sliding, 0.0), change = wanted - last;
-        const double enough = share * std::max({wanted, contact.friction * contact.approach, 1e-2 * largest});
-        double next = wanted;
-        if (iteration < patience) {
-            const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
-            next = std::max(0.0, last + change / (1.0 - std::clamp(slope, -steepest, steepest)));
-            settled_ = settled_ && std::abs(change) <= enough;
+        if (settings_.once && iteration == 0) {
+            contact.sliding = along < 0.0 ? 0.0 : wanted;
+            contact.moved = contact.sliding;
+            contact.wanted = contact.sliding;
         } else {
-            if (change > 0.0) next = last;
-            if (change < 0.0 && iteration >= 2 * patience) next = 0.0;
-            settled_ = settled_ && change >= -enough;
+            const double enough = share * std::max({wanted, contact.friction * contact.approach, 1e-2 * largest});
+            set_sliding_term(contact, wanted, enough, iteration);
         }
-        contact.moved = contact.sliding < 0.0 ? 0.0 : next - contact.sliding;
-        contact.wanted = wanted;
-        contact.sliding = next;
         b += contact.sliding;
     }
+}
+
+void VelocityContacts::set_sliding_term(Contact& contact, double wanted, double enough, int iteration) {
+    const double last = std::max(contact.sliding, 0.0), change = wanted - last;
+    double next = wanted;
+    if (iteration < patience) {
+        const double slope = contact.moved == 0.0 ? 0.0 : (wanted - contact.wanted) / contact.moved;
+        next = std::max(0.0, last + change / (1.0 - std::clamp(slope, -steepest, steepest)));
+        settled_ = settled_ && std::abs(change) <= enough;
+    } else {
+        if (change > 0.0) next = last;
+        if (change < 0.0 && iteration >= 2 * patience) next = 0.0;
+        settled_ = settled_ && change >= -enough;
+    }
+    contact.moved = contact.sliding < 0.0 ? 0.0 : next - contact.sliding;
+    contact.wanted = wanted;
+    contact.sliding = next;
 }
 
 // An interior point leaves impulses above 0 where nothing pushes: they change the speed of their row by next to nothing
@@ -247,7 +349,7 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
     constexpr double share = 1e-6, share_of_momentum = 1e-9;
     double scale = 0.0;
     for (const double momentum : problem.a) scale = std::max(scale, std::abs(momentum));
-    const std::vector<double> diagonal = diagonal_of(problem.H);
+    diagonal_of(problem.H, diagonal_);
     const auto& D = problem.D;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
@@ -258,7 +360,7 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
             const double value = D.value[static_cast<std::size_t>(e)];
             const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
             speed += value * solution.x[column];
-            mobility += value * value / diagonal[column];
+            mobility += value * value / diagonal_[column];
         }
         const double opening = speed + problem.b[first] - std::max(contact.sliding, 0.0);
         double* impulse = solution.lambda.data() + first;
@@ -269,15 +371,13 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
     }
 }
 
-// A contact pushes steadily if it pushed in the step before and its impulse does not come from the speed with which it
-// closed: that is less than a quarter of the change that the impulse makes.
 void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,
                                           double* result) const {
     const auto& D = problem.D;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const std::size_t first = first_row_ + contact.row;
-        if (contact.along_normal && (!contact.pushed || contact.approach > 0.25 * contact.change)) continue;
+        if (contact.along_normal && !contact.steady()) continue;
         for (std::size_t row = first; row < first + static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++row)
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 result[D.column[static_cast<std::size_t>(e)]] += D.value[static_cast<std::size_t>(e)] * lambda[row];
@@ -293,6 +393,15 @@ void VelocityContacts::report_closing(const Contact& contact, StepReport& report
     if (root <= report.impact_speed) return;
     report.impact_speed = root;
     report.impact_time = std::min(2.0 * contact.gap / (root - begin), h_);
+}
+
+bool VelocityContacts::landed(const Solution& solution) const {
+    return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& contact) {
+        if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.steady())
+            return false;
+        const double gap = contact.gap + h_ * ((theta_ - 1.0) * contact.approach + theta_ * contact.end_speed);
+        return gap < std::min(contact.gap, 0.0) - gap_resolution_;
+    });
 }
 
 // A contact that closed is one that pushes and did not in the step before; it closes after g/|u⁻|, or with at least g/h
@@ -312,6 +421,8 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
             report_closing(contact, report);
             continue;
         }
+        report.recovered +=
+            lambda[first] * std::clamp(0.5 * (contact.end_speed - contact.approach), 0.0, contact.recovery);
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
         if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
             report.impact_speed = speed;
@@ -425,6 +536,21 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     }
     system_.increment(end.q.data(), delta_.data(), end.q.data());
     require_finite(begin, end, h, method);
+    require_nearer(begin, end, h, method);
+}
+
+// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is no more than ten
+// times the resolution may be rounding.
+void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
+    double off = 0.0, left = 0.0;
+    for (std::size_t i = 0; i < constraint_.size(); ++i) off = std::max(off, std::abs(constraint_[i]));
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) left = std::max(left, std::abs(C));
+    if (left <= 0.5 * off || left <= 10.0 * resolution_ + 1e-9) return;
+    throw StepFailure(fmt::format(
+        "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
+        "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",
+        method, begin.t, h, off, left));
 }
 
 // ---- Options ----

@@ -14,12 +14,20 @@
 namespace delassus {
 
 /// The diagonal of H; 1 where it is not positive.
-[[nodiscard]] DELASSUS_API std::vector<double> diagonal_of(const SparseMatrix& H);
+DELASSUS_API void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal);
+
+/// E of a problem whose last rows are those of these blocks: diagonal, compliances[k] in each row of the k-th; absent
+/// where all are 0.
+DELASSUS_API void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blocks,
+                                 std::span<const double> compliances);
 
 /// What a user may choose of contacts on the level of velocities.
 struct VelocityContactSettings {
     double recovery_speed = 0.01;    ///< with which penetration that a step finds is undone at most
     double restitution_speed = 0.0;  ///< contacts that close slower do not bounce
+    /// One problem a step: gaps are corrected by the speeds of their rows, and De Saxcé's terms are those of the guess,
+    /// but for contacts that bounce. Otherwise gaps are left to PositionProjection.
+    bool once = false;
 };
 
 /// The rows of the unilateral blocks in a step's problem [H −Dᵀ; D 0] for the velocities at its end, and their law:
@@ -36,18 +44,21 @@ public:
     /// Whether there are any.
     [[nodiscard]] bool any() const { return !rows_.blocks().empty(); }
 
-    /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows, and to lambda the impulses of
-    /// the last step as a start. coulomb: the solver knows Coulomb's law, else De Saxcé's term stands in b. The rows of
-    /// problem.D are used again until the next collect().
+    /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows (cones beyond theirs are those of
+    /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
+    /// law, else De Saxcé's term stands in b. The rows of problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
-    /// natural_error: of the solves so far.
-    void set_b(Problem& problem, std::span<const double> guess, int iteration, double natural_error);
+    /// solution: of the last iteration; natural_error: of the solves so far.
+    void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
+               double natural_error);
     /// Whether the last set_b() left De Saxcé's terms where they were.
     [[nodiscard]] bool settled() const { return settled_; }
 
     /// Takes impulses that a solver leaves where nothing pushes for none. solution: of the whole problem.
     void drop_negligible(const Problem& problem, Solution& solution);
+    /// Whether a contact that closed in this step is left overlapping by more than it was.
+    [[nodiscard]] bool landed(const Solution& solution) const;
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
@@ -72,6 +83,7 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
+        bool known = false;      ///< it is in before_
         bool turns = false;      ///< b has what its rows turn until the end of the step
         double gap = 0.0;        ///< at the beginning
         double approach = 0.0;   ///< speed with which it closes there
@@ -82,26 +94,39 @@ private:
         double wanted = 0.0;     ///< what it should have been before
         double end_speed = 0.0;  ///< of the normal row
         double change = 0.0;     ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
-        bool pushed = false;     ///< in the step before
+        double recovery = 0.0;   ///< speed with which it is pushed apart
+        const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
+        bool pushed = false;                         ///< in the step before
+        bool bounces = false;                        ///< b has restitution
+
+        /// Its impulse does not come from the speed with which it closed: less than a quarter of the change is due to
+        /// that. Of a contact that pushes.
+        [[nodiscard]] bool steady() const { return pushed && approach <= 0.25 * change; }
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
+    [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
+    void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;
     VelocityContactSettings settings_;
     double gap_resolution_;
+    std::size_t bilateral_cones_;
     double h_ = 0.0, theta_ = 0.5;
-    UnilateralRows before_, rows_;  // at the beginning; at the point where D is taken
-    std::vector<Before> keys_;      // of before_, ascending
-    double deepest_ = 0.0;          // the least gap of before_, ≤ 0
+    UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken
+    UnilateralRows servos_;            // those of a step of size θ h, if there are any
+    std::vector<double> compliances_;  // entries of E; of each block
+    std::vector<Before> keys_;         // of before_, ascending
+    double deepest_ = 0.0;             // the least gap of before_, ≤ 0
     std::vector<Contact> contacts_;
     State middle_;
-    std::vector<double> delta_;
+    std::vector<double> delta_, diagonal_;
     KeptImpulses kept_;
-    std::size_t first_row_ = 0;  // in the problem
+    const double* begin_speeds_ = nullptr;  // of the step; until its end
+    std::size_t first_row_ = 0;             // in the problem
     bool coulomb_ = false, settled_ = true;
 };
 
@@ -112,12 +137,14 @@ public:
     explicit PositionProjection(DynamicalSystem& system);
 
     /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
-    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite.
+    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite or does not
+    /// bring the constraints nearer to 0.
     void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
                  StepSolver& solver, StepReport& report, std::string_view method);
 
 private:
     [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+    void require_nearer(const State& begin, const State& end, double h, std::string_view method);
 
     DynamicalSystem& system_;
     std::vector<std::int32_t> blocks_;

@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/theta_method.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "problem/copy_cone.hpp"
+
+namespace delassus {
+
+// With v_θ = (1 − θ) v + θ v⁺, forces at the point q_θ = q ∘ exp(θ h v_θ), v_θ, t + θ h, and impulses P of the step,
+//
+//     M(q_θ) (v⁺ − v) = h f(q_θ, v_θ, t_θ) + C_qᵀ P_C + D_Aᵀ P_A,      q⁺ = q ∘ exp(h v_θ)
+//
+// (Moreau 1988; Jean, CMAME 177, 1999; Acary and Brogliato 2008, ch. 10; for forces linear in q and v this is their
+// θ f⁺ + (1 − θ) f, so that θ = ½ is the trapezoidal rule as well as the midpoint rule). The matrix
+//
+//     H = M + θ h R + θ² h² K,      H v⁺ − Dᵀ P = H ṽ⁺ + M(q̃_θ) (v − ṽ⁺) + h f̃_θ
+//
+// makes it a problem [H −Dᵀ; D 0] with the cones of contacts about a guess ṽ⁺. Its answer is off by (H − the true
+// derivative) (v⁺ − ṽ⁺) and by the square of (v⁺ − ṽ⁺). H is the symmetric part of the derivative, without the
+// gyroscopic part and without the turns of C_qᵀ P.
+//
+// Constraints hold on the level of velocities, C_q(q⁺) v⁺ + C_t = 0, contacts likewise (dynamics/velocity_contacts.cpp,
+// which says where D is taken). λ is P/h, the mean over the step: as a value at its end it is of order 1.
+//
+// Gyroscopic torques: a body that spins by itself turns by a rule that keeps its energy and momentum
+// (DynamicalSystem::free_spins), and what the other motions of the step add to its torque is taken beside its impulse.
+
+ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
+    : system_(system),
+      settings_(std::move(settings)),
+      theta_(settings_.theta),
+      contacts_(system, settings_.contacts),
+      linearization_(system, settings_.linearization_limit),
+      projection_(system),
+      cones_(free_cones(system)),
+      n_(system.n()),
+      m_(system.m()) {}
+
+void ThetaMethod::restart() {
+    multipliers_.clear();
+    contacts_.restart();
+    for (auto& change : changes_) change.clear();
+    last_h_ = 0.0;
+}
+
+// h, whether there are multipliers, how many changes, all of these, and the impulses of unilateral blocks.
+std::vector<double> ThetaMethod::save() const {
+    double known = 0.0;
+    for (const auto& change : changes_) known += change.empty() ? 0.0 : 1.0;
+    std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0, known};
+    memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
+    for (const auto& change : changes_) memory.insert(memory.end(), change.begin(), change.end());
+    contacts_.append_to(memory);
+    return memory;
+}
+
+void ThetaMethod::load(const std::vector<double>& memory) {
+    restart();
+    std::span<const double> rest = memory;
+    const auto take = [&](std::size_t count) {
+        if (rest.size() < count) throw InputError("the memory of " + settings_.name + " is too short");
+        const auto taken = rest.first(count);
+        rest = rest.subspan(count);
+        return taken;
+    };
+    const auto head = take(3);
+    last_h_ = head[0];
+    if (head[1] != 0.0) {
+        const auto multipliers = take(static_cast<std::size_t>(m_));
+        multipliers_.assign(multipliers.begin(), multipliers.end());
+    }
+    double known = head[2];
+    for (auto& change : changes_)
+        if (known-- > 0.0) {
+            const auto values = take(static_cast<std::size_t>(n_));
+            change.assign(values.begin(), values.end());
+        }
+    contacts_.load(rest);
+}
+
+void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepReport& report) {
+    require_step(system_, state, h, settings_.name);
+    solver.method_error = {};
+    find_spins(state, h);
+    if (settings_.linearly_implicit) extrapolate(h);
+    assemble(state, h, solver.law() == Law::Coulomb);
+    if (settings_.linearly_implicit) {
+        solve_once(state, h, solver, report);
+    } else {
+        iterate(state, h, solver, report);
+    }
+    contacts_.drop_negligible(problem_, solution_);
+
+    result_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
+    move(state, h, result_, 1.0, end_);
+    end_.v = solution_.x;
+    require_finite(state, end_, h, settings_.name);
+    if (linearization_.wanted()) judge_linearization(state, h, result_, report);
+    if (!settings_.linearly_implicit || contacts_.landed(solution_))
+        projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
+    if (settings_.linearly_implicit) remember_change(result_, h);
+    last_h_ = h;
+    multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
+    for (double& lambda : multipliers_) lambda /= h;
+    contacts_.finish(solution_.lambda, report);
+    std::swap(state, end_);
+    report.multipliers = multipliers_;
+}
+
+/// to.q ← q ∘ exp(part h v_θ) for the velocities v⁺ = `last` at the end; to.v and to.t are those of θ.
+void ThetaMethod::move(const State& begin, double h, const Vector& last, double part, State& to) {
+    const Eigen::Map<const Vector> v(begin.v.data(), n_);
+    to.v.resize(begin.v.size());
+    Eigen::Map<Vector> mean(to.v.data(), n_);
+    mean = (1.0 - theta_) * v + theta_ * last;
+    delta_ = part * h * mean;
+    if (part == 1.0)
+        for (const FreeSpin* spin : untouched_)
+            for (std::int32_t i = 0; i < 3; ++i) delta_[spin->column + i] = spin->turn[static_cast<std::size_t>(i)];
+    to.q.resize(begin.q.size());
+    system_.increment(begin.q.data(), delta_.data(), to.q.data());
+    to.t = begin.t + part * h;
+}
+
+/// The spins of the step, their torques at θ, and the guess that the spinning bodies go on alone.
+void ThetaMethod::find_spins(const State& begin, double h) {
+    free_ = Eigen::Map<const Vector>(begin.v.data(), n_);
+    guess_ = free_;
+    end_ = begin;
+    end_.t = begin.t + h;
+    system_.free_spins(end_, h, spins_);
+    if (spins_.empty()) return;
+    at_theta_ = begin;
+    for (const FreeSpin& spin : spins_)
+        for (std::int32_t i = 0; i < 3; ++i) {
+            const auto k = static_cast<std::size_t>(i), column = static_cast<std::size_t>(spin.column + i);
+            free_[spin.column + i] = spin.speed[k];
+            at_theta_.v[column] = (1.0 - theta_) * begin.v[column] + theta_ * spin.speed[k];
+        }
+    guess_ = free_;
+    system_.free_spins(at_theta_, 0.0, theta_spins_);  // for the torques alone
+}
+
+// ---- The guess of the linearly implicit method ----
+//
+// The accelerations of the last two steps, less what spins by itself, say how velocities change in this one. Of each
+// entry the one nearer to 0 is taken, or 0 where their signs differ. In a smooth motion either is off by O(h), and the
+// guess by O(h²). Beside an impact the smooth one of the two is the smaller. Where a stiff mode changes its sign from
+// step to step, an extrapolation would double it: the guess then is that velocities stay.
+void ThetaMethod::extrapolate(double h) {
+    if (changes_[0].empty()) return;
+    const bool both = !changes_[1].empty();
+    for (std::int32_t i = 0; i < n_; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const double last = changes_[0][k], before = both ? changes_[1][k] : last;
+        if (last * before > 0.0) guess_[i] += h * (std::abs(last) < std::abs(before) ? last : before);
+    }
+}
+
+void ThetaMethod::remember_change(const Vector& result, double h) {
+    changes_[1].swap(changes_[0]);
+    changes_[0].resize(static_cast<std::size_t>(n_));
+    Eigen::Map<Vector>(changes_[0].data(), n_) = (result - free_) / h;
+}
+
+/// H, D and the cones, which stay for the step.
+void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
+    problem_.name = "step";
+    problem_.law = Law::Associated;
+    untouched_.clear();
+    move(begin, h, guess_, theta_, at_theta_);
+    H_.begin(n_, n_);
+    system_.add_mass(at_theta_, 1.0, H_);
+    if (system_.has_stiffness()) {
+        system_.add_damping(at_theta_, theta_ * h, Tangent::Symmetric, H_);
+        system_.add_stiffness(at_theta_, theta_ * theta_ * h * h, Tangent::Symmetric, H_);
+    }
+    H_.finish_into(problem_.H);
+    D_.begin(m_, n_);
+    if (m_ > 0) system_.add_constraint_jacobian(at_theta_, 0, D_);
+    D_.finish_into(problem_.D);
+    problem_.b.assign(static_cast<std::size_t>(m_), 0.0);
+    if (problem_.cones.size() < cones_.size()) problem_.cones.resize(cones_.size());
+    for (std::size_t k = 0; k < cones_.size(); ++k) copy_cone(cones_[k], problem_.cones[k]);
+    solution_.lambda.assign(static_cast<std::size_t>(m_), 0.0);
+    for (std::size_t i = 0; i < multipliers_.size(); ++i) solution_.lambda[i] = last_h_ * multipliers_[i];
+    solution_.x.assign(guess_.begin(), guess_.end());
+    contacts_.collect(begin, h, theta_);
+    contacts_.append_to(problem_, solution_.lambda, coulomb);
+    untouched_.find(spins_, problem_.D, n_);
+}
+
+/// a and the b of constraints for the guess; the impulse of its forces stays in force_.
+void ThetaMethod::linearize(const State& begin, double h) {
+    const Eigen::Map<const Vector> v(begin.v.data(), n_);
+    move(begin, h, guess_, theta_, at_theta_);
+    impulse_of_forces(h);
+    back_ = v - guess_;
+    problem_.a.assign(force_.begin(), force_.end());
+    system_.multiply_mass(at_theta_, 1.0, back_.data(), problem_.a.data());
+    problem_.H.multiply_add(1.0, guess_.data(), problem_.a.data());
+    if (m_ > 0) set_constraint_rows(begin, h);
+}
+
+// With r̃ = C_q(q̃⁺) ṽ⁺ + C_t at the end of the guess, the rows C_q(q⁺) v⁺ + C_t = 0 are D (v⁺ − ṽ⁺) + r̃ = 0. On the
+// level of velocities alone C would drift by what a step leaves of it, d = O(h³). The linearly implicit method asks for
+//
+//     C_q(q⁺) v⁺ + C_t = −C(q⁺)/(θ h),      C(q⁺) ≈ C(q̃⁺) + θ h D (v⁺ − ṽ⁺)
+//
+// that is D (v⁺ − ṽ⁺) + ½ r̃ + C(q̃⁺)/(2 θ h) = 0. For θ = ½ what C was is gone at once: C⁺ = C + ½ h (u + u⁺) + d with
+// u = −2 C/h and u⁺ = −2 C⁺/h is C⁺ = d/2. (Asking for C(q⁺) = 0 instead would leave u⁺ = −u: an oscillation for ever.)
+void ThetaMethod::set_constraint_rows(const State& begin, double h) {
+    move(begin, h, guess_, 1.0, end_);
+    end_.v.assign(guess_.begin(), guess_.end());
+    rate_.resize(m_);
+    system_.constraint_rate(end_, rate_.data());
+    D_.begin(m_, n_);
+    system_.add_constraint_jacobian(end_, 0, D_);
+    D_.finish().multiply_add(1.0, guess_.data(), rate_.data());
+    if (settings_.linearly_implicit) {
+        constraint_.resize(static_cast<std::size_t>(m_));
+        system_.constraint(end_, constraint_.data());
+        rate_ = 0.5 * rate_ + Eigen::Map<const Vector>(constraint_.data(), m_) / (2.0 * theta_ * h);
+    }
+    for (std::int32_t row = 0; row < m_; ++row)
+        problem_.b[static_cast<std::size_t>(row)] = rate_[row] - times(row, guess_);
+}
+
+/// force_ ← h f at at_theta_, where spinning bodies have their own impulse instead of what they feel alone.
+void ThetaMethod::impulse_of_forces(double h) {
+    force_.setZero(n_);
+    system_.add_force(at_theta_, h, force_.data());
+    for (std::size_t k = 0; k < spins_.size(); ++k)
+        for (std::size_t i = 0; i < 3; ++i)
+            force_[spins_[k].column + static_cast<std::int32_t>(i)] +=
+                spins_[k].impulse[i] - h * theta_spins_[k].torque[i];
+}
+
+/// D x in a row of the problem.
+double ThetaMethod::times(std::int32_t row, const Vector& x) const {
+    const auto& D = problem_.D;
+    double sum = 0.0;
+    for (auto e = D.row_start[static_cast<std::size_t>(row)]; e < D.row_start[static_cast<std::size_t>(row) + 1]; ++e)
+        sum += D.value[static_cast<std::size_t>(e)] * x[D.column[static_cast<std::size_t>(e)]];
+    return sum;
+}
+
+// Right-hand sides in √mass · speed: a by the diagonal of H, b by that of D diag(H)⁻¹ Dᵀ.
+void ThetaMethod::scale() {
+    diagonal_of(problem_.H, diagonal_);
+    row_scale_.setZero(problem_.m());
+    const auto& D = problem_.D;
+    for (std::int32_t j = 0; j < problem_.m(); ++j)
+        for (auto e = D.row_start[static_cast<std::size_t>(j)]; e < D.row_start[static_cast<std::size_t>(j) + 1]; ++e) {
+            const double value = D.value[static_cast<std::size_t>(e)];
+            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
+            row_scale_[j] += value * value / diagonal_[column];
+        }
+}
+
+/// Whether the right-hand sides differ from those of the last solve by a negligible share.
+bool ThetaMethod::unchanged() const {
+    double change = 0.0, size = 0.0;
+    for (std::size_t i = 0; i < diagonal_.size(); ++i) {
+        const double a = problem_.a[i], difference = a - last_a_[i];
+        change += difference * difference / diagonal_[i];
+        size += a * a / diagonal_[i];
+    }
+    for (std::int32_t j = 0; j < problem_.m(); ++j) {
+        const double difference = problem_.b[static_cast<std::size_t>(j)] - last_b_[static_cast<std::size_t>(j)];
+        if (row_scale_[j] > 0.0) change += difference * difference / row_scale_[j];
+    }
+    return change <= settings_.tolerance * settings_.tolerance * size;
+}
+
+void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    scale();
+    const bool before = report.solved;
+    for (int iteration = 0;; ++iteration) {
+        linearize(begin, h);
+        contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration,
+                        solver.effort().worst_natural);
+        if (iteration > 0 && (unchanged() || (iteration >= settings_.iterations && contacts_.settled()))) return;
+        if (iteration == most_iterations) {
+            report.solved = false;
+            report.message = "the speeds of sliding contacts did not settle";
+            return;
+        }
+        last_a_ = problem_.a;
+        last_b_ = problem_.b;
+        report.solved = before;
+        const bool solved = solve(solver, report);
+        solved_from_ = guess_;
+        solved_force_ = force_;
+        guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
+        if (!guess_.allFinite() || !solved) return;
+    }
+}
+
+// One problem. Two in the first step, which has no history to extrapolate from; a few where a contact bounces with
+// friction and the solver does not know Coulomb's law.
+void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    const auto linearize_at_guess = [&] {
+        linearize(begin, h);
+        solved_from_ = guess_;
+        solved_force_ = force_;
+        contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, 0,
+                        solver.effort().worst_natural);
+    };
+    const auto found = [&] {
+        if (!solve(solver, report)) return false;
+        guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
+        return guess_.allFinite();
+    };
+    linearize_at_guess();
+    if (!found()) return;
+    if (changes_[0].empty()) {
+        linearize_at_guess();
+        if (!found()) return;
+    }
+    for (int iteration = 1; iteration <= most_iterations; ++iteration) {
+        contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration,
+                        solver.effort().worst_natural);
+        if (contacts_.settled()) return;
+        if (!found()) return;
+    }
+    report.solved = false;
+    report.message = "the speeds of sliding contacts did not settle";
+}
+
+bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
+    ++report.newton_iterations;
+    if (solver.solve(problem_, solution_, true)) return true;
+    report.solved = false;
+    report.message = solver.effort().unsolved;
+    return false;
+}
+
+// The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).
+void ThetaMethod::judge_linearization(const State& begin, double h, const Vector& result, StepReport& report) {
+    move(begin, h, result, theta_, at_theta_);
+    back_ = result - solved_from_;
+    linear_ = solved_force_;
+    problem_.H.multiply_add(-1.0, back_.data(), linear_.data());
+    system_.multiply_mass(at_theta_, 1.0, back_.data(), linear_.data());
+    impulse_of_forces(h);
+    const auto n = static_cast<std::size_t>(n_);
+    report.linearization = linearization_.error(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H);
+    linearization_.judge(report.linearization, begin, h, settings_.name);
+}
+
+}  // namespace delassus

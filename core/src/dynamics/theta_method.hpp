@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The θ-method for velocities, with constraints and contacts on the level of velocities (internal). It is two methods
+// of integrators/: moreau_jean iterates, linearly_implicit_trapezoidal solves one problem a step.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/timestepper.hpp"
+#include "dynamics/linear_problem.hpp"
+#include "dynamics/linearization.hpp"
+#include "dynamics/untouched_spins.hpp"
+#include "dynamics/velocity_contacts.hpp"
+
+namespace delassus {
+
+struct ThetaSettings {
+    std::string name;    ///< of the method, for messages
+    double theta = 0.5;  ///< in [½, 1]: where in the step forces are taken
+    /// Linearly implicit: one problem a step about an extrapolated guess, and constraints and gaps corrected by its
+    /// rows. Otherwise Newton's method, and positions are projected afterwards.
+    bool linearly_implicit = false;
+    int iterations = 2;        ///< of Newton's method, at least
+    double tolerance = 1e-10;  ///< no further iteration where right-hand sides change by less than this share
+    VelocityContactSettings contacts;
+    double linearization_limit = 0.1;
+};
+
+class DELASSUS_API ThetaMethod : public Timestepper {
+public:
+    /// system outlives it.
+    ThetaMethod(DynamicalSystem& system, ThetaSettings settings);
+
+    [[nodiscard]] int order() const override { return settings_.theta == 0.5 ? 2 : 1; }
+    void restart() override;
+    [[nodiscard]] std::vector<double> save() const override;
+    void load(const std::vector<double>& memory) override;
+
+private:
+    void take_step(State& state, double h, StepSolver& solver, StepReport& report) override;
+
+    void move(const State& begin, double h, const Vector& last, double part, State& to);
+    void find_spins(const State& begin, double h);
+    void extrapolate(double h);
+    void remember_change(const Vector& result, double h);
+    void assemble(const State& begin, double h, bool coulomb);
+    void linearize(const State& begin, double h);
+    void set_constraint_rows(const State& begin, double h);
+    void impulse_of_forces(double h);
+    [[nodiscard]] double times(std::int32_t row, const Vector& x) const;
+    void scale();
+    [[nodiscard]] bool unchanged() const;
+    void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
+    void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
+    [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
+    void judge_linearization(const State& begin, double h, const Vector& result, StepReport& report);
+
+    static constexpr int most_iterations = 50;
+
+    DynamicalSystem& system_;
+    ThetaSettings settings_;
+    double theta_;
+    VelocityContacts contacts_;
+    Linearization linearization_;
+    PositionProjection projection_;
+    std::vector<Cone> cones_;
+    std::int32_t n_, m_;
+    double last_h_ = 0.0;
+    MatrixAssembler H_, D_;
+    Problem problem_;
+    Solution solution_;
+    State at_theta_, end_;
+    std::vector<FreeSpin> spins_, theta_spins_;
+    UntouchedSpins untouched_;
+    /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
+    /// implicit.
+    std::array<std::vector<double>, 2> changes_;
+    Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
+    Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
+    Vector result_, back_, linear_;
+    std::vector<double> constraint_;
+    std::vector<double> last_a_, last_b_;
+    std::vector<double> diagonal_;
+    Vector row_scale_;
+};
+
+}  // namespace delassus
