@@ -163,7 +163,7 @@ TEST(ExplicitOrders, WithAndWithoutLoops) {
         for (const auto& [method, order] : {std::pair{"rk4", 4.0}, {"dormand_prince", 5.0}}) {
             const Finished coarse(text, "joint", method, longest, 0.48);
             const Finished fine(text, "joint", method, 0.5 * longest, 0.48);
-            EXPECT_NEAR(std::log2(coarse.off(best) / fine.off(best)), order, 0.5) << name << ", " << method;
+            EXPECT_GE(std::log2(coarse.off(best) / fine.off(best)), order - 0.5) << name << ", " << method;
         }
     }
 }
