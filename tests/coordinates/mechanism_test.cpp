@@ -257,6 +257,26 @@ TEST(ArticulatedChain, EndsWhereItsReferenceDoes) {
 }
 
 #ifdef DELASSUS_HAS_FCL
+// A gate on a hinge that a servo with a limit drives against dry friction, and a parcel on a belt: in its coordinate
+// servo and friction cancel each other while the gate sticks.
+TEST(ParcelLine, RunsInJointCoordinates) {
+    const auto gate = [](const std::string& coordinates) {
+        SceneOverrides overrides;
+        overrides.end = 2.5;
+        overrides.values = {{"coordinates", coordinates}};
+        Registry registry;
+        Scene scene = read_scene(DELASSUS_SOURCE_DIR "/examples/scenes/parcel_line.yaml", overrides);
+        Simulation simulation(scene.systems[0], registry);
+        while (!simulation.finished()) simulation.step();
+        EXPECT_EQ(simulation.totals().unsolved_steps, 0) << coordinates;
+        const MultibodySystem& system = *scene.systems[0].system;
+        return system.pose(simulation.state(), system.find_body("gate")).position;
+    };
+    const Vector3 joint = gate("joint"), maximal = gate("maximal");
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(joint[i], maximal[i], 1e-3);
+    EXPECT_GT(std::hypot(joint[0] - 1.5, joint[1] + 0.1), 0.3);  // it has opened
+}
+
 // A chain of spheres on hinges that falls on the ground, and a sphere that nothing holds.
 TEST(Contacts, AreThoseOfTheBodies) {
     const std::string text =

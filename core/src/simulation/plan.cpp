@@ -306,7 +306,9 @@ private:
         } else if (sparse_) {
             keep("a sparse H", "forces or constraints couple bodies in it; it is factorised");
         } else {
-            leave("factorisation of H", "no stiffness couples bodies: H is diagonal by blocks of one body");
+            leave("factorisation of H", simulation_.joint_coordinates()
+                                            ? "H is diagonal by blocks, or accelerations follow from link to link"
+                                            : "no stiffness couples bodies: H is diagonal by blocks of one body");
         }
     }
 
