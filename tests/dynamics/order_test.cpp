@@ -51,7 +51,7 @@ struct Case {
     int order;
     std::string system;
     Multipliers multipliers;
-    int factor;  ///< more steps than the subject's
+    double factor;  ///< more steps than the subject's
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) {
@@ -67,7 +67,7 @@ std::vector<Case> cases() {
         int order;
         Multipliers multipliers = Multipliers::Converge;
     };
-    const std::vector<Method> explicit_ones = {{"euler_explicit", {}, 1}, {"rk4", {}, 4}};
+    const std::vector<Method> explicit_ones = {{"euler_explicit", {}, 1}};
     // The coarsest steps are too long to be trusted, but show the order.
     const std::vector<Method> others = {
         {"euler_implicit_linearized", {}, 1},
@@ -84,18 +84,23 @@ std::vector<Case> cases() {
         {"moreau_jean", {}, 2, Multipliers::Mean},
         {"moreau_jean", {{"theta", "0.6"}}, 1},
         {"nonsmooth_generalized_alpha", {}, 2},
-        {"linearly_implicit_trapezoidal", {{"linearization_limit", "inf"}}, 2, Multipliers::Mean}};
+        {"linearly_implicit_trapezoidal", {{"linearization_limit", "inf"}}, 2, Multipliers::Mean},
+        {"rk4", {}, 4},
+        {"dormand_prince", {}, 5}};
     std::vector<Case> result;
     const auto add = [&](const Method& method, const std::string& system, bool constrained) {
         auto options = method.options;
-        const bool newton = method.order != 4 && method.name != "euler_explicit" &&
+        const bool newton = method.order < 4 && method.name != "euler_explicit" &&
                             method.name != "euler_implicit_linearized" && method.name != "trapezoidal_linearized" &&
                             method.name != "linearly_implicit_trapezoidal";
         if (newton) options["newton_tolerance"] = "1e-12";
         const auto multipliers = constrained ? method.multipliers : Multipliers::None;
         const bool late = (method.name == "moreau_jean" && constrained) ||
                           method.name == "linearly_implicit_trapezoidal";  // their asymptotic range
-        const int factor = method.order == 1 ? (constrained ? 2 : 4) : late ? 4 : 1;
+        const double factor = method.order == 1   ? (constrained ? 2.0 : 4.0)
+                              : late              ? 4.0
+                              : method.order >= 4 ? 0.25
+                                                  : 1.0;
         result.push_back({method.name, options, method.order, system, multipliers, factor});
     };
     for (const auto* system : {"elastic pendulum", "heavy top, reduced"}) {
@@ -114,18 +119,24 @@ TEST_P(Order, IsTheOneClaimed) {
     const auto& on = subject(c.system);
     const Registry registry;
     StepSolver solver(registry, {});
-    const std::vector<int> steps = {c.factor * on.steps, 2 * c.factor * on.steps, 4 * c.factor * on.steps,
-                                    8 * c.factor * on.steps};
+    const int coarsest = static_cast<int>(c.factor * on.steps);
+    const std::vector<int> steps = {coarsest, 2 * coarsest, 4 * coarsest, 8 * coarsest};
     const auto measured = measure(*on.system, c.method, c.options, on.t_end, steps, on.reference, solver);
     const double q = measured.order(measured.position), v = measured.order(measured.velocity);
-    EXPECT_NEAR(q, c.order, 0.15);
-    EXPECT_NEAR(v, c.order, 0.15);
+    // The leading error of dormand_prince is so small that longer steps show more of the next one.
+    const double below = c.order == 5 ? 0.3 : 0.15, above = c.order == 5 ? 0.7 : 0.15;
+    const auto expect_order = [&](double measured_order, double order) {
+        EXPECT_GE(measured_order, order - below);
+        EXPECT_LE(measured_order, order + above);
+    };
+    expect_order(q, c.order);
+    expect_order(v, c.order);
     const bool print = std::getenv("DELASSUS_PRINT_ORDERS") != nullptr;
     const std::string name = testing::PrintToString(c);
     if (print) std::printf("%s: q %.2f v %.2f", name.c_str(), q, v);
     if (c.multipliers == Multipliers::Converge || c.multipliers == Multipliers::Mean) {
         const double lambda = measured.order(measured.multiplier);
-        EXPECT_NEAR(lambda, c.multipliers == Multipliers::Mean ? 1 : c.order, 0.15);
+        expect_order(lambda, c.multipliers == Multipliers::Mean ? 1 : c.order);
         if (print) std::printf(" lambda %.2f", lambda);
     }
     if (c.multipliers == Multipliers::Oscillate) {

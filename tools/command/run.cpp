@@ -110,7 +110,13 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
         fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
                    totals.worst_penetration, totals.most_contacts);
         if (const auto start = simulation.start(); !start.empty()) fmt::print("  start: {}\n", start);
-        if (const auto left_out = system.system->constraint_rows() - system.system->m(); left_out > 0)
+        std::int32_t of_trees = 0;
+        if (const auto* joints = simulation.joint_coordinates()) {
+            of_trees = joints->rows_saved();
+            fmt::print("  joint coordinates: {} velocities in place of {}, {} rows saved\n", joints->n(),
+                       joints->body_velocities(), of_trees);
+        }
+        if (const auto left_out = system.system->constraint_rows() - of_trees - system.system->m(); left_out > 0)
             fmt::print("  {} of {} rows of joints and motors left out: others imply them\n", left_out,
                        system.system->constraint_rows());
         if (system.sleeping)

@@ -29,7 +29,8 @@ struct AdaptiveStepReport {
     bool impact = false;        ///< a short step for a contact that closed at its beginning
 };
 
-/// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves; the halves are kept.
+/// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves, and the halves are
+/// kept; once alone by a method that estimates its own error.
 class DELASSUS_API AdaptiveStepping {
 public:
     /// system and stepper, made for it, outlive this. Throws InputError for values of control outside their ranges.
@@ -63,6 +64,7 @@ private:
     /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
     [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
     [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h) const;
+    [[nodiscard]] double error_of(const State& begin, const State& end, const EmbeddedError& error, double h) const;
     void extrapolate(const State& whole, State& halves) const;
     /// A step from the state in which a contact closes.
     [[nodiscard]] AdaptiveStepReport take_impact(State& state, double h, double end, StepSolver& solver);
@@ -75,7 +77,7 @@ private:
     DynamicalSystem& system_;
     Timestepper& stepper_;
     StepControl control_;
-    bool extrapolates_;
+    bool extrapolates_, embedded_;
     double next_;
     double last_error_ = 1.0;
     double impacts_ = 0.0;  // short steps for impacts since the last long one

@@ -180,6 +180,9 @@ public:
     virtual void multiply_mass(const State& state, double factor, const double* x, double* result) const = 0;
     /// result += factor · f(q, v, t); n. Gyroscopic and velocity-dependent inertial terms are part of f.
     virtual void add_force(const State& state, double factor, double* result) const = 0;
+    /// v_dot ← M(q)⁻¹ f(q, v, t), n: accelerations without constraints, by a way of the system's own that is faster
+    /// than assembling M. False: it has none, v_dot is as it was. Default.
+    virtual bool accelerate(const State& state, double* v_dot) const;
     /// H += factor · K, K = −∂f/∂q along increments. Default: nothing (f does not depend on q).
     virtual void add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
     /// H += factor · R, R = −∂f/∂v without the gyroscopic part. Default: nothing.

@@ -100,6 +100,7 @@ enum class JointKind {
     Cylindrical,   ///< 4 rows: both along one axis
     Universal,     ///< 4 rows: axis of the first body normal to second_axis of the second
     Fixed,         ///< 6 rows
+    Planar,        ///< 3 rows: as PointOnPlane, and the axis stays normal to the plane
     PointOnPlane,  ///< 1 row: the point of the second body stays in the plane through the point, normal to the axis, of
                    ///< the first
     Distance,      ///< 1 row: the points keep their initial distance
@@ -366,6 +367,8 @@ public:
     [[nodiscard]] std::int32_t node_column(std::int32_t node) const;
     [[nodiscard]] std::int32_t body_column(BodyIndex index) const;
     [[nodiscard]] const BodyParameters& body(BodyIndex index) const;
+    [[nodiscard]] std::int32_t joint_count() const;
+    [[nodiscard]] const JointParameters& joint(std::int32_t index) const;
     [[nodiscard]] BodyIndex find_body(const std::string& name) const;  ///< world_body if there is none
     [[nodiscard]] Pose pose(const State& state, BodyIndex index) const;
     /// Velocity of the mass centre (world frame) and angular velocity (body frame).
@@ -389,6 +392,10 @@ public:
     [[nodiscard]] const std::vector<std::int32_t>& kept_rows() const;
     /// Keeps these rows; ascending. Timesteppers made before do not know.
     void keep_rows(const std::vector<std::int32_t>& rows);
+    /// Of all rows but those that are certain, enough that the others hold wherever the certain ones do, and no more;
+    /// ascending. certain: rows of a tree of joints, ascending; state: assembled.
+    [[nodiscard]] std::vector<std::int32_t> rows_beside(const std::vector<std::int32_t>& certain,
+                                                        const State& state) const;
     /// Chooses anew which rows to keep, if those that are kept nearly depend on each other at this state and others do
     /// not, or if rows that were left out no longer hold; moves the state to where the new ones hold. Returns whether
     /// it did: then timesteppers must be made anew. Throws StepFailure where rows that are left out no longer hold and

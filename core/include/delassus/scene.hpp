@@ -57,11 +57,18 @@ struct RunLimits {
     double drift = std::numeric_limits<double>::infinity();  ///< of bilateral constraints, m or rad
 };
 
+/// The unknowns of a system's bodies.
+enum class Coordinates {
+    Maximal,  ///< six velocities for each body, and rows for every joint
+    Joint     ///< those of the joints, where joints make trees (delassus/joint_coordinates.hpp)
+};
+
 /// A system, finished and ready to be simulated, with the settings of the file.
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
     std::unique_ptr<MultibodySystem> system;
 
+    Coordinates coordinates = Coordinates::Maximal;
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
     SolverConfig solver;                         ///< an empty name: `auto`

@@ -11,6 +11,7 @@
 #include "delassus/adaptive_stepping.hpp"
 #include "delassus/equilibrium.hpp"
 #include "delassus/export.hpp"
+#include "delassus/joint_coordinates.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/scene.hpp"
 #include "delassus/step_solver.hpp"
@@ -76,7 +77,7 @@ struct SimulationTotals {
 /// All that a simulation carries from step to step: with equal scenes, going on from it gives the same bits.
 struct SimulationState {
     std::int64_t step = 0;
-    State state;
+    State state;                  ///< in the coordinates of the simulation
     std::vector<double> turns;    ///< MultibodySystem::turns()
     std::vector<double> memory;   ///< Timestepper::save(), warm starts included
     std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps
@@ -119,11 +120,16 @@ public:
 
     /// Of the last step; of the initial state before the first.
     [[nodiscard]] const StepRecord& record() const { return record_; }
-    [[nodiscard]] const State& state() const { return now_.state; }
+    /// Of the bodies, as MultibodySystem has it.
+    [[nodiscard]] const State& state() const { return joint_ ? bodies_ : now_.state; }
+    /// The joint coordinates that it is run in, or null.
+    [[nodiscard]] const JointCoordinates* joint_coordinates() const { return joint_.get(); }
+    /// In the coordinates that it is run in.
+    [[nodiscard]] const State& coordinates() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
     /// What the last step reported; empty before the first, and where a run goes on. Its multipliers are those of all
-    /// rows, 0 in rows that are left out.
+    /// rows, 0 in rows that are left out; in joint coordinates not a number in rows that the trees hold.
     [[nodiscard]] const StepReport& report() const { return report_.step; }
     /// The contacts in report(), in their order.
     [[nodiscard]] DELASSUS_API std::vector<ContactRecord> contacts() const;
@@ -144,8 +150,12 @@ public:
     DELASSUS_API void load(SimulationState state);
 
 private:
-    /// record_ ← what is known of a state after so many steps.
+    /// record_ ← what is known of a state of the bodies after so many steps.
     void measure(const State& state, std::int64_t step);
+    /// What the timestepper steps.
+    [[nodiscard]] DynamicalSystem& dynamics();
+    /// The bodies at a state of dynamics(); `memory` holds them where the coordinates are others.
+    [[nodiscard]] const State& bodies_at(const State& state, State& memory) const;
     /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     void advance(State& state, AdaptiveStepReport& report);
@@ -161,7 +171,9 @@ private:
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     Assembly assembly_;
     std::shared_ptr<const Equilibrium> equilibrium_;
+    std::unique_ptr<JointCoordinates> joint_;  // empty in maximal coordinates
     SimulationState now_;
+    State bodies_, next_bodies_;  // in joint coordinates: now, and memory for the next step
     StepRecord record_;
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next
     std::vector<double> constraint_;

@@ -68,6 +68,8 @@ public:
     /// by a solver that takes cones of every kind: what leaving out saves can be measured against that. Call it before
     /// the first solve.
     DELASSUS_API void leave_nothing_out();
+    /// Whether what a problem does not need is left out: false after leave_nothing_out().
+    [[nodiscard]] DELASSUS_API bool leaves_out() const;
 
     /// Solves the problem of a step. solution: the start if warm_start, then the result. Throws Unsupported if the
     /// configured solver cannot take the problem, InputError if the problem is not valid. A solve by a configured

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -51,6 +52,11 @@ public:
     using Error::Error;
 };
 
+/// An estimate of the error of a step, along increments of the positions and in the velocities; n each.
+struct EmbeddedError {
+    std::span<const double> positions, velocities;
+};
+
 /// A method, made for one system. It keeps what belongs to the method (accelerations, multipliers) from step to step.
 class DELASSUS_API Timestepper {
 public:
@@ -70,6 +76,11 @@ public:
     /// Whether a motion of infinite frequency is gone after a step: then results of different steps may be
     /// extrapolated.
     [[nodiscard]] virtual bool damps_at_once() const { return false; }
+
+    /// Whether it estimates its own errors, by a method of one order less that it has in it. Default: no.
+    [[nodiscard]] virtual bool has_embedded_error() const { return false; }
+    /// The estimate for the last step; valid until the next. Empty by default.
+    [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
     [[nodiscard]] virtual double reaction_growth() const { return 0.0; }

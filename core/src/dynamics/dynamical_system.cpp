@@ -107,6 +107,9 @@ void DynamicalSystem::inverse_tangent(const double*, std::vector<DiagonalBlock3>
     blocks.clear();
 }
 
+bool DynamicalSystem::accelerate(const State&, double*) const {
+    return false;
+}
 void DynamicalSystem::add_stiffness(const State&, double, Tangent, MatrixAssembler&) const {}
 void DynamicalSystem::add_damping(const State&, double, Tangent, MatrixAssembler&) const {}
 void DynamicalSystem::add_gyroscopic_damping(const State&, double, Tangent, MatrixAssembler&) const {}

@@ -15,12 +15,11 @@ std::vector<Cone> free_cones(const DynamicalSystem& system) {
     return cones;
 }
 
-Vector multiply_blocks(const std::vector<DiagonalBlock3>& blocks, const Vector& vector) {
-    Vector result = vector;
+void multiply_blocks(const std::vector<DiagonalBlock3>& blocks, const Vector& vector, Vector& result) {
+    result = vector;
     for (const auto& block : blocks)
         result.segment<3>(block.first) = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(block.value) *
                                          vector.segment<3>(block.first);
-    return result;
 }
 
 void require_step(const DynamicalSystem& system, const State& begin, double h, std::string_view method) {
@@ -54,6 +53,24 @@ Accelerations::Accelerations(const DynamicalSystem& system)
     : system_(system), cones_(free_cones(system)), n_(system.n()), m_(system.m()) {}
 
 LinearSolution Accelerations::at(const State& state, StepSolver& solver, StepReport& report) {
+    LinearSolution solution;
+    at(state, solver, report, solution);
+    return solution;
+}
+
+void Accelerations::at(const State& state, StepSolver& solver, StepReport& report, LinearSolution& solution) {
+    const auto require_finite_result = [&] {
+        if (!solution.x.allFinite() || !solution.lambda.allFinite())
+            throw StepFailure(fmt::format("the accelerations at t = {} are not finite", state.t));
+    };
+    if (m_ == 0 && solver.leaves_out()) {
+        solution.x.resize(n_);
+        solution.lambda.resize(0);
+        if (system_.accelerate(state, solution.x.data())) {
+            ++report.newton_iterations;
+            return require_finite_result();
+        }
+    }
     Problem problem;
     M_.begin(n_, n_);
     system_.add_mass(state, 1.0, M_);
@@ -71,10 +88,8 @@ LinearSolution Accelerations::at(const State& state, StepSolver& solver, StepRep
     if (!Eigen::Map<const Vector>(problem.a.data(), n_).allFinite() ||
         !Eigen::Map<const Vector>(problem.b.data(), m_).allFinite())
         throw StepFailure(fmt::format("the forces at t = {} are not finite", state.t));
-    auto solution = solve_linear(std::move(problem), solver, report);
-    if (!solution.x.allFinite() || !solution.lambda.allFinite())
-        throw StepFailure(fmt::format("the accelerations at t = {} are not finite", state.t));
-    return solution;
+    solution = solve_linear(std::move(problem), solver, report);
+    require_finite_result();
 }
 
 }  // namespace delassus

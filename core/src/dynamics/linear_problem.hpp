@@ -20,8 +20,8 @@ struct LinearSolution {
 /// A free cone for each block of constraints.
 std::vector<Cone> free_cones(const DynamicalSystem& system);
 
-/// blocks · vector, for the blocks in which a matrix differs from the identity.
-Vector multiply_blocks(const std::vector<DiagonalBlock3>& blocks, const Vector& vector);
+/// result ← blocks · vector, for the blocks in which a matrix differs from the identity.
+void multiply_blocks(const std::vector<DiagonalBlock3>& blocks, const Vector& vector, Vector& result);
 
 /// Throws InputError unless h > 0 is finite and the state has the system's sizes.
 void require_step(const DynamicalSystem& system, const State& begin, double h, std::string_view method);
@@ -40,6 +40,8 @@ public:
 
     /// Throws StepFailure if they are not finite.
     LinearSolution at(const State& state, StepSolver& solver, StepReport& report);
+    /// The same where memory serves again. Without constraints by the system's own way, if it has one.
+    void at(const State& state, StepSolver& solver, StepReport& report, LinearSolution& solution);
 
 private:
     const DynamicalSystem& system_;

@@ -272,7 +272,7 @@ private:
         }
         if (!increment_.x.allFinite() || !increment_.lambda.allFinite()) fail("the increment is not finite");
         newton_.system_.inverse_tangent(point_.delta.data(), newton_.blocks_);
-        direction_ = multiply_blocks(newton_.blocks_, increment_.x);
+        multiply_blocks(newton_.blocks_, increment_.x, direction_);
         return true;
     }
 

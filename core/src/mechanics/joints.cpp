@@ -146,6 +146,10 @@ Joint make_joint(const JointParameters& parameters, const Placements& at, const 
             parallel();
             no_turning();
             break;
+        case JointKind::Planar:
+            joint.rows.push_back(product(r, in.axis(a, z)));
+            parallel();
+            break;
         case JointKind::PointOnPlane:
             joint.rows.push_back(product(r, in.axis(a, z)));
             break;

@@ -475,22 +475,37 @@ struct Linkage::Rank {
     }
 };
 
+// Certain rows come first: with the QR factors of theirs, Qᵀ takes the others to the space beside them, where they are
+// chosen by pivots. Rows have length one, so that pivots need no scale.
 Linkage::Rank Linkage::rank_at(const State& state, const std::vector<std::size_t>& rows, double threshold,
                                bool motions) const {
+    Rank rank;
+    std::vector<std::size_t> others;
+    for (const auto row : rows)
+        (std::binary_search(certain_.begin(), certain_.end(), row) ? rank.order : others).push_back(row);
+    const auto sure = static_cast<Eigen::Index>(rank.order.size());
+    std::vector<std::size_t> sorted = rank.order;
+    sorted.insert(sorted.end(), others.begin(), others.end());
     Values values;
-    evaluate(state, rows, values);
+    evaluate(state, sorted, values);
     const auto A = scaled(values, Metric::Length);
     const Eigen::VectorXd lengths = lengths_of_rows(A);
     const Eigen::MatrixXd columns = Eigen::MatrixXd(A).transpose() * lengths.cwiseInverse().asDiagonal();
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(columns);
-    Rank rank;
-    const auto count = std::min(columns.rows(), columns.cols());
-    rank.pivots = factor.matrixQR().diagonal().head(count).cwiseAbs();
-    if (count > 0 && rank.pivots[0] > 0.0) rank.pivots /= double(rank.pivots[0]);
-    for (Eigen::Index i = 0; i < columns.cols(); ++i)
-        rank.order.push_back(rows[static_cast<std::size_t>(factor.colsPermutation().indices()[i])]);
+    const Eigen::HouseholderQR<Eigen::MatrixXd> first(columns.leftCols(sure));
+    const Eigen::MatrixXd turned = first.householderQ().transpose() * columns.rightCols(columns.cols() - sure);
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(turned.bottomRows(columns.rows() - sure));
+    const auto count = std::min(factor.rows(), factor.cols());
+    rank.pivots.setOnes(sure + count);
+    rank.pivots.tail(count) = factor.matrixQR().diagonal().head(count).cwiseAbs();
+    if (sure == 0 && count > 0 && rank.pivots[0] > 0.0) rank.pivots /= double(rank.pivots[0]);
+    for (Eigen::Index i = 0; i < factor.cols(); ++i)
+        rank.order.push_back(others[static_cast<std::size_t>(factor.colsPermutation().indices()[i])]);
     rank.rank = static_cast<std::size_t>((rank.pivots.array() > threshold).count());
-    if (motions) rank.Q = factor.householderQ();
+    if (motions) {
+        rank.Q = first.householderQ();
+        const Eigen::MatrixXd beside = factor.householderQ();
+        rank.Q.rightCols(columns.rows() - sure) = (rank.Q.rightCols(columns.rows() - sure) * beside).eval();
+    }
     return rank;
 }
 

@@ -26,6 +26,14 @@ public:
     [[nodiscard]] double size() const { return size_; }
     [[nodiscard]] const std::string& joint_of(std::size_t row) const { return rows_[row].joint->parameters.name; }
 
+    /// These rows, which are independent, are chosen before all others. is_certain(number in the whole system).
+    template <class Predicate>
+    void take_as_certain(Predicate&& is_certain) {
+        certain_.clear();
+        for (std::size_t i = 0; i < numbers_.size(); ++i)
+            if (is_certain(numbers_[i])) certain_.push_back(i);
+    }
+
     /// The largest of a body: m and rad, or m/s and rad/s.
     struct Largest {
         double linear = 0.0, angular = 0.0;
@@ -103,7 +111,7 @@ private:
     std::vector<BodyIndex> members_, prescribed_;
     std::vector<RowOfJoint> rows_;
     std::vector<std::int32_t> numbers_;
-    std::vector<std::size_t> all_, scleronomic_;
+    std::vector<std::size_t> all_, scleronomic_, certain_;
     bool has_loops_ = false;
     std::vector<double> arms_;         // of members: the farthest joint from the mass centre, or the radius of inertia
     double size_ = 0.0, reach_ = 0.0;  // reach: largest coordinate

@@ -449,6 +449,14 @@ const BodyParameters& MultibodySystem::body(BodyIndex index) const {
     if (index == world_body) throw InputError("the world has no parameters");
     return implementation_->bodies[static_cast<std::size_t>(index)].parameters;
 }
+std::int32_t MultibodySystem::joint_count() const {
+    return static_cast<std::int32_t>(implementation_->joints.size());
+}
+const JointParameters& MultibodySystem::joint(std::int32_t index) const {
+    if (index < 0 || index >= joint_count())
+        throw InputError(fmt::format("there is no joint {}; there are {}", index, joint_count()));
+    return implementation_->joints[static_cast<std::size_t>(index)].parameters;
+}
 BodyIndex MultibodySystem::find_body(const std::string& name) const {
     const auto& bodies = implementation_->bodies;
     const auto found =

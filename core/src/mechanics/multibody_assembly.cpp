@@ -142,6 +142,21 @@ void MultibodySystem::keep_rows(const std::vector<std::int32_t>& rows) {
     self.number_rows();
 }
 
+std::vector<std::int32_t> MultibodySystem::rows_beside(const std::vector<std::int32_t>& certain,
+                                                       const State& state) const {
+    const auto& self = *implementation_;
+    self.must_be_finished();
+    const auto is_certain = [&](std::int32_t row) { return std::binary_search(certain.begin(), certain.end(), row); };
+    std::vector<std::int32_t> rows;
+    for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {
+        linkage.take_as_certain(is_certain);
+        for (const auto row : linkage.independent_rows(state))
+            if (!is_certain(linkage.numbers()[row])) rows.push_back(linkage.numbers()[row]);
+    }
+    std::sort(rows.begin(), rows.end());
+    return rows;
+}
+
 bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
     auto& self = *implementation_;
     bool renewed = false;

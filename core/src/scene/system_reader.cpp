@@ -21,6 +21,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"sleeping", [this](const YAML::Node& n) { read_sleeping(n); }},
         {"start", [this](const YAML::Node& n) { read_start(n); }},
+        {"coordinates", [this](const YAML::Node& n) { read_coordinates(n); }},
         {"integrator", [this](const YAML::Node& n) { read_integrator(n); }},
         {"solver", [this](const YAML::Node& n) { result_.solver = read_solver(source_, n); }},
         {"leave_out",
@@ -183,6 +184,13 @@ void SystemReader::build_step(const YAML::Node& place) {
                                    control_.smallest, control_.initial, control_.largest));
     result_.control = control_;
     result_.step = control_.initial;
+}
+
+void SystemReader::read_coordinates(const YAML::Node& node) {
+    const std::string name = scalar(source_, node, "coordinates");
+    if (name != "maximal" && name != "joint")
+        source_.refuse(node, fmt::format("\"coordinates\" is \"{}\"; it must be maximal or joint", name));
+    result_.coordinates = name == "joint" ? Coordinates::Joint : Coordinates::Maximal;
 }
 
 void SystemReader::read_integrator(const YAML::Node& node) {

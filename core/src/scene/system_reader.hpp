@@ -27,6 +27,7 @@ private:
     using Numbers = std::map<std::string, std::int32_t, std::less<>>;
     using ItemReader = void (SystemReader::*)(const YAML::Node& item, const Copy& copy);
 
+    void read_coordinates(const YAML::Node& node);
     void read_integrator(const YAML::Node& node);
     void read_step(const YAML::Node& node);
     void read_tolerance(const YAML::Node& node);

@@ -39,7 +39,8 @@ public:
     Planner(SceneSystem& system, const Registry& registry)
         : system_(system), registry_(registry), simulation_(system, registry), touching_(system) {
         plan_.name = system.name;
-        plan_.velocities = system.system->n();
+        const JointCoordinates* joints = simulation_.joint_coordinates();
+        plan_.velocities = joints ? joints->n() : system.system->n();
         plan_.constraints = system.system->constraint_rows();
     }
 
@@ -107,7 +108,9 @@ private:
             }
         }
         if (!moving.empty())
-            keep(counted(moving.size(), "moving body", "moving bodies"), "6 velocities each: " + some_of(moving));
+            keep(counted(moving.size(), "moving body", "moving bodies"),
+                 (simulation_.joint_coordinates() ? "placed by joint coordinates: " : "6 velocities each: ") +
+                     some_of(moving));
         if (const auto nodes = system_.system->node_count(); nodes > 0)
             keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities for each that moves");
         if (!prescribed.empty())
@@ -140,10 +143,27 @@ private:
         } else {
             leave("bilateral constraints", "the system has no joint with rows");
         }
-        if (const auto redundant = plan_.constraints - system_.system->m(); redundant > 0)
+        const JointCoordinates* joints = simulation_.joint_coordinates();
+        const std::int32_t of_trees = joints ? joints->rows_saved() : 0;
+        if (joints) {
+            std::vector<std::string> loops;
+            std::set<std::int32_t> held;
+            for (const TreeJoint& one : joints->joints()) held.insert(one.joint);
+            for (std::size_t i = 0; i < system_.joints.size(); ++i)
+                if (!held.contains(static_cast<std::int32_t>(i))) loops.push_back(system_.joints[i].name);
+            keep("joint coordinates",
+                 fmt::format("the scene asks for them: {} velocities{}", joints->n(),
+                             loops.empty() ? std::string(", no loops") : "; as rows stay " + some_of(loops)));
+            leave(fmt::format("{} of {} velocities and {} rows", joints->body_velocities() - joints->n(),
+                              joints->body_velocities(), of_trees),
+                  "joints of trees hold by their coordinates");
+        }
+        if (const auto redundant = plan_.constraints - of_trees - system_.system->m(); redundant > 0)
             leave(counted(static_cast<std::size_t>(redundant), "row of joints and motors", "rows of joints and motors"),
-                  fmt::format("others imply them in every configuration, their reactions are reported as 0: of {}",
-                              some_of(system_.system->joints_with_rows_left_out())));
+                  joints ? std::string("others imply them in every configuration")
+                         : fmt::format(
+                               "others imply them in every configuration, their reactions are reported as 0: of {}",
+                               some_of(system_.system->joints_with_rows_left_out())));
         if (const std::string start = simulation_.start(); !start.empty())
             keep("assembly at the start", fmt::format("{} to fit joints and motors", start));
         if (has_limits()) {
@@ -226,7 +246,9 @@ private:
         } else if (sparse_) {
             keep("a sparse H", "forces or constraints couple bodies in it; it is factorised");
         } else {
-            leave("factorisation of H", "no stiffness couples bodies: H is diagonal by blocks of one body");
+            leave("factorisation of H", simulation_.joint_coordinates()
+                                            ? "H is diagonal by blocks, or accelerations follow from link to link"
+                                            : "no stiffness couples bodies: H is diagonal by blocks of one body");
         }
     }
 

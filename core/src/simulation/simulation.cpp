@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
@@ -90,35 +91,48 @@ std::string describe(const Assembly& change) {
 Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
     if (!system.leave_out) solver_->leave_nothing_out();
-    try {
+    const bool in_joints = system.coordinates == Coordinates::Joint;
+    const auto with_name = [&](const auto& make) {
+        try {
+            make();
+        } catch (const InputError& error) {
+            throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));
+        } catch (const Unsupported& error) {
+            throw Unsupported(fmt::format("system \"{}\": {}", system.name, error.what()));
+        }
+    };
+    with_name([&] {
         // Checked here without loading the plugin, which may never be needed.
         SolverConfig solver = system.solver;
         if (solver.name.empty()) solver.name = auto_name;
         check_solver(registry, solver);
         require_law(system, registry, solver_->law());
         assembly_ = system.system->assemble();
-        make_method();
+        if (!in_joints) make_method();
         if (system.sleeping) {
+            if (in_joints)
+                throw Unsupported("bodies cannot sleep in joint coordinates; remove \"sleeping\" or \"coordinates\"");
             require_sleeping(system);
             if (control_)
                 throw InputError("bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
             sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
             solver_->resting = sleeping_.get();
         }
-    } catch (const InputError& error) {
-        throw InputError(fmt::format("system \"{}\": {}", system.name, error.what()));
-    } catch (const Unsupported& error) {
-        throw Unsupported(fmt::format("system \"{}\": {}", system.name, error.what()));
-    }
+    });
     if (system.equilibrium) {
         equilibrium_ = std::make_shared<const Equilibrium>(find_equilibrium(system, registry));
         system.system->set_start(equilibrium_->state);
     }
-    now_.state = system.system->initial_state();
-    system.system->set_turns(now_.state, {});
+    if (in_joints)
+        with_name([&] {
+            joint_ = std::make_unique<JointCoordinates>(*system.system);
+            make_method();
+        });
+    now_.state = dynamics().initial_state();
+    system.system->set_turns(bodies_at(now_.state, bodies_), {});
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
-    measure(now_.state, now_.step);
+    measure(state(), now_.step);
     now_.totals.start_energy = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
     now_.totals.worst_drift = record_.drift;
@@ -129,9 +143,19 @@ Simulation::Simulation(Simulation&&) noexcept = default;
 
 void Simulation::make_method() {
     control_.reset();
-    timestepper_ = make_timestepper(system_->integrator, *system_->system, system_->integrator_options);
-    if (system_->control)
-        control_ = std::make_unique<AdaptiveStepping>(*system_->system, *timestepper_, *system_->control);
+    timestepper_ = make_timestepper(system_->integrator, dynamics(), system_->integrator_options);
+    if (system_->control) control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
+}
+
+DynamicalSystem& Simulation::dynamics() {
+    if (joint_) return *joint_;
+    return *system_->system;
+}
+
+const State& Simulation::bodies_at(const State& state, State& memory) const {
+    if (!joint_) return state;
+    joint_->bodies_of(state, memory);
+    return memory;
 }
 
 void Simulation::renew_rows(State& state) {
@@ -139,6 +163,15 @@ void Simulation::renew_rows(State& state) {
     constexpr std::int64_t every = 10;
     constexpr double drifted = 1e-4;
     MultibodySystem& mechanics = *system_->system;
+    if (joint_) {
+        /// Of rows that are implied, m or rad; as in maximal coordinates.
+        constexpr double most_drift = 1e-3;
+        if (record_.drift > most_drift && joint_->drift_of_rows_left_out(state) > most_drift)
+            throw StepFailure(
+                "rows of a loop that others implied at the start no longer hold; in joint coordinates they are not "
+                "chosen anew: take \"coordinates: maximal\"");
+        return;
+    }
     if (mechanics.m() == mechanics.constraint_rows() || (now_.step % every != 0 && record_.drift < drifted)) return;
     if (!mechanics.renew_rows(state, now_.step)) return;
     const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
@@ -232,7 +265,7 @@ const StepRecord& Simulation::step() {
         require_usable(solver_->effort());
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
-        measure(next, now_.step + 1);
+        measure(bodies_at(next, next_bodies_), now_.step + 1);
         judge(taken, judged);
     } catch (const Unsupported& error) {
         undo();
@@ -250,7 +283,8 @@ const StepRecord& Simulation::step() {
     const StepReport& report = taken.step;
     const std::string place = where();
     now_.state = std::move(next);
-    system_->system->follow(now_.state);
+    std::swap(bodies_, next_bodies_);
+    system_->system->follow(state());
     now_.totals = std::move(judged);
     ++now_.step;
 
@@ -285,6 +319,9 @@ const StepRecord& Simulation::step() {
     std::swap(report_, next_report_);
     if (const MultibodySystem& mechanics = *system_->system; mechanics.m() < mechanics.constraint_rows())
         report_.step.multipliers = mechanics.all_multipliers(report_.step.multipliers);
+    if (joint_)
+        for (const auto row : joint_->rows_of_trees())
+            report_.step.multipliers[static_cast<std::size_t>(row)] = std::numeric_limits<double>::quiet_NaN();
     return record_;
 }
 
@@ -352,7 +389,7 @@ SimulationState Simulation::save() const {
             ++next;
         else
             result.rows_left_out.push_back(row);
-    result.turns = mechanics.turns(now_.state);
+    result.turns = mechanics.turns(state());
     result.memory = timestepper_->save();
     if (control_) result.control = control_->save();
     if (sleeping_) result.sleeping = sleeping_->save();
@@ -376,7 +413,7 @@ void Simulation::load(SimulationState state) {
         throw InputError(fmt::format("the checkpoint of system \"{}\" leaves out rows that the system does not have",
                                      system_->name));
     system_->system->keep_rows(kept);
-    system_->system->set_turns(state.state, state.turns);
+    system_->system->set_turns(bodies_at(state.state, bodies_), state.turns);
     make_method();
     timestepper_->load(state.memory);
     if (control_) control_->load(state.control);
@@ -389,7 +426,7 @@ void Simulation::load(SimulationState state) {
     now_.sleeping.clear();
     record_ = {};
     report_ = {};
-    measure(now_.state, now_.step);
+    measure(this->state(), now_.step);
 }
 
 }  // namespace delassus

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/explicit_method.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace delassus {
+
+ExplicitMethod::ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau)
+    : system_(system),
+      tableau_(std::move(tableau)),
+      accelerations_(system),
+      n_(system.n()),
+      m_(system.m()),
+      cones_(free_cones(system)) {
+    u_.assign(tableau_.b.size(), Vector::Zero(n_));
+    v_ = u_;
+    increment_.setZero(n_);
+    stage_v_.setZero(n_);
+    constraint_.resize(static_cast<std::size_t>(m_));
+}
+
+void ExplicitMethod::restart() {
+    known_ = false;
+    multipliers_.clear();
+}
+
+EmbeddedError ExplicitMethod::embedded_error() const {
+    return {{error_q_.data(), static_cast<std::size_t>(error_q_.size())},
+            {error_v_.data(), static_cast<std::size_t>(error_v_.size())}};
+}
+
+std::vector<double> ExplicitMethod::save() const {
+    if (!known_) return {};
+    std::vector<double> memory = {known_at_.t};
+    memory.insert(memory.end(), known_at_.q.begin(), known_at_.q.end());
+    memory.insert(memory.end(), known_at_.v.begin(), known_at_.v.end());
+    memory.insert(memory.end(), last_.x.begin(), last_.x.end());
+    memory.insert(memory.end(), last_.lambda.begin(), last_.lambda.end());
+    return memory;
+}
+
+void ExplicitMethod::load(const std::vector<double>& memory) {
+    restart();
+    if (memory.empty()) return;
+    const auto q = static_cast<std::ptrdiff_t>(system_.position_size());
+    if (static_cast<std::ptrdiff_t>(memory.size()) != 1 + q + 2 * n_ + m_)
+        throw InputError(fmt::format("the memory of {} is of another system", tableau_.name));
+    auto at = memory.begin() + 1;
+    known_at_.t = memory.front();
+    known_at_.q.assign(at, at + q);
+    at += q;
+    known_at_.v.assign(at, at + n_);
+    at += n_;
+    last_.x = Eigen::Map<const Vector>(&*memory.begin() + (at - memory.begin()), n_);
+    at += n_;
+    last_.lambda.resize(m_);
+    std::copy(at, memory.end(), last_.lambda.data());
+    known_ = true;
+}
+
+/// last_ ← the accelerations at the state, if they are not known from the end of the last step.
+void ExplicitMethod::begin(const State& state, StepSolver& solver, StepReport& report) {
+    if (known_ && known_at_.t == state.t && known_at_.q == state.q && known_at_.v == state.v) return;
+    accelerations_.at(state, solver, report, last_);
+}
+
+void ExplicitMethod::take_step(State& state, double h, StepSolver& solver, StepReport& report) {
+    require_step(system_, state, h, tableau_.name);
+    const Eigen::Map<const Vector> v(state.v.data(), n_);
+    const auto sum = [&](std::span<const double> factors, const std::vector<Vector>& slopes, Vector& result) {
+        for (std::size_t j = 0; j < factors.size(); ++j)
+            if (factors[j] != 0.0) result.noalias() += (h * factors[j]) * slopes[j];
+    };
+    begin(state, solver, report);
+    u_[0] = v;
+    v_[0] = last_.x;
+    stage_.q.resize(state.q.size());
+    stage_.v.resize(state.v.size());
+    for (std::size_t i = 1; i < tableau_.b.size(); ++i) {
+        const auto row = tableau_.a.subspan(i * (i - 1) / 2, i);
+        increment_.setZero(n_);
+        sum(row, u_, increment_);
+        stage_v_ = v;
+        sum(row, v_, stage_v_);
+        system_.increment(state.q.data(), increment_.data(), stage_.q.data());
+        std::copy(stage_v_.begin(), stage_v_.end(), stage_.v.begin());
+        stage_.t = state.t + tableau_.c[i] * h;
+        system_.inverse_tangent(increment_.data(), blocks_);
+        multiply_blocks(blocks_, stage_v_, u_[i]);
+        accelerations_.at(stage_, solver, report, solution_);
+        v_[i] = solution_.x;
+    }
+    increment_.setZero(n_);
+    sum(tableau_.b, u_, increment_);
+    stage_v_ = v;
+    sum(tableau_.b, v_, stage_v_);
+    end_.q.resize(state.q.size());
+    end_.v.resize(state.v.size());
+    system_.increment(state.q.data(), increment_.data(), end_.q.data());
+    std::copy(stage_v_.begin(), stage_v_.end(), end_.v.begin());
+    end_.t = state.t + h;
+    require_finite(state, end_, h, tableau_.name);
+    if (m_ > 0) {
+        project_positions(state, end_, h, solver, report);
+        project_velocities(end_, solver, report);
+        require_finite(state, end_, h, tableau_.name);
+    }
+    known_ = m_ > 0 || !tableau_.error.empty();
+    if (known_) {
+        accelerations_.at(end_, solver, report, last_);
+        known_at_ = end_;
+        multipliers_.assign(last_.lambda.begin(), last_.lambda.end());
+        report.multipliers = multipliers_;
+    }
+    if (!tableau_.error.empty()) {
+        error_q_.setZero(n_);
+        error_v_.setZero(n_);
+        sum(tableau_.error.first(tableau_.b.size()), u_, error_q_);
+        sum(tableau_.error.first(tableau_.b.size()), v_, error_v_);
+        system_.inverse_tangent(increment_.data(), blocks_);
+        stage_v_ = Eigen::Map<const Vector>(end_.v.data(), n_);
+        multiply_blocks(blocks_, stage_v_, u_[0]);
+        error_q_ += h * tableau_.error.back() * u_[0];
+        error_v_ += h * tableau_.error.back() * last_.x;
+    }
+    std::swap(state, end_);
+}
+
+void ExplicitMethod::solve_nearest(const State& state, const std::vector<double>& b, StepSolver& solver,
+                                   StepReport& report) {
+    Problem problem;
+    M_.begin(n_, n_);
+    system_.add_mass(state, 1.0, M_);
+    problem.H = M_.finish();
+    D_.begin(m_, n_);
+    system_.add_constraint_jacobian(state, 0, D_);
+    problem.D = D_.finish();
+    problem.a.assign(static_cast<std::size_t>(n_), 0.0);
+    problem.b = b;
+    problem.cones = cones_;
+    solution_ = solve_linear(std::move(problem), solver, report);
+}
+
+namespace {
+
+double largest(const std::vector<double>& values) {
+    double most = 0.0;
+    for (const double value : values) most = std::max(most, std::abs(value));
+    return most;
+}
+
+}  // namespace
+
+void ExplicitMethod::project_positions(const State& begin, State& end, double h, StepSolver& solver,
+                                       StepReport& report) {
+    constexpr int most_iterations = 10;
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    const double rounding = 16.0 * epsilon * (1.0 + largest(end.q));
+    double last = std::numeric_limits<double>::infinity();
+    for (int i = 0;; ++i) {
+        system_.constraint(end, constraint_.data());
+        const double off = largest(constraint_);
+        // Below 1e-10 what no longer falls is rounding.
+        if (off <= rounding || (off <= 1e-10 && off > 0.25 * last)) return;
+        if (!(off < last) || i == most_iterations)
+            throw StepFailure(fmt::format(
+                "{} cannot take the step from t = {:.9g} with h = {:.9g}: its end is too far from where the "
+                "constraints hold (off by {:.3g}); take shorter steps",
+                tableau_.name, begin.t, h, off));
+        last = off;
+        solve_nearest(end, constraint_, solver, report);
+        system_.increment(end.q.data(), solution_.x.data(), end.q.data());
+    }
+}
+
+void ExplicitMethod::project_velocities(State& end, StepSolver& solver, StepReport& report) {
+    system_.constraint_rate(end, constraint_.data());
+    D_.begin(m_, n_);
+    system_.add_constraint_jacobian(end, 0, D_);
+    D_.finish().multiply_add(1.0, end.v.data(), constraint_.data());
+    solve_nearest(end, constraint_, solver, report);
+    for (std::int32_t i = 0; i < n_; ++i) end.v[static_cast<std::size_t>(i)] += solution_.x[i];
+}
+
+}  // namespace delassus

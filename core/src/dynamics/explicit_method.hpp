@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Explicit Runge–Kutta methods on the Lie group, for systems with and without bilateral constraints (internal).
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "delassus/timestepper.hpp"
+#include "dynamics/linear_problem.hpp"
+
+namespace delassus {
+
+/// Coefficients of an explicit method of s stages.
+struct ButcherTableau {
+    std::string name;
+    int order = 1;
+    std::span<const double> c;  ///< s, the first is 0
+    std::span<const double> a;  ///< the rows of the lower triangle, from the second stage on: s (s − 1)/2
+    std::span<const double> b;  ///< s
+    /// b less that of an embedded method of order − 1, over s + 1 stages of which the last is the beginning of the next
+    /// step; empty: there is none.
+    std::span<const double> error;
+};
+
+// Within a step the position is q(t) = q_n ∘ exp(u(t)) with u(t_n) = 0. q̇ = v means that q(t + dt) = q(t) ∘ exp(v dt),
+// and as exp(u + T⁻¹(u) ε) = exp(u) ∘ exp(ε) to first order,
+//
+//     u̇ = T⁻¹(u) v,      v̇ = M(q_n ∘ exp(u))⁻¹ f(q_n ∘ exp(u), v, t)
+//
+// This is an ordinary differential equation for (u, v) in a vector space: any Runge–Kutta method keeps its order on it
+// (Munthe-Kaas, Applied Numerical Mathematics 29, 1999). Without T⁻¹, that is with the sums of velocities of the seed's
+// remark after eq. 54, it would be 2 where rotations do not commute.
+//
+// With constraints v̇ is that of the saddle point
+//
+//     M v̇ − C_qᵀ λ = f,      C_q v̇ = −(C̈ at v̇ = 0)
+//
+// which is an ordinary differential equation too, and has C = Ċ = 0 among its solutions. The method leaves them by its
+// local error, and that would grow by itself. So each step ends with the nearest positions and velocities, in the norm
+// of the mass at the end, at which they hold:
+//
+//     M x − C_qᵀ μ = 0,   C_q x = −C,        q ← q ∘ exp(x), until C is rounding
+//     M x − C_qᵀ μ = 0,   C_q x = −(C_q v + C_t),   v ← v + x
+//
+// These changes are of the size of the local error, so that the order stays (Hairer and Wanner, Solving Ordinary
+// Differential Equations II, sec. VII.2).
+class ExplicitMethod : public Timestepper {
+public:
+    /// system outlives it; the tableau's arrays too.
+    ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau);
+
+    void restart() override;
+    [[nodiscard]] int order() const override { return tableau_.order; }
+    [[nodiscard]] bool has_embedded_error() const override { return !tableau_.error.empty(); }
+    [[nodiscard]] EmbeddedError embedded_error() const override;
+    // What is known at the end of the last step: the state, its accelerations and multipliers.
+    [[nodiscard]] std::vector<double> save() const override;
+    void load(const std::vector<double>& memory) override;
+
+private:
+    void take_step(State& state, double h, StepSolver& solver, StepReport& report) override;
+    void begin(const State& state, StepSolver& solver, StepReport& report);
+    void project_positions(const State& begin, State& end, double h, StepSolver& solver, StepReport& report);
+    void project_velocities(State& end, StepSolver& solver, StepReport& report);
+    /// solution_ ← of M x − Dᵀ μ = 0, D x + b = 0, M and D at the state.
+    void solve_nearest(const State& state, const std::vector<double>& b, StepSolver& solver, StepReport& report);
+
+    DynamicalSystem& system_;
+    ButcherTableau tableau_;
+    Accelerations accelerations_;
+    std::int32_t n_, m_;
+    std::vector<Cone> cones_;
+    bool known_ = false;
+    State known_at_;             // where `last_` was found
+    LinearSolution last_;        // accelerations there
+    std::vector<Vector> u_, v_;  // slopes of the stages
+    Vector increment_, stage_v_, error_q_, error_v_;
+    State stage_, end_;
+    std::vector<DiagonalBlock3> blocks_;
+    LinearSolution solution_;
+    std::vector<double> constraint_;
+    MatrixAssembler M_, D_;
+};
+
+}  // namespace delassus

@@ -1,0 +1,538 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "delassus/joint_coordinates.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "delassus/error.hpp"
+#include "mechanics/kinematic_tree.hpp"
+#include "mechanics/tree_derivatives.hpp"
+
+namespace delassus {
+
+using mechanics::Link;
+using mechanics::LinkJoint;
+using mechanics::LinkMotion;
+using mechanics::Matrix3d;
+using mechanics::Quaterniond;
+using mechanics::Vector3d;
+using mechanics::Vector6;
+
+struct JointCoordinates::Implementation {
+    explicit Implementation(MultibodySystem& system)
+        : bodies(system), tree(system), derivatives(tree, [this](std::size_t k) { return spins_alone(k); }) {
+        const auto n = static_cast<std::size_t>(system.n());
+        state.q.assign(static_cast<std::size_t>(system.position_size()), 0.0);
+        state.v.assign(n, 0.0);
+        force.assign(n, 0.0);
+        link_at.assign(n / 6, 0);
+        for (std::size_t k = 1; k < tree.links().size(); ++k) {
+            link_at[static_cast<std::size_t>(tree.links()[k].body_column / 6)] = k;
+            turns = turns || !spins_alone(k);
+        }
+    }
+
+    MultibodySystem& bodies;
+    mechanics::KinematicTree tree;
+    mechanics::TreeDerivatives derivatives;
+    State start;
+    std::vector<std::int32_t> held;           // rows that the trees hold
+    std::vector<std::int32_t> rows_left_out;  // that others imply
+    bool turns = false;                       // a link with a joint, whose forces depend on the state
+    std::vector<std::size_t> link_at;         // by the body's column / 6
+    // Work space of the call that runs:
+    State state;  // of the bodies
+    std::vector<double> force, rates, all_rows;
+    MatrixAssembler matrix, rows;
+    UnilateralRows body_rows;
+    std::vector<FreeSpin> body_spins;
+    struct Loaded {
+        std::size_t link;
+        mechanics::Spatial wrench;
+    };
+    std::vector<Loaded> loaded;
+    struct Entry {
+        std::int32_t column;
+        double value;
+    };
+    std::vector<Entry> entries;
+    std::vector<std::pair<std::int32_t, Vector6>> way, other_way;
+
+    /// A body that a free joint holds and that carries none: its gyroscopic torque is that of free_spins().
+    [[nodiscard]] bool spins_alone(std::size_t k) const {
+        return tree.links()[k].kind == LinkJoint::Free && tree.links()[k].leaf;
+    }
+
+    void place(const State& at) {
+        tree.place(at.q.data(), at.v.data());
+        tree.write(state);
+        state.t = at.t;
+    }
+
+    /// entries ← those of a row, in ascending columns, from its entries in columns of bodies: columns ascend there. A
+    /// row that only what links do to each other enters ends where their ways to the ground meet.
+    void project_row(std::span<const std::int32_t> column, std::span<const double> value) {
+        constexpr double rounding = 1e-12;
+        loaded.clear();
+        entries.clear();
+        for (std::size_t e = 0; e < column.size();) {
+            const std::int32_t first = column[e] / 6 * 6;
+            Vector6 g = Vector6::Zero();
+            for (; e < column.size() && column[e] < first + 6; ++e) g[column[e] - first] += value[e];
+            const std::size_t link = link_at[static_cast<std::size_t>(first / 6)];
+            loaded.push_back({link, {tree.motion(link).A * g.tail<3>(), g.head<3>()}});
+        }
+        std::sort(loaded.begin(), loaded.end(), [](const Loaded& a, const Loaded& b) { return a.link < b.link; });
+        while (!loaded.empty()) {
+            const auto [k, wrench] = loaded.back();
+            loaded.pop_back();
+            const Link& link = tree.links()[k];
+            const LinkMotion& motion = tree.motion(k);
+            for (std::int32_t j = link.freedoms; j-- > 0;)
+                entries.push_back({link.column + j, motion.angular.col(j).dot(wrench.angular) +
+                                                        motion.linear.col(j).dot(wrench.linear)});
+            if (link.parent == 0) continue;
+            const auto parent = static_cast<std::size_t>(link.parent);
+            const mechanics::Spatial moved{wrench.angular + motion.d.cross(wrench.linear), wrench.linear};
+            auto at = std::lower_bound(loaded.begin(), loaded.end(), parent,
+                                       [](const Loaded& one, std::size_t wanted) { return one.link < wanted; });
+            if (at == loaded.end() || at->link != parent) {
+                loaded.insert(at, {parent, moved});
+                continue;
+            }
+            const double torque = at->wrench.angular.norm() + moved.angular.norm();
+            const double push = at->wrench.linear.norm() + moved.linear.norm();
+            at->wrench.angular += moved.angular;
+            at->wrench.linear += moved.linear;
+            if (at->wrench.angular.norm() <= rounding * torque && at->wrench.linear.norm() <= rounding * push)
+                loaded.erase(at);
+        }
+        std::reverse(entries.begin(), entries.end());
+    }
+
+    /// The columns of J of a link's body, (v in the world, ω in the frame of the body), on its way to the ground.
+    void columns_of(std::size_t k, std::vector<std::pair<std::int32_t, Vector6>>& columns) const {
+        columns.clear();
+        const LinkMotion& body = tree.motion(k);
+        Vector3d arm = Vector3d::Zero();  // from the link on the way
+        for (std::size_t at = k; at > 0; at = static_cast<std::size_t>(tree.links()[at].parent)) {
+            const Link& link = tree.links()[at];
+            const LinkMotion& motion = tree.motion(at);
+            for (std::int32_t j = 0; j < link.freedoms; ++j) {
+                const Vector3d axis = motion.angular.col(j);
+                Vector6 column;
+                column << motion.linear.col(j) + axis.cross(arm), body.A.transpose() * axis;
+                columns.emplace_back(link.column + j, column);
+            }
+            arm += motion.d;
+        }
+    }
+
+    /// H += factor · Jᵀ A J, or Jᵀ A ∂(J u)/∂q; A: of the bodies.
+    void project_matrix(const SparseMatrix& A, double factor, bool along_velocities, MatrixAssembler& H) {
+        const auto blocks = static_cast<std::size_t>(A.rows / 6);
+        std::vector<std::int32_t> columns;
+        for (std::size_t row = 0; row < blocks; ++row) {
+            columns.clear();
+            const auto begin = static_cast<std::size_t>(A.row_start[6 * row]),
+                       end = static_cast<std::size_t>(A.row_start[6 * row + 6]);
+            for (std::size_t e = begin; e < end; ++e) columns.push_back(A.column[e] / 6);
+            std::sort(columns.begin(), columns.end());
+            columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+            if (columns.empty()) continue;
+            columns_of(link_at[row], way);
+            for (const std::int32_t column : columns) {
+                mechanics::Matrix6 block = mechanics::Matrix6::Zero();
+                for (std::size_t i = 0; i < 6; ++i)
+                    for (auto e = static_cast<std::size_t>(A.row_start[6 * row + i]);
+                         e < static_cast<std::size_t>(A.row_start[6 * row + i + 1]); ++e)
+                        if (A.column[e] / 6 == column)
+                            block(static_cast<Eigen::Index>(i), A.column[e] % 6) += A.value[e];
+                const std::size_t other = link_at[static_cast<std::size_t>(column)];
+                columns_of(other, other_way);
+                for (auto& [j, J] : other_way) {
+                    const Vector6 product = block * (along_velocities ? derivatives.turned_velocity(other, j) : J);
+                    for (const auto& [i, own] : way) H.add(i, j, factor * own.dot(product));
+                }
+            }
+        }
+    }
+
+    /// What the bodies' add_force() has but for weight and gyroscopic torques, which are the recursion's.
+    const std::vector<double>& forces_beside_weight() {
+        force.assign(force.size(), 0.0);
+        bodies.add_force(state, 1.0, force.data());
+        const Vector3d gravity(bodies.gravity().data());
+        for (std::size_t k = 1; k < tree.links().size(); ++k) {
+            const Link& link = tree.links()[k];
+            Eigen::Map<Vector3d> push(force.data() + link.body_column), torque(force.data() + link.body_column + 3);
+            const Vector3d omega = tree.motion(k).A.transpose() * tree.motion(k).omega;
+            push -= link.mass * gravity;
+            torque += omega.cross(link.inertia * omega);
+        }
+        return force;
+    }
+
+    [[nodiscard]] auto adder(double factor, MatrixAssembler& H) const {
+        return
+            [factor, &H](std::int32_t row, std::int32_t column, double value) { H.add(row, column, factor * value); };
+    }
+};
+
+JointCoordinates::JointCoordinates(MultibodySystem& bodies)
+    : implementation_(std::make_unique<Implementation>(bodies)) {
+    auto& self = *implementation_;
+    const State start = bodies.initial_state();
+    auto& held = self.held;
+    for (const Link& link : self.tree.links()) {
+        if (link.joint < 0) continue;
+        const auto [first, count] = bodies.joint_rows(link.joint);
+        const std::int32_t own = 6 - link.freedoms;  // what motors add comes after them
+        for (std::int32_t row = first; row < first + std::min(own, count); ++row) held.push_back(row);
+    }
+    std::sort(held.begin(), held.end());
+    const std::vector<std::int32_t> kept = bodies.rows_beside(held, start);
+    bodies.keep_rows(kept);
+    for (std::int32_t row = 0; row < bodies.constraint_rows(); ++row)
+        if (!std::binary_search(kept.begin(), kept.end(), row) && !std::binary_search(held.begin(), held.end(), row))
+            self.rows_left_out.push_back(row);
+    self.start = coordinates_of(start);
+}
+
+JointCoordinates::~JointCoordinates() = default;
+
+// ---- Reading ----
+
+const MultibodySystem& JointCoordinates::bodies() const {
+    return implementation_->bodies;
+}
+
+std::vector<TreeJoint> JointCoordinates::joints() const {
+    const auto& links = implementation_->tree.links();
+    std::vector<TreeJoint> joints;
+    for (std::size_t k = 1; k < links.size(); ++k) {
+        const Link& link = links[k];
+        joints.push_back({link.joint, link.body, links[static_cast<std::size_t>(link.parent)].body, link.position,
+                          link.coordinates, link.column, link.freedoms});
+    }
+    return joints;
+}
+
+const std::vector<std::int32_t>& JointCoordinates::rows_of_trees() const {
+    return implementation_->held;
+}
+std::int32_t JointCoordinates::body_velocities() const {
+    return implementation_->bodies.n();
+}
+
+double JointCoordinates::drift_of_rows_left_out(const State& state) const {
+    auto& self = *implementation_;
+    if (self.rows_left_out.empty()) return 0.0;
+    self.place(state);
+    self.all_rows.resize(static_cast<std::size_t>(self.bodies.constraint_rows()));
+    self.bodies.all_constraints(self.state, self.all_rows.data());
+    double drift = 0.0;
+    for (const auto row : self.rows_left_out)
+        drift = std::max(drift, std::abs(self.all_rows[static_cast<std::size_t>(row)]));
+    return drift;
+}
+
+State JointCoordinates::bodies_of(const State& state) const {
+    State result;
+    bodies_of(state, result);
+    return result;
+}
+
+void JointCoordinates::bodies_of(const State& state, State& result) const {
+    auto& self = *implementation_;
+    result.q.resize(self.state.q.size());
+    result.v.resize(self.state.v.size());
+    result.t = state.t;
+    self.tree.place(state.q.data(), state.v.data());
+    self.tree.write(result);
+}
+
+State JointCoordinates::coordinates_of(const State& bodies) const {
+    State state;
+    implementation_->tree.read(bodies, state);
+    return state;
+}
+
+// ---- Sizes and the group ----
+
+std::int32_t JointCoordinates::n() const {
+    return implementation_->tree.n();
+}
+std::int32_t JointCoordinates::position_size() const {
+    return implementation_->tree.position_size();
+}
+std::vector<std::int32_t> JointCoordinates::constraint_blocks() const {
+    return implementation_->bodies.constraint_blocks();
+}
+State JointCoordinates::initial_state() const {
+    return implementation_->start;
+}
+
+namespace {
+
+/// Visits the links: visit(link, number of plain coordinates, whether a quaternion follows them).
+template <class Visitor>
+void for_each_coordinate(const mechanics::KinematicTree& tree, Visitor&& visit) {
+    for (std::size_t k = 1; k < tree.links().size(); ++k) {
+        const Link& link = tree.links()[k];
+        const bool turns = link.coordinates > link.freedoms;
+        visit(link, turns ? link.freedoms - 3 : link.freedoms, turns);
+    }
+}
+
+Quaterniond quaternion_of(const double* q) {
+    return {q[0], q[1], q[2], q[3]};
+}
+
+}  // namespace
+
+void JointCoordinates::increment(const double* q, const double* delta, double* result) const {
+    for_each_coordinate(implementation_->tree, [&](const Link& link, std::int32_t plain, bool turns) {
+        const double *from = q + link.position, *by = delta + link.column;
+        double* to = result + link.position;
+        const std::array<double, 4> old =
+            turns ? std::array<double, 4>{from[plain], from[plain + 1], from[plain + 2], from[plain + 3]}
+                  : std::array<double, 4>{};
+        for (std::int32_t i = 0; i < plain; ++i) to[i] = from[i] + by[i];
+        if (!turns) return;
+        const Quaterniond turned =
+            mechanics::rotated(quaternion_of(old.data()), Eigen::Map<const Vector3d>(by + plain));
+        to[plain] = turned.w();
+        to[plain + 1] = turned.x();
+        to[plain + 2] = turned.y();
+        to[plain + 3] = turned.z();
+    });
+}
+
+void JointCoordinates::difference(const double* from, const double* to, double* delta) const {
+    for_each_coordinate(implementation_->tree, [&](const Link& link, std::int32_t plain, bool turns) {
+        const double *a = from + link.position, *b = to + link.position;
+        double* by = delta + link.column;
+        for (std::int32_t i = 0; i < plain; ++i) by[i] = b[i] - a[i];
+        if (!turns) return;
+        Eigen::Map<Vector3d> turn(by + plain);
+        turn = mechanics::logarithm(quaternion_of(a + plain).conjugate() * quaternion_of(b + plain));
+    });
+}
+
+void JointCoordinates::inverse_tangent(const double* delta, std::vector<DiagonalBlock3>& blocks) const {
+    blocks.clear();
+    for_each_coordinate(implementation_->tree, [&](const Link& link, std::int32_t plain, bool turns) {
+        if (!turns) return;
+        DiagonalBlock3& block = blocks.emplace_back();
+        block.first = link.column + plain;
+        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> value(block.value);
+        value = mechanics::inverse_tangent_of(Eigen::Map<const Vector3d>(delta + block.first));
+    });
+}
+
+// ---- Forces ----
+
+void JointCoordinates::add_mass(const State& state, double factor, MatrixAssembler& M) const {
+    auto& self = *implementation_;
+    self.tree.place(state.q.data(), nullptr);
+    self.tree.add_mass(factor, M);
+}
+
+void JointCoordinates::multiply_mass(const State& state, double factor, const double* x, double* result) const {
+    auto& self = *implementation_;
+    self.tree.place(state.q.data(), nullptr);
+    self.tree.multiply_mass(factor, x, result);
+}
+
+void JointCoordinates::add_force(const State& state, double factor, double* result) const {
+    auto& self = *implementation_;
+    self.place(state);
+    std::fill(self.force.begin(), self.force.end(), 0.0);
+    self.bodies.add_force(self.state, 1.0, self.force.data());
+    self.tree.project_with_bias(self.force.data(), factor, result);
+}
+
+bool JointCoordinates::accelerate(const State& state, double* v_dot) const {
+    auto& self = *implementation_;
+    self.place(state);
+    std::fill(self.force.begin(), self.force.end(), 0.0);
+    self.bodies.add_force(self.state, 1.0, self.force.data());
+    self.tree.accelerate(self.force.data(), v_dot);
+    return true;
+}
+
+void JointCoordinates::add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
+    auto& self = *implementation_;
+    self.place(state);
+    const std::int32_t n = self.bodies.n();
+    const bool forces = self.bodies.has_stiffness(), exact = tangent == Tangent::Exact;
+    if (exact) self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
+    if (forces) {
+        self.matrix.begin(n, n);
+        self.bodies.add_stiffness(self.state, 1.0, tangent, self.matrix);
+        self.project_matrix(self.matrix.finish(), factor, false, H);
+    }
+    if (!exact || !self.turns) return;
+    if (forces) {
+        self.matrix.begin(n, n);
+        self.bodies.add_damping(self.state, 1.0, tangent, self.matrix);
+        self.project_matrix(self.matrix.finish(), factor, true, H);
+        self.derivatives.geometry(self.forces_beside_weight().data(), self.adder(-factor, H));
+    }
+    self.derivatives.positions(self.adder(factor, H));
+}
+
+void JointCoordinates::add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
+    auto& self = *implementation_;
+    self.place(state);
+    const std::int32_t n = self.bodies.n();
+    if (self.bodies.has_stiffness()) {
+        self.matrix.begin(n, n);
+        self.bodies.add_damping(self.state, 1.0, tangent, self.matrix);
+        self.project_matrix(self.matrix.finish(), factor, false, H);
+    }
+    if (tangent != Tangent::Exact || !self.turns) return;
+    self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
+    self.derivatives.rates(self.adder(factor, H));
+}
+
+void JointCoordinates::add_gyroscopic_damping(const State& state, double factor, Tangent tangent,
+                                              MatrixAssembler& H) const {
+    auto& self = *implementation_;
+    self.place(state);
+    const std::int32_t n = self.bodies.n();
+    self.matrix.begin(n, n);
+    self.bodies.add_gyroscopic_damping(self.state, factor, tangent, self.matrix);
+    const SparseMatrix& R = self.matrix.finish();
+    for (std::int32_t row = 0; row < n; ++row) {
+        const Link& link = self.tree.links()[self.link_at[static_cast<std::size_t>(row / 6)]];
+        if (link.kind != LinkJoint::Free || !link.leaf) continue;
+        for (auto e = R.row_start[static_cast<std::size_t>(row)]; e < R.row_start[static_cast<std::size_t>(row) + 1];
+             ++e)
+            H.add(link.column + row % 6, link.column + R.column[static_cast<std::size_t>(e)] % 6,
+                  R.value[static_cast<std::size_t>(e)]);
+    }
+}
+
+void JointCoordinates::free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const {
+    auto& self = *implementation_;
+    spins.clear();
+    self.place(state);
+    self.bodies.free_spins(self.state, h, self.body_spins);
+    for (FreeSpin spin : self.body_spins) {
+        const std::size_t k = self.link_at[static_cast<std::size_t>(spin.column / 6)];
+        if (!self.spins_alone(k)) continue;
+        spin.column = self.tree.links()[k].column + 3;
+        spins.push_back(spin);
+    }
+}
+
+void JointCoordinates::add_inertial_stiffness(const State& state, const double* acceleration, double factor,
+                                              Tangent tangent, MatrixAssembler& H) const {
+    auto& self = *implementation_;
+    if (!self.turns || tangent != Tangent::Exact) return;
+    self.tree.place(state.q.data(), nullptr);
+    self.derivatives.set_acceleration(acceleration);
+    self.derivatives.positions(self.adder(factor, H));
+}
+
+bool JointCoordinates::has_stiffness() const {
+    return implementation_->turns || implementation_->bodies.has_stiffness();
+}
+
+// ---- Rows ----
+
+void JointCoordinates::constraint(const State& state, double* C) const {
+    auto& self = *implementation_;
+    self.place(state);
+    self.bodies.constraint(self.state, C);
+}
+
+void JointCoordinates::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
+    auto& self = *implementation_;
+    self.place(state);
+    self.rows.begin(m(), self.bodies.n());
+    self.bodies.add_constraint_jacobian(self.state, 0, self.rows);
+    const SparseMatrix& J = self.rows.finish();
+    for (std::int32_t row = 0; row < J.rows; ++row) {
+        const auto begin = static_cast<std::size_t>(J.row_start[static_cast<std::size_t>(row)]),
+                   end = static_cast<std::size_t>(J.row_start[static_cast<std::size_t>(row) + 1]);
+        self.project_row(std::span(J.column).subspan(begin, end - begin),
+                         std::span(J.value).subspan(begin, end - begin));
+        for (const auto& [column, value] : self.entries) D.add(first_row + row, column, value);
+    }
+}
+
+void JointCoordinates::constraint_rate(const State& state, double* C_t) const {
+    auto& self = *implementation_;
+    self.place(state);
+    self.bodies.constraint_rate(self.state, C_t);
+}
+
+// C̈ at u̇ = 0: of the bodies at v̇ = J̇ u.
+void JointCoordinates::constraint_curvature(const State& state, double* c) const {
+    auto& self = *implementation_;
+    self.place(state);
+    self.bodies.constraint_curvature(self.state, c);
+    self.rates.assign(self.force.size(), 0.0);
+    self.tree.bias(self.rates.data());
+    self.rows.begin(m(), self.bodies.n());
+    self.bodies.add_constraint_jacobian(self.state, 0, self.rows);
+    self.rows.finish().multiply_add(1.0, self.rates.data(), c);
+}
+
+void JointCoordinates::add_constraint_stiffness(const State& state, const double* lambda, double factor,
+                                                Tangent tangent, MatrixAssembler& H) const {
+    auto& self = *implementation_;
+    if (m() == 0 || tangent != Tangent::Exact) return;
+    self.place(state);
+    const std::int32_t n = self.bodies.n();
+    self.matrix.begin(n, n);
+    self.bodies.add_constraint_stiffness(self.state, lambda, 1.0, tangent, self.matrix);
+    self.derivatives.set_motion(state.v.data(), Vector3d::Zero());
+    self.project_matrix(self.matrix.finish(), factor, false, H);
+    self.rows.begin(m(), n);
+    self.bodies.add_constraint_jacobian(self.state, 0, self.rows);
+    self.force.assign(self.force.size(), 0.0);
+    self.rows.finish().transpose_multiply_add(1.0, lambda, self.force.data());
+    self.derivatives.geometry(self.force.data(), self.adder(factor, H));
+}
+
+bool JointCoordinates::has_unilateral() const {
+    return implementation_->bodies.has_unilateral();
+}
+
+void JointCoordinates::collect_unilateral(const State& state, double h, UnilateralRows& rows) {
+    auto& self = *implementation_;
+    self.place(state);
+    self.bodies.collect_unilateral(self.state, h, self.body_rows);
+    rows.clear();
+    const auto& from = self.body_rows;
+    std::size_t row = 0;
+    for (const auto& block : from.blocks()) {
+        for (std::int32_t i = 0; i < block.cone.rows; ++i, ++row) {
+            const auto begin = static_cast<std::size_t>(from.row_start()[row]),
+                       end = static_cast<std::size_t>(from.row_start()[row + 1]);
+            self.project_row(from.column().subspan(begin, end - begin), from.value().subspan(begin, end - begin));
+            for (const auto& [column, value] : self.entries) rows.entry(column, value);
+            rows.end_row(from.rows()[row].gap, from.rows()[row].rate);
+        }
+        rows.end_block(block.cone, block.key, block.restitution, block.compliance);
+    }
+    rows.contacts() = from.contacts();
+}
+
+double JointCoordinates::recovery_speed() const {
+    return implementation_->bodies.recovery_speed();
+}
+double JointCoordinates::gap_resolution() const {
+    return implementation_->bodies.gap_resolution();
+}
+double JointCoordinates::energy(const State& state) const {
+    auto& self = *implementation_;
+    self.place(state);
+    return self.bodies.energy(self.state);
+}
+
+}  // namespace delassus
