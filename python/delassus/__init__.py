@@ -47,7 +47,7 @@ def _folders(plugin_path: Sequence[Path]) -> Tuple[str, ...]:
 
 
 def _reals(array: Any, name: str) -> np.ndarray:
-    """The array itself where its type fits; else a copy in doubles. Types that would lose more than digits are refused."""
+    """The array itself where its type fits; else a copy in doubles. What is not real numbers is refused."""
     result = np.asarray(array)
     if result.dtype != np.float64:
         if not np.can_cast(result.dtype, np.float64, "same_kind"):

@@ -37,7 +37,8 @@ class Matrices(unittest.TestCase):
         H, D = coupled()["H"], coupled()["D"]
         wide = D.copy()
         wide.indices, wide.indptr = wide.indices.astype(np.int64), wide.indptr.astype(np.int64)
-        for form in (H.tocoo(), H.tocsc(), H.toarray(), H.toarray().tolist(), sparse.csr_array(H), H.astype(np.float32)):
+        for form in (H.tocoo(), H.tocsc(), H.toarray(), H.toarray().tolist(), sparse.csr_array(H),
+                     H.astype(np.float32)):
             self.assert_same(delassus.Problem(**coupled(H=form)), expected)
         for form in (wide, D.tocsc(), D.toarray(), np.asfortranarray(D.toarray())):
             self.assert_same(delassus.Problem(**coupled(D=form)), expected)
@@ -78,7 +79,8 @@ class Matrices(unittest.TestCase):
         np.testing.assert_array_equal(H.toarray(), coupled()["H"].toarray())  # its problem is kept alive
 
     def test_cones(self):
-        cones = [Cone.free(2), Cone.nonnegative(), Cone.box([-1.0, -np.inf], [2.0, np.inf]), Cone.friction(0.25, rows=2)]
+        cones = [Cone.free(2), Cone.nonnegative(), Cone.box([-1.0, -np.inf], [2.0, np.inf]),
+                 Cone.friction(0.25, rows=2)]
         problem = delassus.Problem(np.eye(2), np.ones((7, 2)), np.zeros(2), np.zeros(7), cones)
         self.assertEqual([(c.kind, c.rows, c.mu) for c in problem.cones],
                          [("free", 2, None), ("nonnegative", 1, None), ("box", 2, None), ("friction", 2, 0.25)])
@@ -142,7 +144,7 @@ class Files(unittest.TestCase):
 
 class Meaning(unittest.TestCase):
     def test_qualification(self):
-        twice = delassus.Problem(np.eye(2), np.array([[1.0, 0.0], [1.0, 0.0]]), np.zeros(2), np.zeros(2), [Cone.free(2)])
+        twice = delassus.Problem(np.eye(2), [[1.0, 0.0], [1.0, 0.0]], np.zeros(2), np.zeros(2), [Cone.free(2)])
         found = twice.qualification()
         self.assertEqual((found["licq"], found["rank"], found["free_rank"]), (False, 1, 1))
         squeezed = delassus.Problem(np.eye(1), np.array([[1.0], [-1.0]]), np.zeros(1), np.zeros(2),

@@ -123,8 +123,10 @@ class Steps(unittest.TestCase):
 
     def test_a_step_that_fails_leaves_what_was(self):
         pendulum = {"step": 0.01, "end": 1.0, "limits": {"drift": 1e-9},
-                    "bodies": [{"name": "bob", "mass": 1.0, "inertia": {"xx": 0.1, "yy": 0.1, "zz": 0.1}, "position": [1, 0, 0]}],
-                    "joints": [{"name": "hinge", "kind": "revolute", "second": "bob", "point": [0, 0, 0], "axis": [0, 1, 0]}]}
+                    "bodies": [{"name": "bob", "mass": 1.0, "position": [1, 0, 0],
+                                "inertia": {"xx": 0.1, "yy": 0.1, "zz": 0.1}}],
+                    "joints": [{"name": "hinge", "kind": "revolute", "second": "bob", "point": [0, 0, 0],
+                                "axis": [0, 1, 0]}]}
         simulation = delassus.Simulation(pendulum)
         with self.assertRaisesRegex(delassus.StepFailure, "drift"):
             while True:

@@ -47,7 +47,7 @@ class ClosedForms(unittest.TestCase):
         np.testing.assert_allclose(result.x, 0.0, atol=1e-12)
 
     def test_the_law_of_one_solve(self):
-        # The associated law opens the contact by μ ‖u_t‖: with u_n = μ s and λ on the cone, s = (a_t + μ a_n)/(m (1 + μ²)).
+        # The associated law opens the contact by u_n = μ s; with λ on the cone, s = (a_t + μ a_n)/(m (1 + μ²)).
         problem = block_on_slope(0.6, 0.3)
         result = delassus.solve(problem, "pgs", tolerance=1e-12, law="associated")
         slip = 0.01 * 9.81 * (np.sin(0.6) - 0.3 * np.cos(0.6)) / (1 + 0.3**2)
