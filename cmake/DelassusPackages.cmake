@@ -2,6 +2,7 @@
 #   libdelassus       the libraries, with the modules that they load at need
 #   delassus-plugins  the solvers
 #   delassus          the command, with the pages and the suites
+#   python3-delassus  the Python package, where it is built
 #   libdelassus-dev   headers, SDK, CMake package, pkg-config, documentation, examples
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_DIRECTORY "${PROJECT_BINARY_DIR}/packages")
@@ -10,6 +11,9 @@ set(CPACK_PACKAGE_CONTACT "Delassus maintainers <delassus@example.org>" CACHE ST
     "Maintainer of the Debian packages: Name <address>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_COMPONENTS_ALL library plugins command development)
+if(TARGET delassus_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each component says its own
@@ -51,6 +55,17 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libdelassus ${same_version}, delassus ${same_version}, libeigen3-dev (>= 3.4)")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Saddle-point and cone-complementarity problems: development files
 Headers, documentation and examples for programs that embed Delassus and for authors of solvers.")
+
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-delassus)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+if(TARGET delassus_python)
+  math(EXPR next_minor "${Python_VERSION_MINOR} + 1")
+endif()
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+    "libdelassus ${same_version}, python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), python3 (<< ${Python_VERSION_MAJOR}.${next_minor}~), python3-numpy, python3-scipy")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS delassus-plugins)
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Saddle-point and cone-complementarity problems: the Python package
+Solves problems of NumPy arrays and SciPy matrices with the solvers of Delassus, and simulates scenes.")
 
 # /usr/share/doc/<package>/copyright, in the packages only.
 file(READ LICENSE licence)

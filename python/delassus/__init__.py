@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Saddle-point and cone-complementarity problems of constrained mechanics, with solvers as plugins.
+
+    H x − Dᵀ λ   = a          n rows: momentum balance
+    D x + E λ + b = u         m rows: constraint velocities
+    λ ∈ Υ  ⊥  u ∈ Υ*          one cone for each block of rows
+
+x are velocities and λ reaction impulses in SI scenes (m/s, N s), but no unit is assumed.
+
+>>> import delassus
+>>> problem = delassus.Problem(H, D, a, b, [delassus.Cone.friction(mu=0.5)] * contacts)
+>>> result = delassus.solve(problem, tolerance=1e-8)
+>>> result.status, result.x, result.lam, result.errors["natural"]
+"""
+from __future__ import annotations
+
+import functools
+import os
+import warnings
+from dataclasses import dataclass, field
+from typing import Any, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+import scipy.sparse
+
+from . import _delassus
+from ._delassus import Cone, Error, InputError, PluginError, Result, StepFailure, StepRecord, Unsupported
+from ._yaml import yaml_of
+
+__version__: str = _delassus.version
+__all__ = ["Cone", "Error", "InputError", "PluginError", "Problem", "Result", "Scene", "Simulation", "Solver",
+           "StepFailure", "StepRecord", "Trajectory", "Unsupported", "plugins", "read", "simulate", "solve", "unbuilt"]
+
+Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
+Path = Union[str, "os.PathLike[str]"]
+
+
+@functools.lru_cache(maxsize=None)
+def _registry(folders: Tuple[str, ...] = ()) -> _delassus.Registry:
+    return _delassus.Registry(list(folders))
+
+
+def _folders(plugin_path: Sequence[Path]) -> Tuple[str, ...]:
+    if isinstance(plugin_path, (str, os.PathLike)):
+        plugin_path = [plugin_path]
+    return tuple(os.path.abspath(os.fspath(folder)) for folder in plugin_path)
+
+
+def _reals(array: Any, name: str) -> np.ndarray:
+    """The array itself where its type fits; else a copy in doubles. What is not real numbers is refused."""
+    result = np.asarray(array)
+    if result.dtype != np.float64:
+        if not np.can_cast(result.dtype, np.float64, "same_kind"):
+            raise InputError(f"{name} has values of type {result.dtype}; they must be real numbers")
+        result = result.astype(np.float64)
+    return result
+
+
+def _rows(matrix: Optional[Matrix], name: str):
+    """A matrix by compressed rows, columns ascending without repetition: (indptr, indices, data, shape)."""
+    if matrix is None:
+        return None
+    if not scipy.sparse.issparse(matrix):
+        matrix = _reals(matrix, name)
+        if matrix.ndim != 2:
+            raise InputError(f"{name} has {matrix.ndim} dimensions; it must be a matrix")
+    rows = scipy.sparse.csr_matrix(matrix)  # the same arrays where it is one already
+    if not rows.has_canonical_format:
+        rows = rows.copy()  # the user's matrix stays as it is
+        rows.sum_duplicates()
+    return rows.indptr, rows.indices, _reals(rows.data, name), rows.shape
+
+
+def _text(key: str, value: Any) -> str:
+    """An option's value as a configuration file has it."""
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (int, np.integer)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    raise InputError(f"option {key} is of type {type(value).__name__}; it must be a number, a bool or a text")
+
+
+class Problem(_delassus.Problem):
+    """A problem, checked and made ready for solvers.
+
+    Parameters
+    ----------
+    H : (n, n) sparse or dense matrix, or None
+        Both triangles. None for a reduced problem, where n = 0 and E is the Delassus operator.
+    D : (m, n) sparse or dense matrix, or None where n = 0
+    a : (n,) array, momentum
+    b : (m,) array, velocity
+    cones : sequence of Cone, in the order of the rows; together m rows
+    E : (m, m) sparse or dense matrix, or None
+        Compliance: symmetric positive semidefinite, both triangles.
+    law : 'associated' (the convex problem) or 'coulomb' (exact Coulomb friction)
+    name : for messages and tables
+
+    The problem owns its data: each array is copied once here, and what is done to the user's arrays later has no
+    effect on it. (Solvers read that copy; nothing is copied at a solve.) Raises InputError, with one sentence, where
+    shapes, indices or values are wrong.
+    """
+
+    def __init__(self, H: Optional[Matrix], D: Optional[Matrix], a: Any, b: Any, cones: Sequence[Cone],
+                 E: Optional[Matrix] = None, law: str = "associated", name: str = ""):
+        for cone in cones:
+            if not isinstance(cone, Cone):
+                raise InputError(f"cones has an entry of type {type(cone).__name__}; "
+                                 "make them by Cone.free, Cone.nonnegative, Cone.box or Cone.friction")
+        super().__init__(_rows(H, "H"), _rows(D, "D"), _reals(a, "a"), _reals(b, "b"), list(cones), _rows(E, "E"), law,
+                         name)
+
+    @classmethod
+    def read(cls, path: Path) -> "Problem":
+        """Read a problem folder, or an FCLib file if the path ends in .hdf5 or .h5 (docs/files.md)."""
+        problem = cls.__new__(cls)
+        _delassus.Problem.__init__(problem, os.fspath(path))
+        return problem
+
+    def write(self, path: Path) -> None:
+        """Write a problem folder, or an FCLib file if the path ends in .hdf5 or .h5."""
+        self._write(os.fspath(path))
+
+    @property
+    def H(self) -> scipy.sparse.csr_matrix:
+        """(n, n), read-only, in the problem's own memory."""
+        return _matrix(self._H)
+
+    @property
+    def D(self) -> scipy.sparse.csr_matrix:
+        """(m, n), read-only, in the problem's own memory."""
+        return _matrix(self._D)
+
+    @property
+    def E(self) -> scipy.sparse.csr_matrix:
+        """(m, m), read-only, in the problem's own memory; without entries where there is no compliance."""
+        return _matrix(self._E)
+
+    def set_right_hand_side(self, a: Any, b: Any) -> None:
+        """Replace a (n) and b (m). What a Solver analysed or factorised stays valid."""
+        super().set_right_hand_side(_reals(a, "a"), _reals(b, "b"))
+
+    def errors(self, x: Any, lam: Any) -> dict:
+        """The error measures of (x, λ) by name, dimensionless (docs/errors.md); x: n, lam: m."""
+        return self._errors(_reals(x, "x"), _reals(lam, "lam"))
+
+    def inspect(self, plugin_path: Sequence[Path] = ()) -> dict:
+        """Sizes, structure of H, cones, rank, needs, and the solvers that can take it, as `delassus inspect --json`."""
+        return self._inspect(_registry(_folders(plugin_path)))
+
+    def qualification(self, plugin_path: Sequence[Path] = ()) -> dict:
+        """Whether reactions are unique ('licq') and bounded ('pointed'): True, False, or None where undecided.
+
+        'rank' is that of N = D H⁻¹ Dᵀ + E; 'pointedness' the smallest net effect of normal reactions with a sum of 1;
+        'cancelling' the reactions that cancel (m), where they are not bounded.
+        """
+        return self._qualification(_registry(_folders(plugin_path)))
+
+    def __repr__(self) -> str:
+        return f"<delassus.Problem: {self.name or 'without a name'}, n = {self.n}, m = {self.m}, law {self.law}>"
+
+
+def _matrix(parts) -> scipy.sparse.csr_matrix:
+    data, indices, indptr, shape = parts
+    matrix = scipy.sparse.csr_matrix(shape)
+    matrix.data, matrix.indices, matrix.indptr = data, indices, indptr  # the constructor would copy read-only arrays
+    matrix.has_canonical_format = True
+    return matrix
+
+
+class Solver(_delassus.Solver):
+    """A solver that is kept between solves: what it analysed and factorised is used again where the problem allows.
+
+    Parameters
+    ----------
+    name : a plugin's name (plugins()), 'auto', 'name(key=value, …)', or the path of a shared library
+    plugin_path : folders to look for plugins in, before those of DELASSUS_PLUGIN_PATH and of the installation
+    options : the plugin's own (docs/solvers.md), and 'finish', 'finish_at'
+
+    One thread at a time works with a solver or a problem; others wait.
+    """
+
+    def __init__(self, name: str = "auto", *, plugin_path: Sequence[Path] = (), **options: Any):
+        super().__init__(_registry(_folders(plugin_path)), name,
+                         {key: _text(key, value) for key, value in options.items()} if options else {})
+
+    def solve(self, problem: Problem, *, tolerance: float = 1e-8, law: Optional[str] = None,
+              max_iterations: Optional[int] = None, time_limit: Optional[float] = None,
+              start: Union[Result, Tuple[Any, Any], None] = None, curve: bool = False) -> Result:
+        """Solve. Not converging is a status of the result; see solve() for the arguments."""
+        if start is not None:
+            if isinstance(start, _delassus.Result):
+                start = (start.x, start.lam)
+            x, lam = start
+            start = (_reals(x, "the start's x"), _reals(lam, "the start's λ"))
+        return self._solve(problem, tolerance, max_iterations, time_limit, law, start, curve)
+
+    def __repr__(self) -> str:
+        return f"<delassus.Solver: {self.name} {self.version}>"
+
+
+def solve(problem: Problem, solver: Union[str, Solver] = "auto", tolerance: float = 1e-8, law: Optional[str] = None,
+          max_iterations: Optional[int] = None, time_limit: Optional[float] = None,
+          start: Union[Result, Tuple[Any, Any], None] = None, curve: bool = False,
+          plugin_path: Sequence[Path] = (), **options: Any) -> Result:
+    """Solve a problem.
+
+    Parameters
+    ----------
+    solver : a name as Solver takes it, or a Solver
+    tolerance : of the natural error, dimensionless (docs/errors.md)
+    law : 'associated' or 'coulomb' for this solve; None: the problem's own
+    max_iterations : None: a million
+    time_limit : s, of the solver's own time; None: none
+    start : a Result or (x, λ) to start from; solvers without a warm start ignore it
+    curve : measure the error along the way; Result.curve then has the samples
+    options : the solver's own, by keyword
+
+    Returns a Result. Not converging is a status, so look at result.status or result.solved. Raises Unsupported where
+    the solver cannot take the problem, InputError for a wrong option or setting. Ctrl-C ends the solve when the solver
+    next shows an iterate, and raises KeyboardInterrupt. Other threads run meanwhile.
+    """
+    if isinstance(solver, _delassus.Solver):
+        if options or plugin_path:
+            raise InputError("options and plugin_path belong to the Solver: give them where it is made")
+    else:
+        solver = Solver(solver, plugin_path=plugin_path, **options)
+    return solver.solve(problem, tolerance=tolerance, law=law, max_iterations=max_iterations, time_limit=time_limit,
+                        start=start, curve=curve)
+
+
+def read(path: Path) -> Problem:
+    """Read a problem folder, or an FCLib file if the path ends in .hdf5 or .h5 (docs/files.md)."""
+    return Problem.read(path)
+
+
+def plugins(plugin_path: Sequence[Path] = ()) -> list:
+    """The installed solvers: dicts of name, version, description, licence, capabilities, options and library."""
+    return _registry(_folders(plugin_path)).plugins()
+
+
+def unbuilt() -> dict:
+    """Solvers that this build left out, by name, each with the reason."""
+    return _registry().unbuilt()
+
+
+class Scene(_delassus.Scene):
+    """One or several mechanical systems, with their timesteppers and solvers (docs/scenes.md).
+
+    Parameters
+    ----------
+    source : a path of a YAML file, a text in YAML (anything with a line break), or a dict of the same keys
+    set : values by path that replace those of the source, e.g. {"bodies.ball.mass": 2}
+    solver, integrator : 'name' or 'name(key=value, …)' for every system
+    law : 'associated' or 'coulomb', for every system
+    step, end : s, for every system
+    tolerance : m or rad, from which steps follow
+
+    Raises InputError that names file, line, key and the nearest valid key.
+    """
+
+    def __init__(self, source: Union[Path, Mapping[str, Any]], *, set: Optional[Mapping[str, Any]] = None,
+                 solver: str = "", integrator: str = "", law: Optional[str] = None, step: Optional[float] = None,
+                 end: Optional[float] = None, tolerance: Optional[float] = None):
+        if isinstance(source, Mapping):
+            text, is_file = yaml_of(source), False
+        else:
+            text = os.fspath(source)
+            is_file = "\n" not in text
+        values = [(path, yaml_of(value)) for path, value in (set or {}).items()]
+        super().__init__(text, is_file, values, solver, integrator, law, step, end, tolerance)
+
+    def __repr__(self) -> str:
+        return f"<delassus.Scene: {self.title or 'without a title'}, systems {', '.join(self.systems)}>"
+
+
+class Simulation(_delassus.Simulation):
+    """A system of a scene, step by step.
+
+    Parameters
+    ----------
+    scene : a Scene, or what Scene takes; two simulations of one Scene step one at a time
+    system : its name; '' where the scene has only one
+    """
+
+    def __init__(self, scene: Union[Scene, Path, Mapping[str, Any]], system: str = "",
+                 plugin_path: Sequence[Path] = ()):
+        if not isinstance(scene, Scene):
+            scene = Scene(scene)
+        super().__init__(scene, _registry(_folders(plugin_path)), system)
+        self.scene: Scene = scene
+        self.bodies: list = scene.bodies(system)  #: names, in the order of poses and twists
+
+    def __repr__(self) -> str:
+        return f"<delassus.Simulation: t = {self.time} s, {len(self.bodies)} bodies>"
+
+
+@dataclass
+class Trajectory:
+    """What simulate() recorded: K states, of B bodies. Units are those of the scene, SI as a rule."""
+
+    bodies: list  #: names of the B bodies
+    time: np.ndarray  #: (K,), s
+    positions: np.ndarray  #: (K, ·) coordinates q of all that can move
+    velocities: np.ndarray  #: (K, ·) v of all that can move
+    poses: np.ndarray  #: (K, B, 7): mass centre in the world (m), unit quaternion (w, x, y, z)
+    twists: np.ndarray  #: (K, B, 6): velocity in the world frame (m/s), angular velocity in the body frame (rad/s)
+    energy: np.ndarray  #: (K,), J
+    penetration: np.ndarray  #: (K,), m
+    drift: np.ndarray  #: (K,), largest |C| of joints and motors, m or rad
+    natural: np.ndarray  #: (K,), largest natural error of the solves of the step that ends there
+    contacts: dict = field(repr=False)  #: a row for each contact of each state: Simulation.contacts() with 'state' (k)
+    status: str = "finished"  #: or 'unsolved' (a solve missed its tolerance), 'diverged', 'failed'
+    message: str = ""  #: what a person should know; '' where the run finished
+    steps: int = 0  #: steps taken
+
+    def body(self, name: str) -> np.ndarray:
+        """(K, 7): the poses of one body."""
+        return self.poses[:, self._number(name)]
+
+    def twist(self, name: str) -> np.ndarray:
+        """(K, 6): the velocities of one body."""
+        return self.twists[:, self._number(name)]
+
+    def _number(self, name: str) -> int:
+        if name not in self.bodies:
+            raise InputError(f"there is no body {name!r}, but {', '.join(self.bodies)}")
+        return self.bodies.index(name)
+
+
+def simulate(scene: Union[Scene, Simulation, Path, Mapping[str, Any]], system: str = "", every: int = 1,
+             plugin_path: Sequence[Path] = ()) -> Trajectory:
+    """Simulate a system to its end, and record every so many steps, the start and the end.
+
+    scene : a Scene, what Scene takes, or a Simulation, which goes on from where it is
+    system : its name; '' where the scene has only one
+
+    A step that fails ends the run: what was recorded comes back with status 'failed' and the sentence. Whatever is not
+    'finished' is also a RuntimeWarning. Raises Unsupported where a solver or timestepper cannot take the system.
+    """
+    if every < 1:
+        raise InputError(f"every is {every}; it must be 1 or more")
+    simulation = scene if isinstance(scene, _delassus.Simulation) else Simulation(scene, system, plugin_path)
+    frames, contacts = [], []
+
+    def record() -> None:
+        now = simulation.record
+        frames.append((simulation.time, simulation.positions, simulation.velocities, simulation.poses,
+                       simulation.twists, now.energy, now.penetration, now.drift, now.natural))
+        contacts.append(simulation.contacts())
+
+    status, message, steps, recorded, solved = "finished", "", 0, True, True
+    record()
+    try:
+        while not simulation.finished:
+            solved = simulation.step().solved and solved
+            steps += 1
+            recorded = steps % every == 0
+            if recorded:
+                record()
+    except StepFailure as failure:
+        status, message = "failed", str(failure)
+    if not recorded:
+        record()
+    if status == "finished" and not all(np.isfinite(frames[-1][k]).all() for k in (1, 2)):
+        status, message = "diverged", f"the state at t = {frames[-1][0]} s is not finite"
+    elif status == "finished" and not solved:
+        status, message = "unsolved", "; ".join(simulation.warnings()) or "a solve missed its tolerance"
+    if status != "finished":
+        warnings.warn(f"the simulation ended as {status}: {message}", RuntimeWarning, stacklevel=2)
+    arrays = [np.array(column) for column in zip(*frames)]
+    table = {key: np.concatenate([frame[key] for frame in contacts]) for key in contacts[0]}
+    table["state"] = np.repeat(np.arange(len(contacts)), [len(frame["gap"]) for frame in contacts])
+    return Trajectory(simulation.bodies, *arrays, contacts=table, status=status, message=message, steps=steps)

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The extension module delassus._delassus. What users see is in delassus/__init__.py.
+#include <pybind11/pybind11.h>
+
+#include "delassus/version.hpp"
+#include "errors.hpp"
+#include "problems.hpp"
+#include "scenes.hpp"
+#include "solvers.hpp"
+
+PYBIND11_MODULE(_delassus, module) {
+    module.doc() = "The border between Delassus and Python; use the package delassus.";
+    module.attr("version") = DELASSUS_VERSION;
+    delassus::python::bind_errors(module);
+    delassus::python::bind_problems(module);
+    delassus::python::bind_solvers(module);
+    delassus::python::bind_scenes(module);
+}
