@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Primal-dual interior point method for the convex problem of the associated law (README.md).
+// Primal-dual interior point method: for the convex problem of the associated law, and for exact Coulomb (README.md).
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 #include "delassus/sdk/monitor.hpp"
@@ -29,6 +30,13 @@ private:
     bool judge(const sdk::ProblemView& problem, sdk::Monitor& monitor, std::int64_t iteration);
     void iterate(const sdk::ProblemView& problem, sdk::Monitor& monitor);
     bool step();
+    bool coulomb_step();  // coulomb_step.cpp
+    /// δ for the target in target_; its error of the linear solve is at most `enough`.
+    void find_direction(double enough);
+    void aim(double tau, bool second_order);
+    [[nodiscard]] double allowed_length() const { return std::min(1.0, 0.95 * cones_.longest_step()); }
+    bool move(double length);
+    [[nodiscard]] bool is_jammed() const;
     /// Whether the iteration has stopped getting anywhere.
     bool is_stuck(double error);
     /// A lower bound of ‖(x̂, ẑ)‖ over all solutions that the iterates prove; zero if they prove nothing.
@@ -46,6 +54,8 @@ private:
     sdk::Vector true_x_, true_lambda_, best_x_;     // in the problem's units
     double least_error_ = 0.0, least_rest_ = 0.0;   // of is_stuck
     std::int64_t idle_iterations_ = 0;
+    int centre_next_ = 0;  // exact Coulomb: iterations that aim at the present products
+    double jam_ = 0.0;     // counts short steps
 };
 
 }  // namespace delassus::ipm

@@ -27,7 +27,7 @@ constexpr delassus::sdk::PluginInfo info{
     .description = "primal-dual interior point method with Nesterov-Todd scaling and predictor-corrector steps",
     .licence = "BSD-3-Clause AND MPL-2.0",
     .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
-                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
+                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
                     DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_H_SEMIDEFINITE | DELASSUS_CAN_REDUCED |
                     DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
 };
