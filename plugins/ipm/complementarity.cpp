@@ -80,8 +80,8 @@ double longest_step_in_cone(const Triple& ell, const Triple& d) {
 }  // namespace
 
 void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& system) {
-    coulomb_ = problem.coulomb;
-    coupling_.setZero(problem.m);
+    path_ = problem.coulomb ? Path::Product : Path::Associated;
+    share_ = 1.0;
     intervals_.clear();
     free_.clear();
     blocks_.clear();
@@ -123,7 +123,11 @@ void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& 
             }
         }
     }
-    degree_ = static_cast<double>(blocks_.size()) * (coulomb_ ? 2.0 : 1.0);
+    count_products();
+}
+
+void Complementarity::count_products() {
+    degree_ = static_cast<double>(blocks_.size()) * (path_ == Path::Product ? 2.0 : 1.0);
     for (const Interval& row : intervals_) degree_ += (row.has_lower ? 1.0 : 0.0) + (row.has_upper ? 1.0 : 0.0);
 }
 
@@ -162,8 +166,70 @@ void Complementarity::start(const sdk::Vector& z, const sdk::Vector& s, double z
 
 void Complementarity::renew_velocity() {
     u_ = s_;
-    if (!coulomb_) return;
-    for (const Block& block : blocks_) u_[block.first] = block.v;
+    if (path_ == Path::Associated) return;
+    for (Block& block : blocks_) {
+        if (path_ == Path::Shift) {
+            const Triple s = load_rows(s_, block.first, block.rows);
+            const double length = tangent_norm(s);  // s₀ − ‖s_t‖ = det s/(s₀ + ‖s_t‖) keeps its digits
+            block.v = block.det_s / (s[0] + length) + (1.0 - share_) * (length - block.shift);
+        }
+        u_[block.first] = block.v;
+    }
+}
+
+double Complementarity::shift_of(const Block& block) const {
+    return (1.0 - share_) * block.shift + share_ * tangent_norm(load_rows(s_, block.first, block.rows));
+}
+
+void Complementarity::take_shift_path() {
+    path_ = Path::Shift;
+    for (Block& block : blocks_) {
+        const Triple s = load_rows(s_, block.first, block.rows);
+        block.shift = tangent_norm(s);
+        s_[block.first] = block.v + block.shift;
+        block.det_s = block.v * (block.v + 2.0 * block.shift);
+        block.product = dot(load_rows(z_, block.first, block.rows), load_rows(s_, block.first, block.rows));
+    }
+    count_products();
+    set_share(1.0);
+}
+
+void Complementarity::take_product_path() {
+    set_share(1.0);
+    path_ = Path::Product;
+    count_products();
+}
+
+void Complementarity::set_share(double share) {
+    share_ = share;
+    renew_velocity();
+}
+
+void Complementarity::advance_shift() {
+    for (Block& block : blocks_) block.shift = shift_of(block);
+}
+
+double Complementarity::shift_lag() const {
+    double sum = 0.0;
+    for (const Block& block : blocks_) {
+        const double lag = tangent_norm(load_rows(s_, block.first, block.rows)) - shift_of(block);
+        sum += lag * lag;
+    }
+    return std::sqrt(sum);
+}
+
+double Complementarity::distance_from_centre(double tau) const {
+    double largest = 0.0;
+    for (const Interval& row : intervals_) {
+        if (row.has_lower) largest = std::max(largest, std::abs(row.p * row.wl - tau));
+        if (row.has_upper) largest = std::max(largest, std::abs(row.q * row.wu - tau));
+    }
+    for (const Block& block : blocks_) {
+        const Triple rest = plus(jordan_product(block.ell, block.ell), -1.0, {tau, 0.0, 0.0});
+        largest = std::max(largest, std::sqrt(dot(rest, rest)));
+        if (path_ == Path::Product) largest = std::max(largest, std::abs(normal_product(block, 0.0) - tau));
+    }
+    return largest / tau;
 }
 
 double Complementarity::products(double step) const {
@@ -174,7 +240,7 @@ double Complementarity::products(double step) const {
     }
     for (const Block& block : blocks_) {
         sum += step == 0.0 ? block.product : dot(plus(block.ell, step, block.dz), plus(block.ell, step, block.ds));
-        if (coulomb_) sum += normal_product(block, step);
+        if (path_ == Path::Product) sum += normal_product(block, step);
     }
     return sum;
 }
@@ -187,7 +253,7 @@ double Complementarity::smallest_product() const {
     }
     for (const Block& block : blocks_) {
         smallest = std::min(smallest, smallest_eigenvalue(block.product, block.det_z * block.det_s));
-        if (coulomb_) smallest = std::min(smallest, z_[block.first] * block.v);
+        if (path_ == Path::Product) smallest = std::min(smallest, z_[block.first] * block.v);
     }
     return smallest;
 }
@@ -201,7 +267,7 @@ double Complementarity::smallest_product(double step) const {
     for (const Block& block : blocks_) {
         const Triple z = plus(block.ell, step, block.dz), s = plus(block.ell, step, block.ds);
         smallest = std::min(smallest, smallest_eigenvalue(dot(z, s), determinant(z) * determinant(s)));
-        if (coulomb_) smallest = std::min(smallest, normal_product(block, step));
+        if (path_ == Path::Product) smallest = std::min(smallest, normal_product(block, step));
     }
     return smallest;
 }
@@ -215,13 +281,30 @@ void Complementarity::scale(sdk::Vector& theta) {
     for (Block& block : blocks_) {
         scale_block(block);
         Triple value{};
-        for (std::size_t k = 0; k < 3; ++k) value[k] = block.root_theta[k] * block.root_theta[k];
-        if (coulomb_) {
-            coupling_[block.first + 1] = -value[1];
-            value = {block.v / z_[block.first], 0.5 * (value[0] + value[1]), value[2]};
-        }
+        find_theta(block, value);
         store_rows(value, block.first, block.rows, theta);
     }
+}
+
+void Complementarity::find_theta(Block& block, Triple& diagonal) const {
+    for (std::size_t k = 0; k < 3; ++k) diagonal[k] = block.root_theta[k] * block.root_theta[k];
+    block.beside = {};
+    if (path_ == Path::Associated) return;
+    const double small = diagonal[1], along = 0.5 * (diagonal[0] + small);
+    block.beside.below = -small;
+    diagonal = {block.v / z_[block.first], along, diagonal[2]};
+    if (path_ == Path::Product) return;
+    const Triple s = load_rows(s_, block.first, block.rows);
+    const double length = tangent_norm(s);
+    const Triple seen =
+        into(block.rows_in, {0.0, length > 0.0 ? s[1] / length : 0.0, length > 0.0 ? s[2] / length : 0.0});
+    block.c = share_ * seen[1];
+    block.d = share_ * seen[2];
+    const double rest = seen[1] > 0.0 ? seen[2] * seen[2] / (1.0 + seen[1]) : 1.0 - seen[1];  // 1 − c/φ
+    const double one_less = (1.0 - share_) + share_ * rest;
+    diagonal[0] = (1.0 + block.c) * small;
+    block.beside.right = one_less * along - small;
+    block.beside.far = -block.d * diagonal[2];
 }
 
 void Complementarity::scale_block(Block& block) {
@@ -240,7 +323,7 @@ void Complementarity::scale_block(Block& block) {
     const double half = std::sqrt(0.5);
     const Triple across = block.rows == 3 ? Triple{0.0, -nz, ny} : Triple{0.0, 0.0, 1.0};
     block.eigen = {Triple{half, half * ny, half * nz}, Triple{half, -half * ny, -half * nz}, across};
-    if (coulomb_) {
+    if (path_ != Path::Associated) {
         const Triple normal{1.0, 0.0, 0.0}, along{0.0, ny, nz};
         block.rows_in = {normal, along, across};
         block.reactions_in = {plus(normal, -1.0, along), along, across};
@@ -267,11 +350,16 @@ void Complementarity::reactions_from_basis(sdk::Vector& v) const {
         store_rows(out_of(block.reactions_in, load_rows(v, block.first, block.rows)), block.first, block.rows, v);
 }
 
-// W q in the block's basis; with exact Coulomb the target of v stands in its first row.
+// W q in the block's basis. With exact Coulomb its first row has the target of v, or that of s₀ − σ.
 void Complementarity::store_target(Block& block, sdk::Vector& t) const {
     Triple value = into(block.eigen, block.q);
     for (std::size_t k = 0; k < 3; ++k) value[k] *= block.root_theta[k];
-    if (coulomb_) value = {block.tv, std::sqrt(0.5) * (value[0] - value[1]), value[2]};
+    if (path_ != Path::Associated) {
+        const double half = std::sqrt(0.5), along = half * (value[0] - value[1]);
+        // (W q)₀ − c (W q)_ŵ − d (W q)_t, with (W q)₀ = (W q)_ŵ + √2 value₁
+        const double shifted = (1.0 - block.c) * along + 2.0 * half * value[1] - block.d * value[2];
+        value = {path_ == Path::Product ? block.tv : shifted, along, value[2]};
+    }
     store_rows(value, block.first, block.rows, t);
 }
 
@@ -316,7 +404,7 @@ void Complementarity::set_direction(const sdk::Vector& dz) {
     }
     for (Block& block : blocks_) {
         Triple eigen = load_rows(dz, block.first, block.rows);
-        if (coulomb_) {
+        if (path_ != Path::Associated) {
             block.dz0 = eigen[0];
             block.dv = block.tv - block.v / z_[block.first] * block.dz0;
             eigen = {std::sqrt(0.5) * eigen[1], std::sqrt(0.5) * (2.0 * eigen[0] - eigen[1]), eigen[2]};
@@ -345,7 +433,7 @@ double Complementarity::longest_step() const {
     for (const Block& block : blocks_) {
         longest =
             std::min({longest, longest_step_in_cone(block.ell, block.dz), longest_step_in_cone(block.ell, block.ds)});
-        if (coulomb_) limit(block.v, block.dv);
+        if (path_ == Path::Product) limit(block.v, block.dv);
     }
     return longest;
 }
@@ -377,7 +465,7 @@ void Complementarity::advance(double step) {
         block.det_z = determinant(z) / (block.eta * block.eta);
         block.det_s = determinant(s) * (block.eta * block.eta);
         block.product = dot(z, s);
-        if (coulomb_) block.v += step * block.dv;
+        if (path_ == Path::Product) block.v += step * block.dv;
         renew_products(block);
     }
     renew_velocity();

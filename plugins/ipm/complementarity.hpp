@@ -24,6 +24,9 @@
 // With the direction ŵ of W, the equations take the basis e₀, ŵ, t of û. The reactions take δz₀, ε = δz₀ + δz_ŵ and
 // δz_t for unknowns, because at a sliding contact δz_ŵ = −δz₀ but for a small rest, and ε keeps its digits. There
 //     θ = [v/z₀, 0, 0;  −η²/ω², η²(ω² + 1/ω²)/2, 0;  0, 0, η²].
+// Where this path ends another leads past the end (coulomb_path.cpp): û = s − σ e₀ with the shift σ = (1 − φ)ς +
+// φ‖s_t‖, for a given ς and share φ. φ = 1 is De Saxcé's form of the law; φ = 0 the associated law with another b. With
+// φ s_t/‖s_t‖ = c ŵ + d t the first row of θ is then η²((1 + c)/ω², (1 − c)(ω² + 1/ω²)/2 − 1/ω², −d).
 #pragma once
 
 #include <array>
@@ -38,8 +41,16 @@ using Triple = std::array<double, 3>;
 /// Vectors of a friction block's components: of its eigenbasis, or those by which it takes rows or reactions.
 using Basis = std::array<Triple, 3>;
 
+/// Which equation stands for the normal velocities: ŝ itself (associated law), z₀ v = τ, or û₀ = s₀ − σ.
+enum class Path { Associated, Product, Shift };
+
 class Complementarity {
 public:
+    /// Beside θ's diagonal in one friction block: [1][0], [0][1], [0][2].
+    struct Beside {
+        double below = 0.0, right = 0.0, far = 0.0;
+    };
+
     /// θ of a row that is held where it is.
     static constexpr double held = 1e40;
 
@@ -64,9 +75,25 @@ public:
 
     /// Finds W; leaves θ (m) by rows of the blocks' bases, its diagonal.
     void scale(sdk::Vector& theta);
-    /// Of exact Coulomb's θ: what the row below the first of each block has before the first unknown; m.
-    [[nodiscard]] const sdk::Vector& coupling() const { return coupling_; }
-    [[nodiscard]] bool coulomb() const { return coulomb_; }
+    /// The rest of θ; zero in groups without friction and under the associated law.
+    [[nodiscard]] Beside beside(std::size_t group) const {
+        return block_of_group_[group] < 0 ? Beside{} : blocks_[static_cast<std::size_t>(block_of_group_[group])].beside;
+    }
+    [[nodiscard]] Path path() const { return path_; }
+
+    /// Exact Coulomb only. Goes over to û₀ = s₀ − σ with ς = ‖s_t‖ of now, s₀ = v + ς; φ = 1.
+    void take_shift_path();
+    /// Goes over to z₀ v = τ with v = û₀.
+    void take_product_path();
+    /// φ, in (0, 1].
+    void set_share(double share);
+    /// ς ← σ.
+    void advance_shift();
+    /// ‖‖s_t‖ − σ‖₂.
+    [[nodiscard]] double shift_lag() const;
+    /// The largest ‖ℓ ∘ ℓ − τ e‖/τ, after scale().
+    [[nodiscard]] double distance_from_centre(double tau) const;
+    [[nodiscard]] double degree() const { return degree_; }
 
     /// The rows v of the equations (m) in the blocks' bases: v ← Uᵀ v.
     void rows_to_basis(sdk::Vector& v) const;
@@ -117,11 +144,16 @@ private:
         Triple ell, q;                // W z = W⁻¹ s; target
         Triple dz, ds;                // W δz, W⁻¹ δs
         double v, tv, dv, dz0;        // exact Coulomb: û₀, its target and change; δz₀
+        double shift, c, d;           // ς, and φ s_t/‖s_t‖ seen from ŵ and t
+        Beside beside;
     };
 
     void scale_block(Block& block);
     void renew_products(Block& block) const;
     void renew_velocity();
+    void count_products();
+    [[nodiscard]] double shift_of(const Block& block) const;
+    void find_theta(Block& block, Triple& diagonal) const;
     void store_target(Block& block, sdk::Vector& t) const;
     [[nodiscard]] double normal_product(const Block& block, double step) const {
         return (z_[block.first] + step * block.dz0) * (block.v + step * block.dv);
@@ -133,9 +165,9 @@ private:
     std::vector<Block> blocks_;
     std::vector<char> held_;
     std::vector<std::int32_t> free_;  // rows without a bound
-    bool coulomb_ = false;
+    Path path_ = Path::Associated;
+    double share_ = 1.0;  // φ
     sdk::Vector z_, s_, u_, held_value_;
-    sdk::Vector coupling_;
     sdk::Vector direction_;  // δz in the rows' own basis
     double degree_ = 0.0;
 };

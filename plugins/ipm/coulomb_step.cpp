@@ -4,6 +4,8 @@
 // the method ends.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "interior_point.hpp"
 
@@ -11,8 +13,6 @@ namespace delassus::ipm {
 
 namespace {
 
-constexpr double predictor_residual = 1e-3;
-constexpr double corrector_residual = 1e-9;
 constexpr double least_reduction = 1e-4;   // of τ
 constexpr double fair_prediction = 0.3;    // length from which second-order terms help
 constexpr double careful_reduction = 0.3;  // of τ without them
@@ -63,6 +63,11 @@ bool InteriorPoint::coulomb_step() {
         length *= 0.8;
     jam_ = length < short_step ? jam_ + 1.0 : std::max(jam_ - 0.5, 0.0);
     centre_next_ = length < short_step ? std::min(centre_next_ + 1, 3) : std::max(centre_next_ - 1, 0);
+    if (getenv("IPMDBG"))
+        fprintf(stderr,
+                "fac %ld tau %.2e res f %.1e g %.1e small %.1e len %.3f centre %d jam %.1f linres %.1e hops %ld\n",
+                (long)kkt_.factorizations(), tau, f_.norm(), g_.norm(), smallest, length, centre_next_, jam_, linres_,
+                (long)hops_);
     return move(length);
 }
 

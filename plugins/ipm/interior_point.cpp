@@ -13,10 +13,8 @@ namespace {
 // ‖S r‖ = 1 in scaled units. A solution larger than the data by this factor counts as none.
 constexpr double largest_solution = 1e9;
 
-// Relative residuals of linear solves. The predictor is only a forecast. Errors that the corrector leaves show in the
-// residuals of the next iteration.
-constexpr double predictor_residual = 1e-3;
-constexpr double corrector_residual = 1e-9;
+// With exact Coulomb, the error from which on semismooth Newton is the better way to end than hops.
+constexpr double error_for_ssn = 1e-5;
 
 KktSettings settings_from(const sdk::OptionValues& options) {
     const std::string form = options.choice("form");
@@ -35,7 +33,8 @@ double root_mean_square(const sdk::Vector& v) {
 InteriorPoint::InteriorPoint(const sdk::OptionValues& options)
     : kkt_(settings_from(options)),
       step_fraction_(options.real("step_fraction")),
-      stall_iterations_(options.integer("stall_iterations")) {}
+      stall_iterations_(options.integer("stall_iterations")),
+      most_hops_(options.integer("hops")) {}
 
 void InteriorPoint::analyze(const sdk::ProblemView& problem) {
     scaling_.analyze(problem);
@@ -56,6 +55,10 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
     idle_iterations_ = 0;
     centre_next_ = 0;
     jam_ = 0.0;
+    hops_ = 0;
+    rise_ = 1.0;
+    lowest_tau_ = std::numeric_limits<double>::infinity();
+    is_stopped_ = false;
     sdk::Monitor monitor(request, 0);
     if (!judge(problem, monitor, 0)) {
         if (warm) {
@@ -147,7 +150,7 @@ bool InteriorPoint::step() {
 
 void InteriorPoint::find_direction(double enough) {
     right_ = target_ + g_;
-    kkt_.solve(cones_, f_, right_, enough, dx_, dz_);
+    linres_ = kkt_.solve(cones_, f_, right_, enough, dx_, dz_);
     cones_.set_direction(dz_);
 }
 
@@ -160,16 +163,21 @@ bool InteriorPoint::move(double length) {
 
 void InteriorPoint::iterate(const sdk::ProblemView& problem, sdk::Monitor& monitor) {
     sdk::Outcome& outcome = monitor.outcome();
-    for (std::int64_t iteration = 1;; ++iteration) {
-        find_residuals();
-        if (!(problem.coulomb ? coulomb_step() : step())) {
-            outcome.status = DELASSUS_STALLED;
-            outcome.message = "rounding leaves no step that stays inside the cones";
-            return;
-        }
+    const auto stall = [&outcome](std::string message) {
+        outcome.status = DELASSUS_STALLED;
+        outcome.message = std::move(message);
+    };
+    std::int64_t iteration = 0;
+    const auto judge_iterate = [&] {
         true_lambda_ = scaling_.system().z_scale.cwiseProduct(cones_.z());
         true_x_ = scaling_.system().x_scale.cwiseProduct(x_);
-        if (judge(problem, monitor, iteration)) return;
+        return judge(problem, monitor, ++iteration);
+    };
+    while (true) {
+        find_residuals();
+        if (!(problem.coulomb ? coulomb_step() : step()))
+            return stall("rounding leaves no step that stays inside the cones");
+        if (judge_iterate()) return;
         if (const double size = problem.coulomb ? 0.0 : proven_size(); size > largest_solution) {
             char text[160];
             std::snprintf(text, sizeof text,
@@ -180,14 +188,12 @@ void InteriorPoint::iterate(const sdk::ProblemView& problem, sdk::Monitor& monit
             return;
         }
         if (problem.coulomb && is_jammed()) {
-            outcome.status = DELASSUS_STALLED;
-            outcome.message = "the path to the solution ends: steps inside the cones stay short";
-            return;
-        }
-        if (is_stuck(monitor.best_residual())) {
-            outcome.status = DELASSUS_STALLED;
-            outcome.message = "no progress for " + std::to_string(stall_iterations_) + " iterations";
-            return;
+            if (monitor.best_residual() < error_for_ssn || !hop_on(judge_iterate)) {
+                if (!is_stopped_) stall("the path to the solution ends: steps inside the cones stay short");
+                return;
+            }
+        } else if (is_stuck(monitor.best_residual())) {
+            return stall("no progress for " + std::to_string(stall_iterations_) + " iterations");
         }
     }
 }

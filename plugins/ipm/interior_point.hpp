@@ -3,6 +3,8 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
+#include <limits>
 #include <string>
 
 #include "delassus/sdk/monitor.hpp"
@@ -23,6 +25,11 @@ public:
     }
 
 private:
+    // Relative residuals of linear solves. The predictor is only a forecast. Errors that the corrector leaves show in
+    // the residuals of the next iteration.
+    static constexpr double predictor_residual = 1e-3;
+    static constexpr double corrector_residual = 1e-9;
+
     void start_cold();
     void start_warm(const sdk::ProblemView& problem, double error);
     void find_residuals();
@@ -37,6 +44,12 @@ private:
     [[nodiscard]] double allowed_length() const { return std::min(1.0, 0.95 * cones_.longest_step()); }
     bool move(double length);
     [[nodiscard]] bool is_jammed() const;
+
+    // coulomb_path.cpp
+    using Judge = std::function<bool()>;  // of the iterate; true: stop
+    bool follow_shift(const Judge& judge, double tau, double goal, int most);
+    bool hop(const Judge& judge, double tau);
+    bool hop_on(const Judge& judge);
     /// Whether the iteration has stopped getting anywhere.
     bool is_stuck(double error);
     /// A lower bound of ‖(x̂, ẑ)‖ over all solutions that the iterates prove; zero if they prove nothing.
@@ -54,8 +67,13 @@ private:
     sdk::Vector true_x_, true_lambda_, best_x_;     // in the problem's units
     double least_error_ = 0.0, least_rest_ = 0.0;   // of is_stuck
     std::int64_t idle_iterations_ = 0;
+    double linres_ = 0;
     int centre_next_ = 0;  // exact Coulomb: iterations that aim at the present products
-    double jam_ = 0.0;     // counts short steps
+    std::int64_t most_hops_;
+    int hops_ = 0;
+    double rise_ = 1.0, lowest_tau_ = 0.0;
+    bool is_stopped_ = false;  // in a hop
+    double jam_ = 0.0;         // counts short steps
 };
 
 }  // namespace delassus::ipm

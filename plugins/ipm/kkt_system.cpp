@@ -29,11 +29,12 @@ void KktSystem::load(const ScaledSystem& system, bool definite) {
 }
 
 void KktSystem::rotate(const Complementarity& cones) {
-    unsymmetric_ = cones.coulomb();
-    coupling_ = unsymmetric_ ? &cones.coupling() : nullptr;
+    unsymmetric_ = cones.path() != Path::Associated;
     rotate_D(cones, true, d_rotated_);
     rotate_E(cones, true, e_rotated_);
     if (!unsymmetric_) return;
+    beside_.resize(groups_.size());
+    for (std::size_t g = 0; g < groups_.size(); ++g) beside_[g] = cones.beside(g);
     rotate_D(cones, false, d_reactions_);
     rotate_E(cones, false, e_mirrored_);
 }
@@ -130,9 +131,12 @@ void KktSystem::assemble(const sdk::Vector& theta) {
                 const auto place = static_cast<std::size_t>(e_place_[block.place + k]);
                 const std::int32_t first = groups_[row].first;
                 const double diagonal = row == column && i == j ? theta[first + i] + delta_ : 0.0;
-                const double beside = coupling_ && row == column && i == 1 && j == 0 ? (*coupling_)[first + 1] : 0.0;
-                values[place] += sign * (e_rotated_[block.value + k] + diagonal + beside);
-                if (unsymmetric_) upper_[place] += sign * (e_mirrored_[block.value + k] + diagonal);
+                values[place] += sign * (e_rotated_[block.value + k] + diagonal);
+                if (!unsymmetric_) continue;
+                upper_[place] += sign * (e_mirrored_[block.value + k] + diagonal);
+                if (row != column || j != 0 || i == 0) continue;
+                if (i == 1) values[place] += sign * beside_[row].below;
+                upper_[place] += sign * (i == 1 ? beside_[row].right : beside_[row].far);
             }
     }
 }
@@ -142,17 +146,33 @@ void KktSystem::find_T(std::size_t group, const sdk::Vector& theta) {
     const int rows = groups_[group].rows;
     const std::int32_t first = groups_[group].first;
     const Eigen::Map<const Eigen::MatrixXd> E(e_rotated_.data() + e_blocks_[group].value, rows, rows);
-    const double beside = coupling_ && rows > 1 ? (*coupling_)[first + 1] : 0.0;
+    const auto beside = unsymmetric_ ? beside_[group] : Complementarity::Beside{};
     Triple* T = &t_[3 * group];
+    Triple diagonal{1.0, 1.0, 1.0};
+    for (int i = 0; i < rows; ++i) diagonal[i] = theta[first + i] + delta_;
     if (E.isZero(0.0)) {
-        for (int i = 0; i < rows; ++i) T[i][i] = 1.0 / (theta[first + i] + delta_);
-        if (beside != 0.0) T[1][0] = -beside * T[0][0] * T[1][1];
+        // [a, r, e; b, q, 0; 0, 0, t]⁻¹, where a q − b r loses at most a digit
+        const double determinant = diagonal[0] * diagonal[1] - beside.below * beside.right;
+        if (beside.below == 0.0 || beside.right == 0.0) {
+            for (int i = 0; i < rows; ++i) T[i][i] = 1.0 / diagonal[i];
+            if (rows > 1) T[1][0] = -beside.below * T[0][0] * T[1][1];
+        } else {
+            T[0] = {diagonal[1] / determinant, -beside.right / determinant, 0.0};
+            T[1] = {-beside.below / determinant, diagonal[0] / determinant, 0.0};
+            T[2][2] = 1.0 / diagonal[2];
+        }
+        if (rows == 3 && beside.far != 0.0)
+            for (int i = 0; i < 2; ++i) T[i][2] = -T[i][0] * beside.far * T[2][2];
         return;
     }
     Eigen::Matrix3d block = Eigen::Matrix3d::Identity();
     block.topLeftCorner(rows, rows) = E;
     for (int i = 0; i < rows; ++i) block(i, i) += theta[first + i] + delta_;
-    block(1, 0) += beside;
+    if (rows > 1) {
+        block(1, 0) += beside.below;
+        block(0, 1) += beside.right;
+        if (rows > 2) block(0, 2) += beside.far;
+    }
     const Eigen::Matrix3d inverse =
         unsymmetric_ ? Eigen::Matrix3d(block.partialPivLu().inverse()) : sdk::inverse_of_definite(block);
     for (int i = 0; i < rows; ++i)
@@ -235,6 +255,16 @@ void KktSystem::solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vect
     }
 }
 
+void KktSystem::subtract_beside(const sdk::Vector& dz, sdk::Vector& rest) const {
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+        const std::int32_t first = groups_[g].first;
+        if (groups_[g].rows < 2) continue;
+        rest[first] -= beside_[g].right * dz[first + 1];
+        rest[first + 1] -= beside_[g].below * dz[first];
+        if (groups_[g].rows > 2) rest[first] -= beside_[g].far * dz[first + 2];
+    }
+}
+
 double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
                         sdk::Vector& dx, sdk::Vector& dz) {
     const auto norm = [this](const sdk::Vector& x, const sdk::Vector& z) {
@@ -265,9 +295,7 @@ double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, cons
         if (system_->E.nonZeros() > 0) product_.noalias() += system_->E * unrotated_;
         cones.rows_to_basis(product_);
         g_rest_ = g - product_ - theta_.cwiseProduct(dz);
-        if (coupling_)
-            for (const Group& group : groups_)
-                if (group.rows > 1) g_rest_[group.first + 1] -= (*coupling_)[group.first + 1] * dz[group.first];
+        if (unsymmetric_) subtract_beside(dz, g_rest_);
         for (Eigen::Index i = 0; i < m_; ++i)
             if (cones.is_held(i)) g_rest_[i] = 0.0;
         const double next = norm(f_rest_, g_rest_);

@@ -10,7 +10,7 @@
 //     reduced    Ê' + θ + δ1, for n = 0
 // and refined with the residual of the system as it stands. The patterns depend on those of H, D and E alone. Under the
 // associated law U = Z, and the augmented form is quasi-definite: L Δ Lᵀ exists in every order (Vanderbei 1995). With
-// exact Coulomb θ is triangular in each block, the values are unsymmetric on the same patterns, and L U is found
+// exact Coulomb θ couples the rows of each block, the values are unsymmetric on the same patterns, and L U is found
 // without exchanging pivots.
 #pragma once
 
@@ -74,6 +74,7 @@ private:
     void rotate(const Complementarity& cones);
     void rotate_D(const Complementarity& cones, bool by_rows, std::vector<double>& result) const;
     void rotate_E(const Complementarity& cones, bool by_rows, std::vector<double>& result) const;
+    void subtract_beside(const sdk::Vector& dz, sdk::Vector& rest) const;
     void find_T(std::size_t group, const sdk::Vector& theta);
     void assemble(const sdk::Vector& theta);
     [[nodiscard]] const double* reactions_D(std::size_t group) const {
@@ -103,7 +104,7 @@ private:
     bool couples_groups_ = false;         // Ê has blocks off the diagonal
 
     bool unsymmetric_ = false;
-    const sdk::Vector* coupling_ = nullptr;                  // of θ, m; null: none
+    std::vector<Complementarity::Beside> beside_;            // of θ, one a group where unsymmetric
     sdk::SparseColumns matrix_;                              // the lower triangle of the form
     std::vector<double> upper_;                              // beside it where unsymmetric: the mirrored values
     std::vector<std::int32_t> h_place_, d_place_, e_place_;  // into its values

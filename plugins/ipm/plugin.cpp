@@ -19,6 +19,8 @@ constexpr delassus_option options[] = {
     integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
     integer_option("stall_iterations", "15", 0, 1e9, "iterations",
                    "give up after this many iterations without an improvement by 1 %; 0: never"),
+    integer_option("hops", "0", 0, 1e6, "",
+                   "exact Coulomb: how often to look for a way on where the path to the solution ends"),
 };
 
 constexpr delassus::sdk::PluginInfo info{
