@@ -4,8 +4,6 @@
 // the method ends.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "interior_point.hpp"
 
@@ -63,11 +61,6 @@ bool InteriorPoint::coulomb_step() {
         length *= 0.8;
     jam_ = length < short_step ? jam_ + 1.0 : std::max(jam_ - 0.5, 0.0);
     centre_next_ = length < short_step ? std::min(centre_next_ + 1, 3) : std::max(centre_next_ - 1, 0);
-    if (getenv("IPMDBG"))
-        fprintf(stderr,
-                "fac %ld tau %.2e res f %.1e g %.1e small %.1e len %.3f centre %d jam %.1f linres %.1e hops %ld\n",
-                (long)kkt_.factorizations(), tau, f_.norm(), g_.norm(), smallest, length, centre_next_, jam_, linres_,
-                (long)hops_);
     return move(length);
 }
 

@@ -34,6 +34,7 @@ InteriorPoint::InteriorPoint(const sdk::OptionValues& options)
     : kkt_(settings_from(options)),
       step_fraction_(options.real("step_fraction")),
       stall_iterations_(options.integer("stall_iterations")),
+      shift_first_(options.choice("path") == "shift"),
       most_hops_(options.integer("hops")) {}
 
 void InteriorPoint::analyze(const sdk::ProblemView& problem) {
@@ -61,10 +62,11 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
     is_stopped_ = false;
     sdk::Monitor monitor(request, 0);
     if (!judge(problem, monitor, 0)) {
-        if (warm) {
+        if (warm && !problem.coulomb) {  // with exact Coulomb a good iterate may lie far from the path
             start_warm(problem, monitor.best_residual());
         } else {
             start_cold();
+            if (problem.coulomb && shift_first_) cones_.take_shift_path();
         }
         iterate(problem, monitor);
     }
@@ -150,7 +152,7 @@ bool InteriorPoint::step() {
 
 void InteriorPoint::find_direction(double enough) {
     right_ = target_ + g_;
-    linres_ = kkt_.solve(cones_, f_, right_, enough, dx_, dz_);
+    kkt_.solve(cones_, f_, right_, enough, dx_, dz_);
     cones_.set_direction(dz_);
 }
 

@@ -60,6 +60,8 @@ private:
     KktSystem kkt_;
     double step_fraction_;
     std::int64_t stall_iterations_;
+    bool shift_first_;
+    std::int64_t most_hops_;
 
     sdk::Vector x_;                                 // x̂
     sdk::Vector f_, g_;                             // what is left of the two equations
@@ -67,9 +69,7 @@ private:
     sdk::Vector true_x_, true_lambda_, best_x_;     // in the problem's units
     double least_error_ = 0.0, least_rest_ = 0.0;   // of is_stuck
     std::int64_t idle_iterations_ = 0;
-    double linres_ = 0;
     int centre_next_ = 0;  // exact Coulomb: iterations that aim at the present products
-    std::int64_t most_hops_;
     int hops_ = 0;
     double rise_ = 1.0, lowest_tau_ = 0.0;
     bool is_stopped_ = false;  // in a hop
