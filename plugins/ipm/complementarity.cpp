@@ -59,6 +59,12 @@ Triple out_of(const Basis& basis, const Triple& v) {
     return result;
 }
 
+/// The smallest eigenvalue of ℓ ∘ ℓ, (ℓ₀ − ‖ℓ₁‖)², for ℓ = W z = W⁻¹ s, from zᵀs and det z det s: the sum of both
+/// eigenvalues is 2 zᵀs, their product det z det s.
+double smallest_eigenvalue(double product, double squared) {
+    return squared / (product + std::sqrt(std::max(product * product - squared, 0.0)));
+}
+
 /// The largest α with ℓ + α d in the cone: 1/α is minus the smallest eigenvalue of d seen from ℓ̄ = ℓ/√det ℓ
 /// (Vandenberghe 2010, section 5.2).
 double longest_step_in_cone(const Triple& ell, const Triple& d) {
@@ -74,6 +80,8 @@ double longest_step_in_cone(const Triple& ell, const Triple& d) {
 }  // namespace
 
 void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& system) {
+    path_ = problem.coulomb ? Path::Product : Path::Associated;
+    share_ = 1.0;
     intervals_.clear();
     free_.clear();
     blocks_.clear();
@@ -115,7 +123,11 @@ void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& 
             }
         }
     }
-    degree_ = static_cast<double>(blocks_.size());
+    count_products();
+}
+
+void Complementarity::count_products() {
+    degree_ = static_cast<double>(blocks_.size()) * (path_ == Path::Product ? 2.0 : 1.0);
     for (const Interval& row : intervals_) degree_ += (row.has_lower ? 1.0 : 0.0) + (row.has_upper ? 1.0 : 0.0);
 }
 
@@ -147,7 +159,77 @@ void Complementarity::start(const sdk::Vector& z, const sdk::Vector& s, double z
         block.det_z = determinant(zb);
         block.det_s = determinant(sb);
         block.product = dot(zb, sb);
+        block.v = std::max(sb[0] - tangent_norm(sb), 0.01 * sb[0]);
     }
+    renew_velocity();
+}
+
+void Complementarity::renew_velocity() {
+    u_ = s_;
+    if (path_ == Path::Associated) return;
+    for (Block& block : blocks_) {
+        if (path_ == Path::Shift) {
+            const Triple s = load_rows(s_, block.first, block.rows);
+            const double length = tangent_norm(s);  // s₀ − ‖s_t‖ = det s/(s₀ + ‖s_t‖) keeps its digits
+            block.v = block.det_s / (s[0] + length) + (1.0 - share_) * (length - block.shift);
+        }
+        u_[block.first] = block.v;
+    }
+}
+
+double Complementarity::shift_of(const Block& block) const {
+    return (1.0 - share_) * block.shift + share_ * tangent_norm(load_rows(s_, block.first, block.rows));
+}
+
+void Complementarity::take_shift_path() {
+    path_ = Path::Shift;
+    for (Block& block : blocks_) {
+        const Triple s = load_rows(s_, block.first, block.rows);
+        block.shift = tangent_norm(s);
+        s_[block.first] = block.v + block.shift;
+        block.det_s = block.v * (block.v + 2.0 * block.shift);
+        block.product = dot(load_rows(z_, block.first, block.rows), load_rows(s_, block.first, block.rows));
+    }
+    count_products();
+    set_share(1.0);
+}
+
+void Complementarity::take_product_path() {
+    set_share(1.0);
+    path_ = Path::Product;
+    count_products();
+}
+
+void Complementarity::set_share(double share) {
+    share_ = share;
+    renew_velocity();
+}
+
+void Complementarity::advance_shift() {
+    for (Block& block : blocks_) block.shift = shift_of(block);
+}
+
+double Complementarity::shift_lag() const {
+    double sum = 0.0;
+    for (const Block& block : blocks_) {
+        const double lag = tangent_norm(load_rows(s_, block.first, block.rows)) - shift_of(block);
+        sum += lag * lag;
+    }
+    return std::sqrt(sum);
+}
+
+double Complementarity::distance_from_centre(double tau) const {
+    double largest = 0.0;
+    for (const Interval& row : intervals_) {
+        if (row.has_lower) largest = std::max(largest, std::abs(row.p * row.wl - tau));
+        if (row.has_upper) largest = std::max(largest, std::abs(row.q * row.wu - tau));
+    }
+    for (const Block& block : blocks_) {
+        const Triple rest = plus(jordan_product(block.ell, block.ell), -1.0, {tau, 0.0, 0.0});
+        largest = std::max(largest, std::sqrt(dot(rest, rest)));
+        if (path_ == Path::Product) largest = std::max(largest, std::abs(normal_product(block, 0.0) - tau));
+    }
+    return largest / tau;
 }
 
 double Complementarity::products(double step) const {
@@ -156,9 +238,38 @@ double Complementarity::products(double step) const {
         if (row.has_lower) sum += (row.p + step * row.dz) * (row.wl + step * row.dwl);
         if (row.has_upper) sum += (row.q - step * row.dz) * (row.wu + step * row.dwu);
     }
-    for (const Block& block : blocks_)
+    for (const Block& block : blocks_) {
         sum += step == 0.0 ? block.product : dot(plus(block.ell, step, block.dz), plus(block.ell, step, block.ds));
+        if (path_ == Path::Product) sum += normal_product(block, step);
+    }
     return sum;
+}
+
+double Complementarity::smallest_product() const {
+    double smallest = infinity;
+    for (const Interval& row : intervals_) {
+        if (row.has_lower) smallest = std::min(smallest, row.p * row.wl);
+        if (row.has_upper) smallest = std::min(smallest, row.q * row.wu);
+    }
+    for (const Block& block : blocks_) {
+        smallest = std::min(smallest, smallest_eigenvalue(block.product, block.det_z * block.det_s));
+        if (path_ == Path::Product) smallest = std::min(smallest, z_[block.first] * block.v);
+    }
+    return smallest;
+}
+
+double Complementarity::smallest_product(double step) const {
+    double smallest = infinity;
+    for (const Interval& row : intervals_) {
+        if (row.has_lower) smallest = std::min(smallest, (row.p + step * row.dz) * (row.wl + step * row.dwl));
+        if (row.has_upper) smallest = std::min(smallest, (row.q - step * row.dz) * (row.wu + step * row.dwu));
+    }
+    for (const Block& block : blocks_) {
+        const Triple z = plus(block.ell, step, block.dz), s = plus(block.ell, step, block.ds);
+        smallest = std::min(smallest, smallest_eigenvalue(dot(z, s), determinant(z) * determinant(s)));
+        if (path_ == Path::Product) smallest = std::min(smallest, normal_product(block, step));
+    }
+    return smallest;
 }
 
 void Complementarity::scale(sdk::Vector& theta) {
@@ -169,11 +280,31 @@ void Complementarity::scale(sdk::Vector& theta) {
         theta[row.row] = (row.has_lower ? row.wl / row.p : 0.0) + (row.has_upper ? row.wu / row.q : 0.0);
     for (Block& block : blocks_) {
         scale_block(block);
-        for (std::int32_t i = 0; i < block.rows; ++i) {
-            const double root = block.root_theta[static_cast<std::size_t>(i)];
-            theta[block.first + i] = root * root;
-        }
+        Triple value{};
+        find_theta(block, value);
+        store_rows(value, block.first, block.rows, theta);
     }
+}
+
+void Complementarity::find_theta(Block& block, Triple& diagonal) const {
+    for (std::size_t k = 0; k < 3; ++k) diagonal[k] = block.root_theta[k] * block.root_theta[k];
+    block.beside = {};
+    if (path_ == Path::Associated) return;
+    const double small = diagonal[1], along = 0.5 * (diagonal[0] + small);
+    block.beside.below = -small;
+    diagonal = {block.v / z_[block.first], along, diagonal[2]};
+    if (path_ == Path::Product) return;
+    const Triple s = load_rows(s_, block.first, block.rows);
+    const double length = tangent_norm(s);
+    const Triple seen =
+        into(block.rows_in, {0.0, length > 0.0 ? s[1] / length : 0.0, length > 0.0 ? s[2] / length : 0.0});
+    block.c = share_ * seen[1];
+    block.d = share_ * seen[2];
+    const double rest = seen[1] > 0.0 ? seen[2] * seen[2] / (1.0 + seen[1]) : 1.0 - seen[1];  // 1 − c/φ
+    const double one_less = (1.0 - share_) + share_ * rest;
+    diagonal[0] = (1.0 + block.c) * small;
+    block.beside.right = one_less * along - small;
+    block.beside.far = -block.d * diagonal[2];
 }
 
 void Complementarity::scale_block(Block& block) {
@@ -190,8 +321,15 @@ void Complementarity::scale_block(Block& block) {
     block.root_theta = {block.eta * omega, block.eta / omega, block.eta};
     const double ny = length > 0.0 ? wy / length : 1.0, nz = length > 0.0 ? wz / length : 0.0;
     const double half = std::sqrt(0.5);
-    block.basis = {Triple{half, half * ny, half * nz}, Triple{half, -half * ny, -half * nz},
-                   block.rows == 3 ? Triple{0.0, -nz, ny} : Triple{0.0, 0.0, 1.0}};
+    const Triple across = block.rows == 3 ? Triple{0.0, -nz, ny} : Triple{0.0, 0.0, 1.0};
+    block.eigen = {Triple{half, half * ny, half * nz}, Triple{half, -half * ny, -half * nz}, across};
+    if (path_ != Path::Associated) {
+        const Triple normal{1.0, 0.0, 0.0}, along{0.0, ny, nz};
+        block.rows_in = {normal, along, across};
+        block.reactions_in = {plus(normal, -1.0, along), along, across};
+    } else {
+        block.rows_in = block.reactions_in = block.eigen;
+    }
 
     // ℓ = (det z det s)^(1/4) ℓ̄, ℓ̄₀ = γ, det ℓ̄ = 1 (Vandenberghe 2010, section 5.1).
     const double size = std::sqrt(root_z * root_s), weight = 1.0 / (sn[0] + zn[0] + 2.0 * gamma);
@@ -202,14 +340,27 @@ void Complementarity::scale_block(Block& block) {
     block.ell = {size * ell[0], size * correction * ell[1], size * correction * ell[2]};
 }
 
-void Complementarity::to_eigenbasis(sdk::Vector& v) const {
+void Complementarity::rows_to_basis(sdk::Vector& v) const {
     for (const Block& block : blocks_)
-        store_rows(into(block.basis, load_rows(v, block.first, block.rows)), block.first, block.rows, v);
+        store_rows(into(block.rows_in, load_rows(v, block.first, block.rows)), block.first, block.rows, v);
 }
 
-void Complementarity::from_eigenbasis(sdk::Vector& v) const {
+void Complementarity::reactions_from_basis(sdk::Vector& v) const {
     for (const Block& block : blocks_)
-        store_rows(out_of(block.basis, load_rows(v, block.first, block.rows)), block.first, block.rows, v);
+        store_rows(out_of(block.reactions_in, load_rows(v, block.first, block.rows)), block.first, block.rows, v);
+}
+
+// W q in the block's basis. With exact Coulomb its first row has the target of v, or that of s₀ − σ.
+void Complementarity::store_target(Block& block, sdk::Vector& t) const {
+    Triple value = into(block.eigen, block.q);
+    for (std::size_t k = 0; k < 3; ++k) value[k] *= block.root_theta[k];
+    if (path_ != Path::Associated) {
+        const double half = std::sqrt(0.5), along = half * (value[0] - value[1]);
+        // (W q)₀ − c (W q)_ŵ − d (W q)_t, with (W q)₀ = (W q)_ŵ + √2 value₁
+        const double shifted = (1.0 - block.c) * along + 2.0 * half * value[1] - block.d * value[2];
+        value = {path_ == Path::Product ? block.tv : shifted, along, value[2]};
+    }
+    store_rows(value, block.first, block.rows, t);
 }
 
 void Complementarity::target_zero(sdk::Vector& t) {
@@ -221,31 +372,31 @@ void Complementarity::target_zero(sdk::Vector& t) {
     }
     for (Block& block : blocks_) {
         block.q = {-block.ell[0], -block.ell[1], -block.ell[2]};
-        Triple eigen = into(block.basis, block.q);
-        for (std::size_t k = 0; k < 3; ++k) eigen[k] *= block.root_theta[k];
-        store_rows(eigen, block.first, block.rows, t);
+        block.tv = -block.v;
+        store_target(block, t);
     }
 }
 
-void Complementarity::target(double tau, sdk::Vector& t) {
+void Complementarity::target(double tau, bool second_order, sdk::Vector& t) {
     t.setZero(z_.size());
+    const double second = second_order ? 1.0 : 0.0;
     for (Interval& row : intervals_) {
-        row.tl = row.has_lower ? (tau - row.dz * row.dwl) / row.p - row.wl : 0.0;
-        row.tu = row.has_upper ? (tau + row.dz * row.dwu) / row.q - row.wu : 0.0;
+        row.tl = row.has_lower ? (tau - second * row.dz * row.dwl) / row.p - row.wl : 0.0;
+        row.tu = row.has_upper ? (tau + second * row.dz * row.dwu) / row.q - row.wu : 0.0;
         t[row.row] = row.tl - row.tu;
     }
     for (Block& block : blocks_) {
-        Triple rest = plus(jordan_product(block.ell, block.ell), 1.0, jordan_product(block.ds, block.dz));
+        Triple rest = jordan_product(block.ell, block.ell);
+        if (second_order) rest = plus(rest, 1.0, jordan_product(block.ds, block.dz));
         block.q = jordan_divide(block.ell, {tau - rest[0], -rest[1], -rest[2]});
-        Triple eigen = into(block.basis, block.q);
-        for (std::size_t k = 0; k < 3; ++k) eigen[k] *= block.root_theta[k];
-        store_rows(eigen, block.first, block.rows, t);
+        block.tv = (tau - second * block.dz0 * block.dv) / z_[block.first] - block.v;
+        store_target(block, t);
     }
 }
 
 void Complementarity::set_direction(const sdk::Vector& dz) {
     direction_ = dz;
-    from_eigenbasis(direction_);
+    reactions_from_basis(direction_);
     for (Interval& row : intervals_) {
         row.dz = dz[row.row];
         row.dwl = row.has_lower ? row.tl - row.wl / row.p * row.dz : 0.0;
@@ -253,8 +404,13 @@ void Complementarity::set_direction(const sdk::Vector& dz) {
     }
     for (Block& block : blocks_) {
         Triple eigen = load_rows(dz, block.first, block.rows);
+        if (path_ != Path::Associated) {
+            block.dz0 = eigen[0];
+            block.dv = block.tv - block.v / z_[block.first] * block.dz0;
+            eigen = {std::sqrt(0.5) * eigen[1], std::sqrt(0.5) * (2.0 * eigen[0] - eigen[1]), eigen[2]};
+        }
         for (std::size_t k = 0; k < 3; ++k) eigen[k] *= block.root_theta[k];
-        block.dz = out_of(block.basis, eigen);
+        block.dz = out_of(block.eigen, eigen);
         block.ds = plus(block.q, -1.0, block.dz);
     }
 }
@@ -274,9 +430,11 @@ double Complementarity::longest_step() const {
             limit(row.wu, row.dwu);
         }
     }
-    for (const Block& block : blocks_)
+    for (const Block& block : blocks_) {
         longest =
             std::min({longest, longest_step_in_cone(block.ell, block.dz), longest_step_in_cone(block.ell, block.ds)});
+        if (path_ == Path::Product) limit(block.v, block.dv);
+    }
     return longest;
 }
 
@@ -298,17 +456,19 @@ void Complementarity::advance(double step) {
         s_[row.row] = row.wl - row.wu;
     }
     for (Block& block : blocks_) {
-        Triple eigen = into(block.basis, block.ds);
+        Triple eigen = into(block.eigen, block.ds);
         for (std::size_t k = 0; k < 3; ++k) eigen[k] *= step * block.root_theta[k];
-        store_rows(plus(load_rows(s_, block.first, block.rows), 1.0, out_of(block.basis, eigen)), block.first,
+        store_rows(plus(load_rows(s_, block.first, block.rows), 1.0, out_of(block.eigen, eigen)), block.first,
                    block.rows, s_);
         // det W v = η² det v.
         const Triple z = plus(block.ell, step, block.dz), s = plus(block.ell, step, block.ds);
         block.det_z = determinant(z) / (block.eta * block.eta);
         block.det_s = determinant(s) * (block.eta * block.eta);
         block.product = dot(z, s);
+        if (path_ == Path::Product) block.v += step * block.dv;
         renew_products(block);
     }
+    renew_velocity();
 }
 
 // z and s themselves are the better source while rounding leaves them enough digits: the values carried along agree

@@ -13,10 +13,8 @@ namespace {
 // ‖S r‖ = 1 in scaled units. A solution larger than the data by this factor counts as none.
 constexpr double largest_solution = 1e9;
 
-// Relative residuals of linear solves. The predictor is only a forecast. Errors that the corrector leaves show in the
-// residuals of the next iteration.
-constexpr double predictor_residual = 1e-3;
-constexpr double corrector_residual = 1e-9;
+// With exact Coulomb, the error from which on semismooth Newton is the better way to end than hops.
+constexpr double error_for_ssn = 1e-5;
 
 KktSettings settings_from(const sdk::OptionValues& options) {
     const std::string form = options.choice("form");
@@ -35,7 +33,9 @@ double root_mean_square(const sdk::Vector& v) {
 InteriorPoint::InteriorPoint(const sdk::OptionValues& options)
     : kkt_(settings_from(options)),
       step_fraction_(options.real("step_fraction")),
-      stall_iterations_(options.integer("stall_iterations")) {}
+      stall_iterations_(options.integer("stall_iterations")),
+      shift_first_(options.choice("path") == "shift"),
+      most_hops_(options.integer("hops")) {}
 
 void InteriorPoint::analyze(const sdk::ProblemView& problem) {
     scaling_.analyze(problem);
@@ -54,12 +54,19 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
     best_x_ = true_x_;
     least_error_ = least_rest_ = std::numeric_limits<double>::infinity();
     idle_iterations_ = 0;
+    centre_next_ = 0;
+    jam_ = 0.0;
+    hops_ = 0;
+    rise_ = 1.0;
+    lowest_tau_ = std::numeric_limits<double>::infinity();
+    is_stopped_ = false;
     sdk::Monitor monitor(request, 0);
     if (!judge(problem, monitor, 0)) {
-        if (warm) {
+        if (warm && !problem.coulomb) {  // with exact Coulomb a good iterate may lie far from the path
             start_warm(problem, monitor.best_residual());
         } else {
             start_cold();
+            if (problem.coulomb && shift_first_) cones_.take_shift_path();
         }
         iterate(problem, monitor);
     }
@@ -92,8 +99,10 @@ void InteriorPoint::start_cold() {
     cones_.start(zero, zero, 1.0, theta);
     cones_.scale(theta_);
     kkt_.factorize(cones_, theta_);
-    kkt_.solve(cones_, system.a, -system.b, corrector_residual, x_, dz_);
-    cones_.from_eigenbasis(dz_);
+    right_ = -system.b;
+    cones_.rows_to_basis(right_);
+    kkt_.solve(cones_, system.a, right_, corrector_residual, x_, dz_);
+    cones_.reactions_from_basis(dz_);
     const double size = std::max(root_mean_square(dz_), 1e-2);
     cones_.start(dz_, -theta * dz_, size, 10.0 * theta * size);
 }
@@ -113,7 +122,7 @@ void InteriorPoint::find_residuals() {
     const ScaledSystem& system = scaling_.system();
     const sdk::Vector& z = cones_.z();
     f_ = system.a;
-    g_ = cones_.s() - system.b;
+    g_ = cones_.u() - system.b;
     if (f_.size() > 0) {
         f_.noalias() -= system.H * x_;
         f_.noalias() += system.D.transpose() * z;
@@ -128,21 +137,26 @@ void InteriorPoint::find_residuals() {
 bool InteriorPoint::step() {
     cones_.scale(theta_);
     kkt_.factorize(cones_, theta_);
-    cones_.to_eigenbasis(g_);
+    cones_.rows_to_basis(g_);
     cones_.target_zero(target_);
-    right_ = target_ + g_;
     const double tau = cones_.mean_product();
-    kkt_.solve(cones_, f_, right_, tau > 0.0 ? predictor_residual : corrector_residual, dx_, dz_);
-    cones_.set_direction(dz_);
+    find_direction(tau > 0.0 ? predictor_residual : corrector_residual);
     if (tau > 0.0) {
         const double predicted = std::min(1.0, cones_.longest_step());
         const double ratio = std::clamp(cones_.mean_product(predicted) / tau, 0.0, 1.0);
-        cones_.target(ratio * ratio * ratio * tau, target_);
-        right_ = target_ + g_;
-        kkt_.solve(cones_, f_, right_, corrector_residual, dx_, dz_);
-        cones_.set_direction(dz_);
+        cones_.target(ratio * ratio * ratio * tau, true, target_);
+        find_direction(corrector_residual);
     }
-    const double length = std::min(1.0, step_fraction_ * cones_.longest_step());
+    return move(std::min(1.0, step_fraction_ * cones_.longest_step()));
+}
+
+void InteriorPoint::find_direction(double enough) {
+    right_ = target_ + g_;
+    kkt_.solve(cones_, f_, right_, enough, dx_, dz_);
+    cones_.set_direction(dz_);
+}
+
+bool InteriorPoint::move(double length) {
     if (!dx_.allFinite() || !dz_.allFinite() || !(length > 0.0)) return false;
     x_ += length * dx_;
     cones_.advance(length);
@@ -151,17 +165,22 @@ bool InteriorPoint::step() {
 
 void InteriorPoint::iterate(const sdk::ProblemView& problem, sdk::Monitor& monitor) {
     sdk::Outcome& outcome = monitor.outcome();
-    for (std::int64_t iteration = 1;; ++iteration) {
-        find_residuals();
-        if (!step()) {
-            outcome.status = DELASSUS_STALLED;
-            outcome.message = "rounding leaves no step that stays inside the cones";
-            return;
-        }
+    const auto stall = [&outcome](std::string message) {
+        outcome.status = DELASSUS_STALLED;
+        outcome.message = std::move(message);
+    };
+    std::int64_t iteration = 0;
+    const auto judge_iterate = [&] {
         true_lambda_ = scaling_.system().z_scale.cwiseProduct(cones_.z());
         true_x_ = scaling_.system().x_scale.cwiseProduct(x_);
-        if (judge(problem, monitor, iteration)) return;
-        if (const double size = proven_size(); size > largest_solution) {
+        return judge(problem, monitor, ++iteration);
+    };
+    while (true) {
+        find_residuals();
+        if (!(problem.coulomb ? coulomb_step() : step()))
+            return stall("rounding leaves no step that stays inside the cones");
+        if (judge_iterate()) return;
+        if (const double size = problem.coulomb ? 0.0 : proven_size(); size > largest_solution) {
             char text[160];
             std::snprintf(text, sizeof text,
                           "there is no solution: in units of the data, x or the reactions would have to exceed %.1e",
@@ -170,10 +189,13 @@ void InteriorPoint::iterate(const sdk::ProblemView& problem, sdk::Monitor& monit
             outcome.message = text;
             return;
         }
-        if (is_stuck(monitor.best_residual())) {
-            outcome.status = DELASSUS_STALLED;
-            outcome.message = "no progress for " + std::to_string(stall_iterations_) + " iterations";
-            return;
+        if (problem.coulomb && is_jammed()) {
+            if (monitor.best_residual() < error_for_ssn || !hop_on(judge_iterate)) {
+                if (!is_stopped_) stall("the path to the solution ends: steps inside the cones stay short");
+                return;
+            }
+        } else if (is_stuck(monitor.best_residual())) {
+            return stall("no progress for " + std::to_string(stall_iterations_) + " iterations");
         }
     }
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Primal-dual interior point method for the convex problem of the associated law (README.md).
+// Primal-dual interior point method: for the convex problem of the associated law, and for exact Coulomb (README.md).
 #pragma once
 
+#include <algorithm>
+#include <functional>
+#include <limits>
 #include <string>
 
 #include "delassus/sdk/monitor.hpp"
@@ -22,6 +25,11 @@ public:
     }
 
 private:
+    // Relative residuals of linear solves. The predictor is only a forecast. Errors that the corrector leaves show in
+    // the residuals of the next iteration.
+    static constexpr double predictor_residual = 1e-3;
+    static constexpr double corrector_residual = 1e-9;
+
     void start_cold();
     void start_warm(const sdk::ProblemView& problem, double error);
     void find_residuals();
@@ -29,6 +37,19 @@ private:
     bool judge(const sdk::ProblemView& problem, sdk::Monitor& monitor, std::int64_t iteration);
     void iterate(const sdk::ProblemView& problem, sdk::Monitor& monitor);
     bool step();
+    bool coulomb_step();  // coulomb_step.cpp
+    /// δ for the target in target_; its error of the linear solve is at most `enough`.
+    void find_direction(double enough);
+    void aim(double tau, bool second_order);
+    [[nodiscard]] double allowed_length() const { return std::min(1.0, 0.95 * cones_.longest_step()); }
+    bool move(double length);
+    [[nodiscard]] bool is_jammed() const;
+
+    // coulomb_path.cpp
+    using Judge = std::function<bool()>;  // of the iterate; true: stop
+    bool follow_shift(const Judge& judge, double tau, double goal, int most);
+    bool hop(const Judge& judge, double tau);
+    bool hop_on(const Judge& judge);
     /// Whether the iteration has stopped getting anywhere.
     bool is_stuck(double error);
     /// A lower bound of ‖(x̂, ẑ)‖ over all solutions that the iterates prove; zero if they prove nothing.
@@ -39,6 +60,8 @@ private:
     KktSystem kkt_;
     double step_fraction_;
     std::int64_t stall_iterations_;
+    bool shift_first_;
+    std::int64_t most_hops_;
 
     sdk::Vector x_;                                 // x̂
     sdk::Vector f_, g_;                             // what is left of the two equations
@@ -46,6 +69,11 @@ private:
     sdk::Vector true_x_, true_lambda_, best_x_;     // in the problem's units
     double least_error_ = 0.0, least_rest_ = 0.0;   // of is_stuck
     std::int64_t idle_iterations_ = 0;
+    int centre_next_ = 0;  // exact Coulomb: iterations that aim at the present products
+    int hops_ = 0;
+    double rise_ = 1.0, lowest_tau_ = 0.0;
+    bool is_stopped_ = false;  // in a hop
+    double jam_ = 0.0;         // counts short steps
 };
 
 }  // namespace delassus::ipm

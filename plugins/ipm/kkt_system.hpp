@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The linear system of an interior point step, in the eigenbases of the scaling (complementarity.hpp):
+// The linear system of an interior point step, in the bases U of the rows and Z of the reactions (complementarity.hpp):
 //
-//     Ĥ δx − D̂'ᵀ δz       = f        D̂' = Qᵀ D̂,  Ê' = Qᵀ Ê Q
+//     Ĥ δx − D̂″ᵀ δz       = f        D̂' = Uᵀ D̂,  D̂″ = Zᵀ D̂,  Ê' = Uᵀ Ê Z
 //     D̂' δx + (Ê' + θ) δz = g
 //
 // factored with static regularisation, θ + δ1 and Ĥ + ρ1, in one of three forms:
-//     normal     Ĥ + ρ1 + D̂'ᵀ T D̂' with T = (Ê' + θ + δ1)⁻¹ by groups; where Ê couples no two groups
-//     augmented  [Ĥ + ρ1, D̂'ᵀ; D̂', −(Ê' + θ + δ1)], quasi-definite: L Δ Lᵀ exists in every order (Vanderbei 1995)
+//     normal     Ĥ + ρ1 + D̂″ᵀ T D̂' with T = (Ê' + θ + δ1)⁻¹ by groups; where Ê couples no two groups
+//     augmented  [Ĥ + ρ1, D̂″ᵀ; D̂', −(Ê' + θ + δ1)]
 //     reduced    Ê' + θ + δ1, for n = 0
-// and refined with the residual of the system as it stands. The patterns depend on those of H, D and E alone.
+// and refined with the residual of the system as it stands. The patterns depend on those of H, D and E alone. Under the
+// associated law U = Z, and the augmented form is quasi-definite: L Δ Lᵀ exists in every order (Vanderbei 1995). With
+// exact Coulomb θ couples the rows of each block, the values are unsymmetric on the same patterns, and L U is found
+// without exchanging pivots.
 #pragma once
 
 #include <string>
@@ -36,11 +39,11 @@ public:
     /// Takes new values; system must outlive the solves. definite: whether H is.
     void load(const ScaledSystem& system, bool definite);
 
-    /// theta: m, in the eigenbases of cones. Raises the regularisation until the factorisation exists. Throws
+    /// theta: m, the diagonal, in the bases of cones. Raises the regularisation until the factorisation exists. Throws
     /// sdk::NumericalFailure if it does not for any.
     void factorize(const Complementarity& cones, const sdk::Vector& theta);
 
-    /// Solves for δx (n) and δz (m) from f (n) and g (m); rows of g and δz in the eigenbases. Refines until the
+    /// Solves for δx (n) and δz (m) from f (n) and g (m); rows of g and δz in the bases. Refines until the
     /// relative residual, which it returns, is at most `enough`.
     double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
                  sdk::Vector& dx, sdk::Vector& dz);
@@ -69,7 +72,14 @@ private:
     [[nodiscard]] sdk::SparseColumns pattern(const sdk::ProblemView& problem, Form form) const;
     void find_places(const sdk::ProblemView& problem);
     void rotate(const Complementarity& cones);
+    void rotate_D(const Complementarity& cones, bool by_rows, std::vector<double>& result) const;
+    void rotate_E(const Complementarity& cones, bool by_rows, std::vector<double>& result) const;
+    void subtract_beside(const sdk::Vector& dz, sdk::Vector& rest) const;
+    void find_T(std::size_t group, const sdk::Vector& theta);
     void assemble(const sdk::Vector& theta);
+    [[nodiscard]] const double* reactions_D(std::size_t group) const {
+        return (unsymmetric_ ? d_reactions_ : d_rotated_).data() + d_blocks_[group].value;
+    }
     void add_normal_block(std::size_t group);
     void solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz);
 
@@ -84,14 +94,19 @@ private:
     std::vector<std::int32_t> group_of_row_;
     std::vector<DBlock> d_blocks_;  // one a group
     std::vector<std::int32_t> column_;
-    std::vector<double> d_value_, d_rotated_;
-    std::vector<std::size_t> d_slot_;  // of each entry of D, into d_value_
-    std::vector<EBlock> e_blocks_;     // every diagonal block, then the others
+    std::vector<double> d_value_, d_rotated_;  // D̂, D̂'
+    std::vector<double> d_reactions_;          // D̂″ where it is not D̂'
+    std::vector<std::size_t> d_slot_;          // of each entry of D, into d_value_
+    std::vector<EBlock> e_blocks_;             // every diagonal block, then the others
     std::vector<double> e_value_, e_rotated_;
+    std::vector<double> e_mirrored_;      // Zᵀ Ê U where it is not Ê': the transpose of Ê' on the other side
     std::vector<std::ptrdiff_t> e_slot_;  // of each entry of E, into e_value_; −1 above the diagonal blocks
     bool couples_groups_ = false;         // Ê has blocks off the diagonal
 
+    bool unsymmetric_ = false;
+    std::vector<Complementarity::Beside> beside_;            // of θ, one a group where unsymmetric
     sdk::SparseColumns matrix_;                              // the lower triangle of the form
+    std::vector<double> upper_;                              // beside it where unsymmetric: the mirrored values
     std::vector<std::int32_t> h_place_, d_place_, e_place_;  // into its values
     std::vector<Triple> t_;                                  // rows of T, three a group
     sdk::SparseFactor factor_;

@@ -9,6 +9,8 @@ using delassus::sdk::real_option;
 
 constexpr const char* forms[] = {"auto", "normal", "augmented"};
 
+constexpr const char* paths[] = {"product", "shift"};
+
 constexpr delassus_option options[] = {
     choice_option(
         "form", "auto", forms,
@@ -19,15 +21,21 @@ constexpr delassus_option options[] = {
     integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
     integer_option("stall_iterations", "15", 0, 1e9, "iterations",
                    "give up after this many iterations without an improvement by 1 %; 0: never"),
+    choice_option(
+        "path", "product", paths,
+        "exact Coulomb: the equation by which the start is left, the product of normal force and velocity, or "
+        "the shift by the sliding speed"),
+    integer_option("hops", "0", 0, 1e6, "",
+                   "exact Coulomb: how often to look for a way on where the path to the solution ends"),
 };
 
 constexpr delassus::sdk::PluginInfo info{
     .name = "ipm",
     .version = "0.1.0",
-    .description = "primal-dual interior point method with Nesterov-Todd scaling and predictor-corrector steps",
+    .description = "primal-dual interior point method with Nesterov-Todd scaling, for both friction laws",
     .licence = "BSD-3-Clause AND MPL-2.0",
     .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
-                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
+                    DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
                     DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_H_SEMIDEFINITE | DELASSUS_CAN_REDUCED |
                     DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
 };

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 #include <cmath>
 #include <random>
 #include <vector>
@@ -134,6 +136,105 @@ TEST(SparseFactor, RefusesPivotsOfTheWrongSign) {
         problem.matrix.coeffRef(problem.matrix.rows() / 2, problem.matrix.rows() / 2) = NAN;
         EXPECT_FALSE(factor.factorize(problem.matrix)) << side;
     }
+}
+
+/// A matrix of symmetric pattern by its lower triangle and the mirrored values beside it.
+struct Unsymmetric {
+    SparseColumns lower;
+    std::vector<double> upper;
+
+    [[nodiscard]] SparseColumns whole() const {
+        Entries entries;
+        for (int j = 0; j < lower.cols(); ++j)
+            for (int k = lower.outerIndexPtr()[j]; k < lower.outerIndexPtr()[j + 1]; ++k) {
+                const std::int32_t i = lower.innerIndexPtr()[k];
+                entries.emplace_back(i, j, lower.valuePtr()[k]);
+                if (i != j) entries.emplace_back(j, i, upper[static_cast<std::size_t>(k)]);
+            }
+        return matrix_of(static_cast<int>(lower.rows()), entries);
+    }
+};
+
+/// The problem's matrix with random values of their own in both triangles; diagonals keep their signs.
+Unsymmetric unsymmetric(const Problem& problem) {
+    std::mt19937_64 random(11);
+    std::normal_distribution<double> normal;
+    Unsymmetric result{problem.matrix, std::vector<double>(static_cast<std::size_t>(problem.matrix.nonZeros()))};
+    for (int j = 0; j < result.lower.cols(); ++j)
+        for (int k = result.lower.outerIndexPtr()[j]; k < result.lower.outerIndexPtr()[j + 1]; ++k) {
+            double& value = result.lower.valuePtr()[k];
+            const bool diagonal = result.lower.innerIndexPtr()[k] == j;
+            if (!diagonal) value *= 1.0 + 0.5 * normal(random);
+            result.upper[static_cast<std::size_t>(k)] = diagonal ? value : value + 0.3 * normal(random);
+        }
+    return result;
+}
+
+Vector solution(SparseFactor& factor, const Unsymmetric& problem) {
+    factor.analyze(problem.lower, problem.lower.rows());
+    EXPECT_TRUE(factor.factorize(problem.lower, problem.upper));
+    Vector v = right_hand_side(problem.lower.rows());
+    factor.solve(v);
+    return v;
+}
+
+TEST(SparseFactor, SolvesUnsymmetricMatricesAsDenseLuDoes) {
+    for (const int side : {1, 2, 5, 8}) {
+        for (const Problem& problem : {definite(side), quasi_definite(side)}) {
+            SparseFactor factor(SparseFactor::Kernels::Eigen);
+            const Unsymmetric matrix = unsymmetric(problem);
+            const Eigen::MatrixXd dense(matrix.whole());
+            const Vector expected = dense.partialPivLu().solve(right_hand_side(dense.rows()));
+            EXPECT_LT((solution(factor, matrix) - expected).norm(), 1e-10 * expected.norm()) << side;
+            EXPECT_EQ(factor.replaced_pivots(), 0);
+        }
+    }
+}
+
+TEST(SparseFactor, SolvesLargeUnsymmetricMatricesByBlas) {
+    if (!sdk::Blas::find()) GTEST_SKIP() << "neither OpenBLAS nor BLIS is installed";
+    for (const Problem& problem : {definite(18), quasi_definite(12)}) {
+        SparseFactor factor, by_eigen(SparseFactor::Kernels::Eigen);
+        const Unsymmetric matrix = unsymmetric(problem);
+        const Vector v = solution(factor, matrix);
+        EXPECT_TRUE(factor.uses_blas());
+        const Vector right = right_hand_side(v.size());
+        EXPECT_LT((matrix.whole() * v - right).norm(), 1e-9 * right.norm());
+        EXPECT_LT((v - solution(by_eigen, matrix)).norm(), 1e-9 * v.norm());
+        EXPECT_TRUE(v == solution(factor, matrix)) << "what the last factorisation left is used again";
+        expect_solution(problem, solution(factor, problem));
+    }
+}
+
+TEST(SparseFactor, GivesASymmetricMatrixTheSameSolutionByLu) {
+    const Problem problem = quasi_definite(6);
+    const std::vector<double> upper(problem.matrix.valuePtr(), problem.matrix.valuePtr() + problem.matrix.nonZeros());
+    SparseFactor factor;
+    const Vector expected = solution(factor, problem);
+    EXPECT_LT((solution(factor, Unsymmetric{problem.matrix, upper}) - expected).norm(), 1e-11 * expected.norm());
+}
+
+TEST(SparseFactor, ReplacesTinyPivotsOfAnUnsymmetricMatrix) {
+    const SparseColumns lower = matrix_of(2, {{0, 0, 1e-30}, {1, 0, 2.0}, {1, 1, 1.0}});
+    SparseFactor factor;
+    factor.analyze(lower, 2);
+    ASSERT_TRUE(factor.factorize(lower, std::vector<double>{1e-30, -1.0, 1.0}));
+    EXPECT_EQ(factor.replaced_pivots(), 1);
+    Vector v(2);  // [0, −1; 2, 1] v = (3, 5)
+    v << 3.0, 5.0;
+    factor.solve(v);
+    EXPECT_NEAR(v[0], 4.0, 0.1);
+    EXPECT_NEAR(v[1], -3.0, 0.1);
+}
+
+TEST(SparseFactor, RefusesUnsymmetricMatricesWithoutPivots) {
+    SparseColumns lower = matrix_of(2, {{0, 0, 0.0}, {1, 0, 0.0}, {1, 1, 1.0}});
+    SparseFactor factor;
+    factor.analyze(lower, 2);
+    EXPECT_FALSE(factor.factorize(lower, std::vector<double>{0.0, 0.0, 1.0}));
+    EXPECT_FALSE(factor.factorize(lower, std::vector<double>{NAN, NAN, 1.0}));
+    lower.valuePtr()[0] = NAN;
+    EXPECT_FALSE(factor.factorize(lower, std::vector<double>{NAN, 0.0, 1.0}));
 }
 
 }  // namespace

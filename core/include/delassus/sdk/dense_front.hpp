@@ -16,6 +16,10 @@ namespace delassus::sdk {
 ///     A11 = L11 S L11ᵀ,  L21 = A21 L11⁻ᵀ S,  A22 ← A22 − L21 S L21ᵀ,   S = diag(±1)
 ///
 /// Columns are halved until few are left, so that nearly all work is in products of matrices.
+///
+/// An unsymmetric matrix [A11 A12; A21 A22] is factored in the same way, its rows to the right transposed so that they
+/// lie as its columns do: A11 = L11 V11ᵀ, L21 = A21 V11⁻ᵀ, V21 = A12ᵀ L11⁻ᵀ, A22 ← A22 − L21 V21ᵀ, with lower triangles
+/// L11 and V11 whose diagonals share each pivot as roots of one size.
 class DenseFront {
 public:
     using Matrix = Eigen::MatrixXd;
@@ -33,6 +37,18 @@ public:
         const Eigen::Index k = panel.cols();
         if (update.rows() > 0) subtract_lower(part(panel, k, 0, update.rows(), k), sign, update);
         return true;
+    }
+
+    /// lower: [A11; A21], height × k, becomes [L11; L21]; upper: [A11ᵀ; A12ᵀ] becomes [V11; V21]. Lower triangles of
+    /// the squares on top are read; what is above them is meaningless afterwards. update: A22, all of it. The order of
+    /// pivots is fixed: one below `smallest` times the largest entry beside it in its square is replaced by that bound.
+    /// Returns how many were; −1 if entries are not finite or a row and column are zero.
+    [[nodiscard]] int factor(Block lower, Block upper, double smallest, Block update) {
+        const int replaced = factor_columns(lower, upper, smallest);
+        const Eigen::Index k = lower.cols(), rest = update.rows();
+        if (replaced >= 0 && rest > 0)
+            add_product(-1.0, part(lower, k, 0, rest, k), part(upper, k, 0, rest, k), update);
+        return replaced;
     }
 
 private:
@@ -91,6 +107,54 @@ private:
         for (Eigen::Index c = 0; c < k; ++c)
             if (sign[c] < 0.0) bottom.col(c) *= -1.0;
         return true;
+    }
+
+    int factor_columns(Block lower, Block upper, double smallest) {
+        const Eigen::Index k = lower.cols(), height = lower.rows();
+        if (k <= fewest_columns) return factor_few(lower, upper, smallest);
+        const Eigen::Index first = (k / 2 + 7) / 8 * 8, second = k - first, rest = height - first;
+        const int replaced =
+            factor_columns(part(lower, 0, 0, height, first), part(upper, 0, 0, height, first), smallest);
+        if (replaced < 0) return replaced;
+        const Block below = part(lower, first, 0, rest, first), beside = part(upper, first, 0, rest, first);
+        const Block below_lower = part(lower, first, first, rest, second);
+        const Block below_upper = part(upper, first, first, rest, second);
+        add_product(-1.0, below, part(beside, 0, 0, second, first), below_lower);
+        add_product(-1.0, beside, part(below, 0, 0, second, first), below_upper);
+        const int more = factor_columns(below_lower, below_upper, smallest);
+        return more < 0 ? more : replaced + more;
+    }
+
+    int factor_few(Block lower, Block upper, double smallest) {
+        const Eigen::Index k = lower.cols(), rest = lower.rows() - k;
+        Block L = part(lower, 0, 0, k, k), V = part(upper, 0, 0, k, k);
+        int replaced = 0;
+        for (Eigen::Index c = 0; c < k; ++c) {
+            const Eigen::Index left = k - c - 1;
+            auto column = L.col(c).tail(left), row = V.col(c).tail(left);
+            double pivot = L(c, c);
+            double largest = std::abs(pivot);
+            if (left > 0) largest = std::max({largest, column.cwiseAbs().maxCoeff(), row.cwiseAbs().maxCoeff()});
+            if (!(largest > 0.0) || !std::isfinite(pivot)) return -1;
+            if (std::abs(pivot) < smallest * largest) {
+                pivot = std::copysign(smallest * largest, pivot);
+                ++replaced;
+            }
+            const double root = std::sqrt(std::abs(pivot));
+            L(c, c) = pivot / root;
+            V(c, c) = root;
+            column /= root;
+            row /= L(c, c);
+            for (Eigen::Index j = c + 1; j < k; ++j) {
+                L.col(j).tail(k - j) -= V(j, c) * L.col(c).tail(k - j);
+                V.col(j).tail(k - j) -= L(j, c) * V.col(c).tail(k - j);
+            }
+        }
+        if (rest > 0) {
+            solve_right(V, part(lower, k, 0, rest, k));
+            solve_right(L, part(upper, k, 0, rest, k));
+        }
+        return replaced;
     }
 
     void solve_right(Block L, Block B) const {

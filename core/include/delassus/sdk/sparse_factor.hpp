@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// L S Lᵀ of a symmetric sparse matrix with pivots of known signs S = diag(±1), without pivoting, by dense fronts.
+// L S Lᵀ of a symmetric sparse matrix with pivots of known signs S = diag(±1), or L U of an unsymmetric one of
+// symmetric pattern, without pivoting, by dense fronts.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,6 +43,15 @@ public:
     /// matrix: as analysed, with values. False if a pivot has the wrong sign, or is not finite.
     [[nodiscard]] bool factorize(const Eigen::Ref<const SparseColumns>& matrix);
 
+    /// L U of an unsymmetric matrix, about twice the work. lower: as analysed, its lower triangle; upper: beside each
+    /// of lower's values A_ij the value A_ji. Pivots are not exchanged: one that is tiny beside its neighbours is
+    /// replaced (replaced_pivots), which refinement by the caller makes up for. False if entries are not finite, or a
+    /// row and column vanish. half_solve and diagonal are for the symmetric factor only.
+    [[nodiscard]] bool factorize(const Eigen::Ref<const SparseColumns>& lower, std::span<const double> upper);
+
+    /// In the last unsymmetric factorisation.
+    [[nodiscard]] std::int64_t replaced_pivots() const { return replaced_pivots_; }
+
     /// v ← A⁻¹ v.
     void solve(Vector& v) const;
 
@@ -77,12 +87,13 @@ private:
         std::size_t entry = 0;                // into entry_: up to that of the next supernode
         std::size_t child = 0, children = 0;  // into child_
         std::size_t depth = 0;                // below its root
-        std::size_t update = 0;               // into stack_[depth % 2]: (height − columns)², lower triangle
+        std::size_t update = 0;  // into stack_[depth % 2]: (height − columns)²; symmetric: lower triangle
     };
     struct Entry {
         std::int32_t source;  // into the values of the matrix
         std::int32_t row;     // of L
         std::size_t target;   // into the panel
+        bool mirrored;        // above the diagonal in the order of L
     };
 
     /// Rows by columns, or columns by rows, without values.
@@ -95,6 +106,9 @@ private:
     void find_places(const Eigen::Ref<const SparseColumns>& matrix);
     [[nodiscard]] DenseFront::Block update_of(const Supernode& node);
     void add_update(const Supernode& child);
+    void add_upper_update(const Supernode& child);
+    void gather_entries(std::size_t supernode, const double* lower, const double* upper,
+                        std::vector<double>& panels) const;
 
     static std::vector<std::int32_t> minimum_degree(const Eigen::Ref<const SparseColumns>& matrix);
     static std::vector<std::int32_t> elimination_tree(const Pattern& rows);
@@ -118,6 +132,8 @@ private:
     std::vector<std::int32_t> run_end_;  // beside place_in_parent_: up to there the places follow one another
     std::vector<Entry> entry_;
     std::vector<double> value_;
+    std::vector<double> upper_;  // Uᵀ beside value_ = L; empty: Uᵀ = L S
+    std::int64_t replaced_pivots_ = 0;
     std::vector<std::size_t> child_;  // supernodes
     // Updates that wait for their parents, by the parity of the depth: the children of a supernode lie on top of one
     // stack when it puts its own update on the other.

@@ -267,17 +267,18 @@ DELASSUS_SDK_FUNCTION void SparseFactor::find_places(const Eigen::Ref<const Spar
                 if (row[k] < j) continue;
                 const auto [low, high] =
                     std::minmax(position_[static_cast<std::size_t>(row[k])], position_[static_cast<std::size_t>(j)]);
-                take(k, low, high, static_cast<std::size_t>(node_of_[static_cast<std::size_t>(low)]));
+                take(k, low, high, low != position_[static_cast<std::size_t>(j)],
+                     static_cast<std::size_t>(node_of_[static_cast<std::size_t>(low)]));
             }
     };
     std::vector<std::size_t> next(nodes_.size() + 1, 0);
-    visit([&](std::int32_t, std::int32_t, std::int32_t, std::size_t s) { ++next[s + 1]; });
+    visit([&](std::int32_t, std::int32_t, std::int32_t, bool, std::size_t s) { ++next[s + 1]; });
     std::partial_sum(next.begin(), next.end(), next.begin());
     entry_.resize(next.back());
     for (std::size_t s = 0; s < nodes_.size(); ++s) nodes_[s].entry = next[s];
-    visit([&](std::int32_t k, std::int32_t low, std::int32_t high, std::size_t s) {
+    visit([&](std::int32_t k, std::int32_t low, std::int32_t high, bool swapped, std::size_t s) {
         const auto column = static_cast<std::size_t>(low - nodes_[s].first);
-        entry_[next[s]++] = {k, high, column * static_cast<std::size_t>(nodes_[s].height)};
+        entry_[next[s]++] = {k, high, column * static_cast<std::size_t>(nodes_[s].height), swapped};
     });
     place_in_parent_.resize(row_.size());
     run_end_.resize(row_.size());
@@ -305,12 +306,11 @@ DELASSUS_SDK_FUNCTION void SparseFactor::find_places(const Eigen::Ref<const Spar
 
 DELASSUS_SDK_FUNCTION bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
     value_.assign(static_cast<std::size_t>(entries_), 0.0);
+    upper_.clear();
     for (std::size_t k = 0; k < 2; ++k) stack_[k].resize(stack_size_[k]);
     for (std::size_t s = 0; s < nodes_.size(); ++s) {
         const Supernode& node = nodes_[s];
-        const std::size_t end = s + 1 < nodes_.size() ? nodes_[s + 1].entry : entry_.size();
-        for (std::size_t k = node.entry; k < end; ++k)
-            value_[node.panel + entry_[k].target] += matrix.valuePtr()[entry_[k].source];
+        gather_entries(s, matrix.valuePtr(), matrix.valuePtr(), value_);
         DenseFront::Block update = update_of(node);
         for (Eigen::Index j = 0; j < update.cols(); ++j) update.col(j).tail(update.rows() - j).setZero();
         for (std::size_t k = 0; k < node.children; ++k) add_update(nodes_[child_[node.child + k]]);
@@ -319,6 +319,44 @@ DELASSUS_SDK_FUNCTION bool SparseFactor::factorize(const Eigen::Ref<const Sparse
         if (!front_.factor(panel, sign_.data() + node.first, update)) return false;
     }
     return true;
+}
+
+// Pivots below this part of the largest entry beside them are replaced.
+inline constexpr double smallest_pivot = 1e-14;
+
+DELASSUS_SDK_FUNCTION bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& lower,
+                                                   std::span<const double> upper) {
+    value_.assign(static_cast<std::size_t>(entries_), 0.0);
+    upper_.assign(static_cast<std::size_t>(entries_), 0.0);
+    replaced_pivots_ = 0;
+    for (std::size_t k = 0; k < 2; ++k) stack_[k].resize(stack_size_[k]);
+    for (std::size_t s = 0; s < nodes_.size(); ++s) {
+        const Supernode& node = nodes_[s];
+        gather_entries(s, lower.valuePtr(), upper.data(), value_);
+        gather_entries(s, upper.data(), lower.valuePtr(), upper_);
+        DenseFront::Block update = update_of(node);
+        update.setZero();
+        for (std::size_t k = 0; k < node.children; ++k) {
+            add_update(nodes_[child_[node.child + k]]);
+            add_upper_update(nodes_[child_[node.child + k]]);
+        }
+        const auto panel = [&node](std::vector<double>& values) {
+            return DenseFront::Block(values.data() + node.panel, node.height, node.columns,
+                                     Eigen::OuterStride<>(node.height));
+        };
+        const int replaced = front_.factor(panel(value_), panel(upper_), smallest_pivot, update);
+        if (replaced < 0) return false;
+        replaced_pivots_ += replaced;
+    }
+    return true;
+}
+
+// The entries on one side of the diagonal; lower and upper are the sides in the order of the matrix.
+DELASSUS_SDK_FUNCTION void SparseFactor::gather_entries(std::size_t supernode, const double* lower, const double* upper,
+                                                        std::vector<double>& panels) const {
+    const std::size_t end = supernode + 1 < nodes_.size() ? nodes_[supernode + 1].entry : entry_.size();
+    for (std::size_t k = nodes_[supernode].entry; k < end; ++k)
+        panels[nodes_[supernode].panel + entry_[k].target] += (entry_[k].mirrored ? upper : lower)[entry_[k].source];
 }
 
 DELASSUS_SDK_FUNCTION DenseFront::Block SparseFactor::update_of(const Supernode& node) {
@@ -347,6 +385,30 @@ DELASSUS_SDK_FUNCTION void SparseFactor::add_update(const Supernode& child) {
     }
 }
 
+// Adds what is above the diagonal of a supernode's update to its parent's front: the transposed rows of its panel, then
+// the update. Columns go in strips, so that the rows of the panel are filled in pieces.
+DELASSUS_SDK_FUNCTION void SparseFactor::add_upper_update(const Supernode& child) {
+    constexpr Eigen::Index strip = 8;
+    const Supernode& parent = nodes_[static_cast<std::size_t>(child.parent)];
+    const DenseFront::Block from = update_of(child);
+    DenseFront::Block update = update_of(parent);
+    const Eigen::Index rest = from.rows();
+    const std::int32_t* place = place_in_parent_.data() + child.row + child.columns;
+    const Eigen::Index own = std::lower_bound(place, place + rest, parent.columns) - place;
+    for (Eigen::Index begin = 0; begin < rest; begin += strip) {
+        const Eigen::Index end = std::min(begin + strip, rest);
+        for (Eigen::Index i = 0; i < std::min(own, end); ++i) {
+            double* target = upper_.data() + parent.panel +
+                             static_cast<std::size_t>(place[i]) * static_cast<std::size_t>(parent.height);
+            for (Eigen::Index j = std::max(begin, i); j < end; ++j) target[place[j]] += from(i, j);
+        }
+        for (Eigen::Index j = begin; j < end; ++j)
+            if (place[j] >= parent.columns)
+                for (Eigen::Index i = own; i < j; ++i)
+                    update(place[i] - parent.columns, place[j] - parent.columns) += from(i, j);
+    }
+}
+
 DELASSUS_SDK_FUNCTION void SparseFactor::solve(Vector& v) const {
     work_.resize(size_);
     for (Eigen::Index i = 0; i < size_; ++i) work_[position_[static_cast<std::size_t>(i)]] = v[i];
@@ -360,10 +422,11 @@ DELASSUS_SDK_FUNCTION void SparseFactor::solve(Vector& v) const {
         const std::int32_t* row = row_.data() + node.row + k;
         for (Eigen::Index i = 0; i < rest; ++i) work_[row[i]] -= gathered_[i];
     }
-    work_.array() *= Eigen::Map<const Vector>(sign_.data(), size_).array();
+    const std::vector<double>& upper = upper_.empty() ? value_ : upper_;
+    if (upper_.empty()) work_.array() *= Eigen::Map<const Vector>(sign_.data(), size_).array();
     for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) {
         const Eigen::Index k = node->columns, rest = node->height - k;
-        const ConstPanel panel(value_.data() + node->panel, node->height, k);
+        const ConstPanel panel(upper.data() + node->panel, node->height, k);
         auto own = work_.segment(node->first, k);
         if (rest > 0) {
             gathered_.resize(rest);
