@@ -18,6 +18,9 @@ namespace delassus {
 /// by the first task and stay until the object ends. A member that waits looks for the next task for a few microseconds
 /// and then sleeps. It sleeps at once where the team is larger than the number of processors that the process may use.
 ///
+/// Where other programs keep the members from running, so that most of the time goes by waiting for them, tasks are
+/// left to the calling thread for a while, from a tenth of a second to some seconds: results do not depend on it.
+///
 /// In the child of a fork the threads are missing; the first task there starts others. Signals are left to the threads
 /// of the program.
 class ThreadTeam {
@@ -32,8 +35,9 @@ public:
     /// without a number as many as there are processors.
     [[nodiscard]] DELASSUS_API static std::shared_ptr<ThreadTeam> for_threads(std::optional<std::int64_t> asked);
 
-    /// Valid as long as this object. A task throws std::system_error if a thread cannot be started.
-    [[nodiscard]] sdk::Team team() const { return sdk::Team(&raw_); }
+    /// For the work at hand; valid as long as this object. A task throws std::system_error if a thread cannot be
+    /// started.
+    [[nodiscard]] DELASSUS_API sdk::Team team() const;
 
 private:
     struct Threads;

@@ -4,6 +4,7 @@
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
+#include <time.h>
 
 #include <algorithm>
 #include <atomic>
@@ -72,12 +73,43 @@ struct ThreadTeam::Threads {
     void run(Task body, void* argument) {
         task = body;
         data = argument;
-        barrier();
+        caller = pthread_self();
+        const auto begin = Clock::now();
+        barrier(true);
         body(argument, 0);
-        barrier();
+        barrier(true);
+        judge(std::chrono::duration<double>(Clock::now() - begin).count());
     }
 
-    void barrier() {
+    /// Whether the calling thread should work alone for now: others keep the members from running.
+    [[nodiscard]] bool rests() const { return patient && Clock::now() < rest_until; }
+
+    /// Called after each task of so many seconds.
+    void judge(double seconds) {
+        worked += seconds;
+        if (worked < 0.005) return;
+        if (lost > 0.3 * worked) {
+            rest = std::min(2 * rest, std::chrono::milliseconds(3200));
+            rest_until = Clock::now() + rest;
+        } else {
+            rest = std::chrono::milliseconds(50);
+        }
+        worked = lost = 0.0;
+    }
+
+    /// Seconds of processor time that the other members have had.
+    [[nodiscard]] double processor_time() {
+        double sum = 0.0;
+        for (std::thread& worker : workers) {
+            clockid_t clock;
+            timespec time{};
+            if (pthread_getcpuclockid(worker.native_handle(), &clock) == 0 && clock_gettime(clock, &time) == 0)
+                sum += static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+        }
+        return sum;
+    }
+
+    void barrier(bool by_caller) {
         const std::uint32_t now = turn.load(std::memory_order_relaxed);
         if (arrived.fetch_add(1, std::memory_order_acq_rel) + 1 == size) {
             arrived.store(0, std::memory_order_relaxed);
@@ -86,7 +118,14 @@ struct ThreadTeam::Threads {
             return;
         }
         if (patient && appears(now)) return;
+        const bool counts = patient && by_caller;
+        const double before = counts ? processor_time() : 0.0;
+        const auto begin = Clock::now();
         while (turn.load(std::memory_order_acquire) == now) turn.wait(now, std::memory_order_acquire);
+        if (!counts) return;
+        // Waiting for members that work is not lost.
+        const double waited = std::chrono::duration<double>(Clock::now() - begin).count();
+        lost += std::max(0.0, waited - (processor_time() - before));
     }
 
     /// Looks for the next turn for a while; whether it came.
@@ -104,17 +143,17 @@ struct ThreadTeam::Threads {
 
     void work(int index) {
         while (true) {
-            barrier();
+            barrier(false);
             if (!task) return;
             task(data, index);
-            barrier();
+            barrier(false);
         }
     }
 
     void dismiss() {
         if (workers.empty()) return;
         task = nullptr;
-        barrier();
+        barrier(false);
         for (std::thread& worker : workers) worker.join();
     }
 
@@ -128,6 +167,11 @@ struct ThreadTeam::Threads {
     const unsigned born = forks().load();
     Task task = nullptr;
     void* data = nullptr;
+    // Of the calling thread alone.
+    pthread_t caller = pthread_self();
+    double worked = 0.0, lost = 0.0;  // s since the last judgement
+    std::chrono::milliseconds rest{50};
+    Clock::time_point rest_until{};
     alignas(64) std::atomic<int> arrived{0};
     alignas(64) std::atomic<std::uint32_t> turn{0};
     std::vector<std::thread> workers;
@@ -147,6 +191,10 @@ std::shared_ptr<ThreadTeam> ThreadTeam::for_threads(std::optional<std::int64_t> 
                                               : processors);
 }
 
+sdk::Team ThreadTeam::team() const {
+    return threads_ && threads_->rests() ? sdk::Team() : sdk::Team(&raw_);
+}
+
 void ThreadTeam::run(void* context, void (*task)(void* data, std::int32_t member), void* data) {
     auto& self = *static_cast<ThreadTeam*>(context);
     if (self.threads_ && self.threads_->born != forks().load()) static_cast<void>(self.threads_.release());
@@ -155,7 +203,8 @@ void ThreadTeam::run(void* context, void (*task)(void* data, std::int32_t member
 }
 
 void ThreadTeam::wait(void* context) {
-    static_cast<ThreadTeam*>(context)->threads_->barrier();
+    Threads& threads = *static_cast<ThreadTeam*>(context)->threads_;
+    threads.barrier(pthread_equal(threads.caller, pthread_self()) != 0);
 }
 
 }  // namespace delassus
