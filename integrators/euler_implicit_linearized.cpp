@@ -121,6 +121,7 @@ private:
         end_.t = state.t + h;
         rows_.clear();
         rows_.measure_speeds_at(state.v.data());
+        rows_.team = solver.team();
         if (system_.has_unilateral()) system_.collect_unilateral(state, h, rows_);
         assemble_balance(state, h);
         assemble_constraints(h);

@@ -13,9 +13,6 @@ constexpr delassus_option options[] = {
     boolean_option("restart", true, "drop the momentum where it points uphill"),
     integer_option("stall_iterations", "100000", 0, 1e9, "iterations",
                    "give up after this many iterations without an improvement by 1 %; 0: never"),
-    integer_option("threads", "1", 1, 1024, "threads",
-                   "threads that share the work, at most as many as there are processors; the answer does not depend "
-                   "on their number"),
 };
 
 constexpr delassus::sdk::PluginInfo info{

@@ -126,7 +126,7 @@ public:
     }
 
     /// One Gauss–Seidel sweep; with a team of more than one, coloured blocks at the same time.
-    void sweep_in_place(const SweepRule& rule, SweepState& state, sdk::Team& team) const {
+    void sweep_in_place(const SweepRule& rule, SweepState& state, const sdk::Team& team) const {
         if (team.size() == 1 || order_.coloured == 0) {
             visit_range(rule, state, state.z, 0, blocks_.size());
             return;
@@ -155,7 +155,7 @@ public:
     }
 
     /// u without the De Saxcé term; m, as the problem counts rows.
-    void constraint_velocities(const SweepState& state, sdk::Vector& u, sdk::Team& team) {
+    void constraint_velocities(const SweepState& state, sdk::Vector& u, const sdk::Team& team) {
         team.run([&](int member) {
             const auto [first, last] = team.share(blocks_.size(), member);
             rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), first, last);
@@ -185,7 +185,7 @@ private:
     }
 
     // The blocks without a colour, by one member.
-    void visit_rest(const SweepRule& rule, SweepState& state, sdk::Team& team, int member) const {
+    void visit_rest(const SweepRule& rule, SweepState& state, const sdk::Team& team, int member) const {
         if (order_.coloured == blocks_.size()) return;
         if (member == 0) visit_range(rule, state, state.z, order_.coloured, blocks_.size());
         team.barrier();

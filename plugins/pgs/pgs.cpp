@@ -35,9 +35,6 @@ constexpr delassus_option option_table[] = {
     sdk::choice_option("ordering", "spaced", orderings,
                        "order of the blocks in a sweep: as in the problem; as in the problem, with neighbours kept a "
                        "little apart; by colours that share no body"),
-    sdk::integer_option("threads", "1", 1, 1024, "threads",
-                        "threads that share a sweep (needs ordering = coloured), at most as many as there are "
-                        "processors; the answer does not depend on their number"),
     sdk::integer_option("check_every", "0", 0, 1e9, "iterations",
                         "iterations between measurements of the natural error; 0: every 5 % of the iterations done"),
     sdk::integer_option("stall_window", "1000000", 0, 1e15, "iterations",
@@ -50,7 +47,6 @@ public:
         : symmetric_(options.choice("variant") == "symmetric"),
           jacobi_(options.choice("variant") == "jacobi"),
           form_(options.choice("form")),
-          threads_(options.integer("threads")),
           check_every_(options.integer("check_every")),
           stall_window_(options.integer("stall_window")) {
         rule_.local = options.choice("local_solver") == "exact" ? Local::Exact : Local::Diagonal;
@@ -59,9 +55,6 @@ public:
         ordering_ = ordering == "given"    ? Ordering::Given
                     : ordering == "spaced" ? Ordering::Spaced
                                            : Ordering::Coloured;
-        if (threads_ > 1 && (ordering_ != Ordering::Coloured || jacobi_))
-            throw std::invalid_argument("threads = " + std::to_string(threads_) +
-                                        " needs ordering = coloured and a variant other than jacobi");
     }
 
     std::string refusal(const ProblemView& problem) override {
@@ -88,8 +81,8 @@ public:
         for (const delassus_cone& cone : problem.cones) sdk::project(cone, lambda_.data() + cone.first_row);
 
         sdk::Monitor monitor(request, stall_window_);
-        sdk::Team team(sdk::useful_threads(threads_));
-        iterate(problem, request, monitor, team);
+        // A colour is too little work for several threads where there are few contacts (docs/measurements.md).
+        iterate(problem, request, monitor, team().if_worth(problem.m >= 6000));
         lambda = monitor.best();
         x = operator_.velocity(problem, lambda);
         return monitor.outcome();
@@ -102,7 +95,8 @@ private:
     using Clock = std::chrono::steady_clock;
     static constexpr std::chrono::milliseconds patience{20};  // between two calls of progress
 
-    void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor, sdk::Team& team) {
+    void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor,
+                 const sdk::Team& team) {
         model_.state_of(lambda_, state_);
         // A tolerance below rounding asks for all iterations: then only their end is measured.
         const bool to_the_end = request.tolerance() < std::numeric_limits<double>::epsilon();
@@ -130,7 +124,7 @@ private:
         }
     }
 
-    void advance(sdk::Team& team) {
+    void advance(const sdk::Team& team) {
         if (jacobi_) {
             model_.jacobi_step(rule_, state_, next_);
             return;
@@ -145,7 +139,7 @@ private:
     // The natural error of λ, which is taken from the state. Where it would end the solve it is measured again as the
     // host does, from u = D H⁻¹(a + Dᵀλ) + E λ + b, and v̂ is renewed from λ, which takes out the rounding of all
     // changes so far.
-    double measure(const ProblemView& problem, const sdk::Request& request, sdk::Team& team) {
+    double measure(const ProblemView& problem, const sdk::Request& request, const sdk::Team& team) {
         model_.reactions(state_, lambda_);
         model_.constraint_velocities(state_, u_, team);
         const double error = residual_.natural(lambda_, u_);
@@ -159,7 +153,6 @@ private:
 
     bool symmetric_, jacobi_;
     std::string form_;
-    std::int64_t threads_;
     Ordering ordering_ = Ordering::Spaced;
     std::int64_t check_every_, stall_window_;
     SweepRule rule_;

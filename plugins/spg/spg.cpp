@@ -26,8 +26,7 @@ SpectralGradient::SpectralGradient(const sdk::OptionValues& options)
       memory_(static_cast<std::size_t>(options.integer("memory"))),
       tangential_(options.boolean("tangential")),
       face_steps_(options.boolean("face_steps")),
-      stall_iterations_(options.integer("stall_iterations")),
-      threads_(options.integer("threads")) {}
+      stall_iterations_(options.integer("stall_iterations")) {}
 
 sdk::Outcome SpectralGradient::solve(const sdk::ProblemView& problem, const sdk::Request& request,
                                      sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
@@ -39,15 +38,14 @@ sdk::Outcome SpectralGradient::solve(const sdk::ProblemView& problem, const sdk:
     face_.reset(scaled_);
     face_period_ = first_face_period;
     since_face_ = 0;
-    sdk::Team team(sdk::useful_threads(threads_));
-    iterate(run, team);
+    iterate(run, sdk::ScaledProblem::useful(team(), problem));
     return run.finish(x, lambda);
 }
 
 // One product with N̂ an iteration: f is quadratic, so that N̂ d gives f, û and both spectral steps anywhere on the
 // segment from λ̂ to Π(λ̂ − α û). Changes of f are formed without subtracting values of f, which would lose all digits
 // near the solution.
-void SpectralGradient::iterate(sdk::ScaledRun& run, sdk::Team& team) {
+void SpectralGradient::iterate(sdk::ScaledRun& run, const sdk::Team& team) {
     scaled_.gradient(lambda_, gradient_);
     if (run.check(lambda_, gradient_)) return;
     double alpha = 1.0;
@@ -57,17 +55,17 @@ void SpectralGradient::iterate(sdk::ScaledRun& run, sdk::Team& team) {
             if (take_face_step(run)) return;
             alpha = 1.0;
         }
-        const auto [slope, square] = scaled_.sums_over_parts<2>(team, [&](const Part& part) {
+        const auto project = [&](const Part& part) {
             part.of(direction_) = part.of(lambda_) - alpha * part.of(gradient_);
             scaled_.project(part, direction_);
             part.of(direction_) -= part.of(lambda_);
             return std::array{part.of(gradient_).dot(part.of(direction_)), part.of(direction_).squaredNorm()};
-        });
-        scaled_.begin_product(team, direction_);
-        const auto [curvature] = scaled_.sums_over_parts<1>(team, [&](const Part& part) {
+        };
+        const auto multiply = [&](const Part& part) {
             scaled_.finish_product(part, product_);
             return std::array{part.of(direction_).dot(part.of(product_))};
-        });
+        };
+        const auto [slope, square, curvature] = scaled_.sums_about_product<2, 1>(team, direction_, project, multiply);
         const double length = line_search(slope, curvature);
         const auto [natural] = scaled_.sums_over_parts<1>(team, [&](const Part& part) {
             part.of(lambda_) += length * part.of(direction_);

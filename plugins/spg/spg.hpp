@@ -14,7 +14,7 @@ class SpectralGradient : public sdk::Solver {
 public:
     explicit SpectralGradient(const sdk::OptionValues& options);
     void analyze(const sdk::ProblemView& problem) override { scaled_.analyze(problem); }
-    void factorize(const sdk::ProblemView& problem) override { scaled_.factorize(problem); }
+    void factorize(const sdk::ProblemView& problem) override { scaled_.factorize(problem, team()); }
     sdk::Outcome solve(const sdk::ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
                        sdk::MutableVectorView lambda) override;
     [[nodiscard]] std::int64_t analyses() const override { return scaled_.unscaled().inverse().analyses(); }
@@ -23,7 +23,7 @@ public:
 private:
     enum class Steps : std::uint8_t { Alternating, Long };
 
-    void iterate(sdk::ScaledRun& run, sdk::Team& team);
+    void iterate(sdk::ScaledRun& run, const sdk::Team& team);
     double line_search(double slope, double curvature);
     double next_step(std::int64_t iteration, double square, double curvature);
     bool take_face_step(sdk::ScaledRun& run);
@@ -32,7 +32,7 @@ private:
     Steps steps_;
     std::size_t memory_;
     bool tangential_, face_steps_;
-    std::int64_t stall_iterations_, threads_;
+    std::int64_t stall_iterations_;
 
     sdk::Vector lambda_, gradient_;    // λ̂ and û
     sdk::Vector direction_, product_;  // d and N̂ d

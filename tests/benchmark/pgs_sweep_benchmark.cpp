@@ -15,6 +15,7 @@
 #include "delassus/generate.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/thread_team.hpp"
 #include "plugins/pgs/model.hpp"
 
 namespace {
@@ -41,7 +42,8 @@ void time_sweeps(benchmark::State& state, delassus::Problem problem, const Way& 
     model.set_right_hand_side(view, N);
     delassus::pgs::SweepState sweep;
     model.state_of(delassus::sdk::Vector::Zero(view.m), sweep);
-    delassus::sdk::Team team(way.threads);
+    delassus::ThreadTeam threads(way.threads);
+    const delassus::sdk::Team team = threads.team();
     delassus::pgs::SweepRule rule;
     rule.local = way.local;
     rule.omega = 1.5;

@@ -17,6 +17,7 @@
 #include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
+#include "delassus/thread_team.hpp"
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
@@ -149,7 +150,7 @@ void compare_forms(Problem problem, pgs::Local local) {
     pgs::Model models[2];
     sdk::Vector lambda[2];
     pgs::SweepState state[2];
-    sdk::Team alone(1);
+    const sdk::Team alone;
     for (int form = 0; form < 2; ++form) {
         models[form].build(view, N, form == 0, false, true, pgs::Ordering::Given);
         models[form].set_right_hand_side(view, N);
@@ -231,7 +232,8 @@ struct Swept {
         model.set_right_hand_side(view, N);
         pgs::SweepState state;
         model.state_of(sdk::Vector::Zero(view.m), state);
-        sdk::Team team(threads);
+        ThreadTeam members(threads);
+        const sdk::Team team = members.team();
         pgs::SweepRule rule;
         rule.local = local;
         rule.coulomb = view.coulomb;
@@ -520,10 +522,6 @@ TEST(Pgs, SolvesInEveryOrder) {
             EXPECT_EQ(report.status, Status::Solved) << ordering;
             EXPECT_LE(report.error.natural, 1e-9) << ordering;
         }
-}
-
-TEST(Pgs, RefusesThreadsWithoutColours) {
-    EXPECT_THROW((void)solve(pile(), {{"threads", "2"}}, to(1e-8)), Error);
 }
 
 TEST(Pgs, RefusesAFormThatTheProblemDoesNotHave) {

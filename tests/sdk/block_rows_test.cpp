@@ -9,7 +9,7 @@
 #include <random>
 
 #include "delassus/sdk/column_shares.hpp"
-#include "delassus/sdk/team.hpp"
+#include "delassus/thread_team.hpp"
 
 namespace delassus::sdk::block_rows_test {
 namespace {
@@ -103,9 +103,24 @@ TEST_P(Runs, GiveTheSameBitsByManyThreads) {
     for (const int members : {1, 2, 3, 4}) {
         const ColumnShares shares(rows, one.size(), members);
         Vector many = Vector::Constant(one.size(), 7.0);
-        Team team(members);
-        team.run([&](int member) { shares.transpose_multiply(rows, w.data(), many.data(), member); });
+        ThreadTeam threads(members);
+        threads.team().run([&](int member) { shares.transpose_multiply(rows, w.data(), many.data(), member); });
         EXPECT_EQ(one, many) << members << " threads";
+    }
+}
+
+TEST_P(Runs, AreMadeByManyThreadsWithTheSameBits) {
+    const RandomRows random(6, 300, GetParam(), 200);
+    const BlockRows one = random.rows();
+    for (const int members : {2, 3}) {
+        ThreadTeam threads(members);
+        const BlockRows many(random.matrix, random.groups, random.left.data(), random.right.data(), threads.team());
+        const Vector v = padded(Vector::Random(300));
+        Vector a = Vector::Zero(random.dense.rows()), b = a;
+        one.multiply_add(v.data(), a.data());
+        many.multiply_add(v.data(), b.data());
+        EXPECT_EQ(a, b);
+        EXPECT_EQ(one.entries(), many.entries());
     }
 }
 

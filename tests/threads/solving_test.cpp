@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Solvers with threads of their own, and solvers in several threads of the host.
+// Solvers that use the host's threads, and solvers in several threads of the host.
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <filesystem>
+#include <memory>
 #include <thread>
 
 #include "delassus/generate.hpp"
@@ -26,53 +27,51 @@ Problem pile(std::int32_t contacts) {
     return generate_sphere_pile(parameters);
 }
 
-tests::Solved solve(const std::string& plugin, const Problem& problem, const SolveSettings& settings,
-                    const OptionTexts& options) {
+tests::Solved solve(const std::string& plugin, const Problem& problem, SolveSettings settings, int threads) {
+    settings.team = std::make_shared<ThreadTeam>(threads);
+    const OptionTexts options = plugin == "pgs" ? OptionTexts{{"ordering", "coloured"}} : OptionTexts{};
     return tests::solve_with(path_of(plugin), problem, settings, options);
-}
-
-OptionTexts with_threads(const std::string& plugin, const char* count) {
-    if (plugin == "pgs") return {{"ordering", "coloured"}, {"threads", count}};
-    return {{"threads", count}};
 }
 
 class Threads : public testing::TestWithParam<std::string> {};
 
 TEST_P(Threads, DoNotChangeTheAnswer) {
     for (const bool elastic : {false, true}) {
-        const Problem problem = elastic ? generate_elastic_block({}) : pile(1500);
-        const auto one = solve(GetParam(), problem, to(1e-5), with_threads(GetParam(), "1"));
-        const auto two = solve(GetParam(), problem, to(1e-5), with_threads(GetParam(), "2"));
+        const Problem problem = elastic ? generate_elastic_block({}) : pile(2500);
+        const auto one = solve(GetParam(), problem, to(1e-5), 1);
         EXPECT_EQ(one.report.status, Status::Solved);
-        EXPECT_EQ(one.solution.lambda, two.solution.lambda);
-        EXPECT_EQ(one.report.iterations, two.report.iterations);
+        for (const int threads : {2, 3}) {
+            const auto several = solve(GetParam(), problem, to(1e-5), threads);
+            EXPECT_EQ(one.solution.lambda, several.solution.lambda);
+            EXPECT_EQ(one.solution.x, several.solution.x);
+            EXPECT_EQ(one.report.iterations, several.report.iterations);
+        }
     }
 }
 
 TEST(PgsThreads, DoNotChangeTheAnswerUnderTheCoulombLaw) {
-    Problem problem = pile(300);
+    Problem problem = pile(2100);
     problem.law = Law::Coulomb;
-    const auto one = solve("pgs", problem, to(1e-5), with_threads("pgs", "1"));
-    const auto two = solve("pgs", problem, to(1e-5), with_threads("pgs", "2"));
+    const auto one = solve("pgs", problem, to(1e-5), 1);
+    const auto two = solve("pgs", problem, to(1e-5), 2);
     EXPECT_EQ(one.report.status, Status::Solved);
     EXPECT_EQ(one.solution.lambda, two.solution.lambda);
 }
 
 /// Two threads of the host, each with a problem and a solver of its own, which has two threads and tells its progress.
 TEST_P(Threads, SolversInTwoThreadsOfTheHostDoNotMeet) {
-    const Problem problems[2] = {pile(150), pile(250)};
+    const Problem problems[2] = {pile(750), pile(2100)};
     SolveSettings settings = to(1e-5);
     settings.record_curve = true;
     std::vector<double> alone[2], together[2];
-    for (int k = 0; k < 2; ++k)
-        alone[k] = solve(GetParam(), problems[k], settings, with_threads(GetParam(), "2")).solution.lambda;
+    for (int k = 0; k < 2; ++k) alone[k] = solve(GetParam(), problems[k], settings, 2).solution.lambda;
     std::atomic<int> samples = 0;
     settings.on_sample = [&](const CurveSample&) { ++samples; };
     std::vector<std::jthread> hosts;
     for (int k = 0; k < 2; ++k)
         hosts.emplace_back([&, k] {
             for (int repeat = 0; repeat < 3; ++repeat)
-                together[k] = solve(GetParam(), problems[k], settings, with_threads(GetParam(), "2")).solution.lambda;
+                together[k] = solve(GetParam(), problems[k], settings, 2).solution.lambda;
         });
     hosts.clear();
     EXPECT_GT(samples, 0);
@@ -81,14 +80,14 @@ TEST_P(Threads, SolversInTwoThreadsOfTheHostDoNotMeet) {
 
 /// The iterates shown along the way are whole: none is being written by another thread meanwhile.
 TEST_P(Threads, ShowWholeIterates) {
-    const Problem problem = pile(200);
+    const Problem problem = pile(2100);
     std::vector<double> last;
     SolveSettings settings = to(1e-5);
     settings.give_up = [&](std::int64_t, const double*, const double* lambda) {
         last.assign(lambda, lambda + problem.m());
         return false;
     };
-    const auto solved = solve(GetParam(), problem, settings, with_threads(GetParam(), "2"));
+    const auto solved = solve(GetParam(), problem, settings, 2);
     EXPECT_EQ(solved.report.status, Status::Solved);
     EXPECT_EQ(last.size(), static_cast<std::size_t>(problem.m()));
 }
@@ -103,7 +102,7 @@ TEST_P(Threads, AreCancelledFromAnother) {
         while (!running) std::this_thread::yield();
         stop = true;
     });
-    const auto solved = solve(GetParam(), pile(400), settings, with_threads(GetParam(), "2"));
+    const auto solved = solve(GetParam(), pile(2100), settings, 2);
     running = true;
     EXPECT_EQ(solved.report.status, Status::Cancelled);
 }

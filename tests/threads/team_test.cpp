@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "delassus/sdk/team.hpp"
+#include "delassus/thread_team.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <numeric>
 #include <thread>
+#include <vector>
 
-namespace delassus::sdk::team_test {
+namespace delassus::team_test {
 namespace {
+
+using sdk::Team;
 
 TEST(Team, EveryMemberPassesEveryBarrier) {
     for (const int members : {1, 2, 4}) {
-        Team team(members);
+        ThreadTeam threads(members);
+        const Team team = threads.team();
         std::vector<int> step(static_cast<std::size_t>(members), 0);
         for (int turn = 0; turn < 50; ++turn)
             team.run([&](int member) {
@@ -27,7 +35,8 @@ TEST(Team, EveryMemberPassesEveryBarrier) {
 }
 
 TEST(Team, SharesCoverEverythingOnce) {
-    Team team(3);
+    ThreadTeam threads(3);
+    const Team team = threads.team();
     std::size_t next = 0;
     for (int member = 0; member < 3; ++member) {
         const auto [first, last] = team.share(10, member);
@@ -38,7 +47,8 @@ TEST(Team, SharesCoverEverythingOnce) {
 }
 
 TEST(Team, TheCallerSeesWhatMembersWrote) {
-    Team team(3);
+    ThreadTeam threads(3);
+    const Team team = threads.team();
     std::vector<int> values(1000);
     for (int turn = 1; turn <= 20; ++turn) {
         team.run([&](int member) {
@@ -51,7 +61,8 @@ TEST(Team, TheCallerSeesWhatMembersWrote) {
 
 /// Waiting members look at a counter first and then sleep: a task must reach them there too.
 TEST(Team, WakesMembersThatSleep) {
-    Team team(2);
+    ThreadTeam threads(2);
+    const Team team = threads.team();
     int calls[2] = {0, 0};
     for (int turn = 0; turn < 3; ++turn) {
         std::this_thread::sleep_for(std::chrono::milliseconds(30));
@@ -63,15 +74,78 @@ TEST(Team, WakesMembersThatSleep) {
 }
 
 TEST(Team, EndsWithoutATask) {
-    for (int k = 0; k < 20; ++k) const Team team(1 + k % 4);
+    for (int k = 0; k < 20; ++k) {
+        const ThreadTeam threads(1 + k % 4);
+        EXPECT_EQ(threads.team().size(), 1 + k % 4);
+    }
 }
+
+TEST(Team, DealsOutEachItemOnce) {
+    ThreadTeam threads(3);
+    std::vector<int> done(500, 0);
+    threads.team().for_each(done.size(), [&](std::size_t k) { ++done[k]; });
+    EXPECT_EQ(std::count(done.begin(), done.end(), 1), 500);
+}
+
+TEST(Team, ThrowsTheExceptionOfTheFirstItemThatFails) {
+    ThreadTeam threads(3);
+    for (int turn = 0; turn < 50; ++turn) {
+        try {
+            threads.team().for_each(40, [&](std::size_t k) {
+                if (k % 2 == 1) throw static_cast<int>(k);
+            });
+            FAIL();
+        } catch (int item) {
+            EXPECT_EQ(item, 1);
+        }
+        int calls = 0;
+        threads.team().for_each(1, [&](std::size_t) { ++calls; });
+        EXPECT_EQ(calls, 1);
+    }
+}
+
+TEST(Team, IsNoLargerThanThereAreProcessors) {
+    EXPECT_EQ(ThreadTeam::for_threads(1)->team().size(), 1);
+    EXPECT_EQ(ThreadTeam::for_threads({})->team().size(), usable_processors());
+    EXPECT_EQ(ThreadTeam::for_threads(100000)->team().size(), usable_processors());
+}
+
+/// Members that have nothing to do use no processor.
+TEST(Team, SleepsBetweenTasks) {
+    ThreadTeam threads(2);
+    threads.team().run([](int) {});
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const std::clock_t before = std::clock();
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    EXPECT_LT(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC, 0.03);
+}
+
+#if !defined(__SANITIZE_THREAD__)  // which takes a fork of several threads for the end
+TEST(Team, WorksInTheChildOfAFork) {
+    ThreadTeam threads(2);
+    int sums[2] = {0, 0};
+    const auto add = [&](int member) { ++sums[member]; };
+    threads.team().run(add);
+    const pid_t child = fork();
+    if (child == 0) {
+        threads.team().run(add);
+        _exit(sums[0] == 2 && sums[1] == 2 ? 0 : 1);
+    }
+    int status = -1;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    threads.team().run(add);
+    EXPECT_EQ(sums[1], 2);
+}
+#endif
 
 TEST(Team, TwoTeamsWorkAtTheSameTime) {
     int sums[2] = {0, 0};
     std::vector<std::jthread> hosts;
     for (int& sum : sums)
         hosts.emplace_back([&sum] {
-            Team team(2);
+            ThreadTeam threads(2);
+            const Team team = threads.team();
             int parts[2] = {0, 0};
             for (int turn = 0; turn < 100; ++turn) team.run([&](int member) { parts[member] += member + 1; });
             sum = parts[0] + parts[1];
@@ -82,4 +156,4 @@ TEST(Team, TwoTeamsWorkAtTheSameTime) {
 }
 
 }  // namespace
-}  // namespace delassus::sdk::team_test
+}  // namespace delassus::team_test

@@ -12,6 +12,7 @@
 
 #include "delassus/contact_point.hpp"
 #include "delassus/export.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus {
 
@@ -62,7 +63,9 @@ public:
     /// excluded, at least one of them not fixed. Ordered by (shape_a, shape_b, feature): equal inputs give equal
     /// outputs, bit for bit. poses: of the bodies by index. Pairs of flat faces give up to four points or more, edges
     /// two, the rest one.
-    virtual void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) = 0;
+    /// team: threads that share the work where there is enough of it.
+    virtual void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
+                        const sdk::Team& team = {}) = 0;
 };
 
 /// What a detector is made of.

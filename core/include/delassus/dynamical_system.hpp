@@ -23,6 +23,7 @@
 #include "delassus/matrix_assembler.hpp"
 #include "delassus/problem.hpp"
 #include "delassus/sdk/cones.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus {
 
@@ -83,6 +84,9 @@ public:
     DELASSUS_API void clear();
     /// v: n, valid as long as blocks are added; null: the speeds of blocks are 0.
     void measure_speeds_at(const double* v) { velocity_ = v; }
+
+    /// Threads that may share the work of collecting rows; the rows are the same without them.
+    sdk::Team team;
 
     /// Adds entries to the row that end_row() closes, in the columns from `column` on. Columns of one row may come in
     /// any order but not twice.

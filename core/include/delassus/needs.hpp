@@ -11,6 +11,7 @@
 #include "delassus/export.hpp"
 #include "delassus/plugin.h"
 #include "delassus/problem.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus {
 
@@ -66,6 +67,9 @@ public:
     DELASSUS_API void renew(Problem&& problem);
     /// The same with a copy of the problem.
     DELASSUS_API void renew(const Problem& problem);
+
+    /// Threads that share the work of renewing and measuring it where it is large; results stay the same to the bit.
+    DELASSUS_API void use(const sdk::Team& team);
 
     /// Changes the friction law.
     DELASSUS_API void set_law(Law law);

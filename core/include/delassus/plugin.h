@@ -36,7 +36,7 @@ extern "C" {
  * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
  * Major version 1 was never released; its cones had no stride. */
 #define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
-#define DELASSUS_ABI_MINOR 1
+#define DELASSUS_ABI_MINOR 2
 
 #if defined(_WIN32)
 #define DELASSUS_PLUGIN_EXPORT __declspec(dllexport)
@@ -203,6 +203,20 @@ typedef struct delassus_outcome {
     const char* message; /* what a person should know, or NULL; owned by the solver, valid until its next call */
 } delassus_outcome;
 
+/* ---- Threads --------------------------------------------------------------------------------------------------- */
+
+/* Since 2.2. Threads of the host that a solver may share its work among. They sleep while there is nothing to do. */
+typedef struct delassus_team {
+    uint32_t struct_size;
+    int32_t size; /* members, the calling thread among them; ≥ 1 */
+    void* context;
+    /* task(data, member) by every member at once, member 0 by the caller; returns when all are done. A task calls
+     * neither run nor progress, and ends without an exception. */
+    void (*run)(void* context, void (*task)(void* data, int32_t member), void* data);
+    /* Called by every member inside a task: no member goes on before all have come. */
+    void (*barrier)(void* context);
+} delassus_team;
+
 /* ---- The descriptor ------------------------------------------------------------------------------------------ */
 #define DELASSUS_FLAG_GLOBAL_SYMBOLS 1u /* load with RTLD_GLOBAL (libraries that load parts of themselves) */
 #define DELASSUS_FLAG_MPI 2u            /* starts MPI when first created */
@@ -241,6 +255,11 @@ typedef struct delassus_plugin_descriptor {
     /* Since 2.1. Optional (may be NULL): a last look at a problem whose needs are all met. Returns 1 to take it, or 0
      * after writing a short NUL-terminated reason. Cheap: no factorisation. */
     int32_t (*accepts)(void* solver, const delassus_problem* problem, char* reason, int32_t capacity);
+
+    /* Since 2.2. Optional (may be NULL): the threads that analyze, factorize and solve may use from now on, NULL for the
+     * calling thread alone. *team stays as it is until the next call. Results must not depend on the size, to the bit.
+     */
+    void (*use_team)(void* solver, const delassus_team* team);
 } delassus_plugin_descriptor;
 
 /* The one exported symbol. */

@@ -14,6 +14,7 @@
 #include "delassus/export.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/registry.hpp"
+#include "delassus/thread_team.hpp"
 
 namespace delassus {
 
@@ -45,6 +46,8 @@ struct SolveSettings {
     std::int64_t max_iterations = 1000000;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
+    /// Threads that the solver may share its work among; the answer is the same to the bit without them. May be null.
+    std::shared_ptr<ThreadTeam> team;
 
     /// Measure the natural error along the way and keep the curve in the report. Samples are spaced by 2 % in time.
     bool record_curve = false;

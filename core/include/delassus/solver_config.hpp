@@ -25,7 +25,8 @@ struct SolverConfig {
     OptionTexts options;  ///< the plugin's, and "finish" and "finish_at" of the framework (docs/configuration.md)
     std::optional<double> tolerance;
     std::optional<std::int64_t> max_iterations;
-    std::optional<double> time_limit;  ///< seconds
+    std::optional<double> time_limit;     ///< seconds
+    std::optional<std::int64_t> threads;  ///< ≥ 1; no more are used than there are processors, without it as many
     std::optional<Law> law;
     /// Iterations to be done in each step of a simulation, whatever error they leave: the cheap mode. The error is
     /// measured and reported, and a step that misses no limit but this one counts as solved. Needs a plugin's name.

@@ -16,6 +16,7 @@
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
 #include "delassus/solver_config.hpp"
+#include "delassus/thread_team.hpp"
 
 namespace delassus {
 
@@ -53,8 +54,10 @@ public:
 };
 
 /// Problems without rows are solved here: x = H⁻¹ a, block by block where H is block-diagonal, else by a factorisation
-/// that is kept while the values of H stay. What was prepared for a step is kept for the next: where the entries stand
-/// in the same places and H is block-diagonal, a step allocates nothing here.
+/// that is kept while the values of H stay. Parts that have nothing to do with one another are solved side by side
+/// where there are threads and work enough; the results are the same to the bit for any number of threads. What was
+/// prepared for a step is kept for the next: where the entries stand in the same places and H is block-diagonal, a step
+/// allocates nothing here.
 class StepSolver {
 public:
     /// An empty config.name means `auto` by its rules for simulations (docs/solvers/auto.md).
@@ -79,6 +82,12 @@ public:
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
     DELASSUS_API bool solve(Problem&& problem, Solution& solution, bool warm_start);
 
+    /// Threads in place of those that the configuration asks for, e.g. to share them with other systems. Null: none but
+    /// the calling thread. Call it between solves.
+    DELASSUS_API void use(std::shared_ptr<ThreadTeam> threads);
+    /// For other work of the step; valid as long as this object, until the next use().
+    [[nodiscard]] DELASSUS_API sdk::Team team() const;
+
     /// The law of friction by which problems are solved, whatever theirs: the configured one, else law_of_scenes.
     [[nodiscard]] DELASSUS_API Law law() const;
 
@@ -89,7 +98,8 @@ public:
     std::function<void(const Problem&)> on_problem;
 
     /// Asked before each part of a problem and whenever a solver at work shows an iterate; where the answer is yes,
-    /// solve() throws StepInterrupted. May be empty.
+    /// solve() throws StepInterrupted. Parts that are solved side by side ask from several threads at once. May be
+    /// empty.
     std::function<bool()> cancelled;
 
     /// The error that the method itself makes in the velocities of this step, n, or empty where it is not known. Where

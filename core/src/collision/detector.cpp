@@ -97,7 +97,8 @@ void Detector::place(std::span<const Pose> poses) {
 
 // Cost: linear in shapes, near pairs and points, but for the tree's logarithm where shapes left their boxes; planes and
 // terrains are tried against every shape.
-void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) {
+void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
+                      const sdk::Team& team) {
     contacts.clear();
     if (!(envelope >= 0.0) || !std::isfinite(envelope))
         throw InputError(
@@ -136,10 +137,38 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         std::merge(pairs_.begin(), pairs_.end(), with_ground_.begin(), with_ground_.end(), std::back_inserter(merged_));
         pairs_.swap(merged_);
     }
-    for (const auto& [a, b] : pairs_) {
-        const std::size_t first = contacts.size();
-        narrow_phase_.collide(placed_[a], placed_[b], envelope, contacts);
-        for (std::size_t i = first; i < contacts.size(); ++i) {
+    collide_pairs(envelope, contacts, team);
+}
+
+// Runs of pairs are dealt out to the threads, and their contacts put together in the order of the pairs.
+void Detector::collide_pairs(double envelope, std::vector<ContactPoint>& contacts, const sdk::Team& given) {
+    constexpr std::size_t run = 128, worth_sharing = 1024;
+    const sdk::Team team = given.if_worth(pairs_.size() >= worth_sharing);
+    if (narrow_phases_.size() < static_cast<std::size_t>(team.size()))
+        narrow_phases_.resize(static_cast<std::size_t>(team.size()));
+    if (team.size() == 1) return collide_pairs(0, pairs_.size(), envelope, narrow_phases_[0], contacts);
+    // A placed core that several pairs share is turned before.
+    team.run([&](int member) {
+        const auto [first, last] = team.share(bounded_.size(), member);
+        for (std::size_t i = first; i < last; ++i) placed_[bounded_[i]].rotate_core();
+    });
+    const std::size_t runs = (pairs_.size() + run - 1) / run;
+    if (found_.size() < runs) found_.resize(runs);
+    team.for_each_by_member(runs, [&](std::size_t k, int member) {
+        found_[k].clear();
+        collide_pairs(k * run, std::min((k + 1) * run, pairs_.size()), envelope,
+                      narrow_phases_[static_cast<std::size_t>(member)], found_[k]);
+    });
+    for (std::size_t k = 0; k < runs; ++k) contacts.insert(contacts.end(), found_[k].begin(), found_[k].end());
+}
+
+void Detector::collide_pairs(std::size_t first, std::size_t last, double envelope, NarrowPhase& by,
+                             std::vector<ContactPoint>& contacts) {
+    for (std::size_t k = first; k < last; ++k) {
+        const auto& [a, b] = pairs_[k];
+        const std::size_t before = contacts.size();
+        by.collide(placed_[a], placed_[b], envelope, contacts);
+        for (std::size_t i = before; i < contacts.size(); ++i) {
             contacts[i].shape_a = a;
             contacts[i].shape_b = b;
         }

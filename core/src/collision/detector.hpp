@@ -9,10 +9,15 @@ namespace delassus::collision {
 class Detector : public CollisionDetector {
 public:
     explicit Detector(CollisionSetup setup);
-    void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts) override;
+    void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
+                const sdk::Team& team) override;
 
 private:
     void place(std::span<const Pose> poses);
+    void collide_pairs(double envelope, std::vector<ContactPoint>& contacts, const sdk::Team& team);
+    /// Appends the contacts of pairs_[first] to pairs_[last − 1].
+    void collide_pairs(std::size_t first, std::size_t last, double envelope, NarrowPhase& by,
+                       std::vector<ContactPoint>& contacts);
     [[nodiscard]] bool may_touch(std::int32_t shape_a, std::int32_t shape_b) const;
     [[nodiscard]] bool is_fixed(std::int32_t body) const;
 
@@ -32,7 +37,9 @@ private:
     double slack_ = 0.0;       ///< a tenth of the mean reach, m
     std::vector<std::pair<std::int32_t, std::int32_t>> pairs_, with_ground_, merged_;
     BroadPhase broad_phase_;
-    NarrowPhase narrow_phase_;
+    /// Of each thread its own.
+    std::vector<NarrowPhase> narrow_phases_;
+    std::vector<std::vector<ContactPoint>> found_;  ///< by runs of pairs
 };
 
 }  // namespace delassus::collision

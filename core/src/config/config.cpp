@@ -47,6 +47,11 @@ SolverConfig read_solver(const Source& source, const YAML::Node& node) {
                [&](const YAML::Node& n) {
                    solver.time_limit = value<double>(source, n, "time_limit", "a number of seconds");
                }},
+              {"threads",
+               [&](const YAML::Node& n) {
+                   solver.threads = value<std::int64_t>(source, n, "threads", "an integer");
+                   if (*solver.threads < 1) source.refuse(n, "\"threads\" must be at least 1");
+               }},
               {"law", [&](const YAML::Node& n) {
                    try {
                        solver.law = law_of(scalar(source, n, "law"));

@@ -149,6 +149,12 @@ void Islands::find(const Problem& problem, std::span<const std::int32_t> bodies)
     if (!untouched_.columns.empty()) next_island().columns = untouched_.columns;
 }
 
+std::int64_t Islands::rows(const Island& island) const {
+    std::int64_t sum = 0;
+    for (const auto c : island.cones) sum += problem_->cones[static_cast<std::size_t>(c)].rows;
+    return sum;
+}
+
 bool Islands::can_part(const Problem& problem) {
     bool diagonal = true;
     for (std::int32_t row = 0; row < problem.E.rows; ++row)

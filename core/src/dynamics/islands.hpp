@@ -29,6 +29,8 @@ public:
     [[nodiscard]] std::span<const Island> list() const { return {islands_.data(), count_}; }
     /// Whether a problem can be cut into parts: its E links no rows.
     [[nodiscard]] static bool can_part(const Problem& problem);
+    /// Rows of a part.
+    [[nodiscard]] std::int64_t rows(const Island& island) const;
     /// The problem of one part, in place of what was in part.
     void part(const Island& island, Problem& part) const;
     /// A hash of a part: its columns, its cones, and their entries in D, a and b. Neither 0 nor 1.

@@ -6,9 +6,12 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <set>
+#include <utility>
 
+#include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
@@ -35,15 +38,40 @@ struct KeptPart {
     Problem data;  // unused where the whole problem is one part
     std::optional<PreparedProblem> prepared;
     Solution solution;
+    std::uint64_t identity = 0;  // as RestingParts knows it; 0: not asked about
+    bool rests = false;
+    bool waits = false;  // to be solved beside others
+};
+
+/// Parts that have the same solver: every most_instances-th from the first on.
+struct Chain {
+    std::int64_t rows = 0;
+    std::size_t first = 0;
+};
+
+/// What solving a part came to.
+struct PartResult {
+    bool solved = true;
+    SolverEffort effort;
+};
+
+/// A solver of parts, used by one thread at a time.
+struct Instance {
+    Solver solver;
+    std::optional<Solver> fallback;  // `auto`, where the configured solver is another
+    Solution before;                 // the start of the part that is solved
+    std::set<std::string> loaded;
+
+    void count(const SolveReport& report, SolverEffort& effort);
 };
 
 /// What is kept of the problems of one name: a method that solves several kinds of problems in a step finds its own
 /// pattern again.
 struct KeptKind {
     std::string name;
-    Problem given;                // a copy of what solve() must not change
-    std::deque<KeptPart> parts;   // by the number of the part
-    std::vector<Solver> solvers;  // instances by the number of the part
+    Problem given;                   // a copy of what solve() must not change
+    std::deque<KeptPart> parts;      // by the number of the part
+    std::deque<Instance> instances;  // likewise
 };
 
 struct StepSolver::Implementation {
@@ -59,22 +87,33 @@ struct StepSolver::Implementation {
         kinds.emplace_back().name = name;
         return kinds.back();
     }
-    Solver& solver(KeptKind& kind, std::size_t instance) {
-        while (kind.solvers.size() <= instance) kind.solvers.push_back(make_solver(registry, config));
-        return kind.solvers[instance];
+    /// The instance for a part. Those of other parts stay where they are.
+    Instance& instance(KeptKind& kind, std::size_t number) const {
+        while (kind.instances.size() <= number % most_instances)
+            kind.instances.push_back({make_solver(registry, config), {}, {}, {}});
+        return kind.instances[number % most_instances];
+    }
+    static KeptPart& part(KeptKind& kind, std::size_t number) {
+        while (kind.parts.size() <= number) kind.parts.emplace_back();
+        return kind.parts[number];
     }
 
-    /// Takes the arrays of the problem and leaves others.
-    /// columns: of the part in the whole problem.
-    bool solve_part(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start, std::size_t number,
-                    std::span<const std::int32_t> columns);
+    bool solve_whole(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start);
+    /// Solves the parts in `list` that do not rest, from self.start into the parts' solutions.
+    bool solve_parts(KeptKind& kind, std::span<const Island> list, bool warm_start);
+    /// Takes the arrays of the problem and leaves others. Parts of different instances may be solved at the same time.
+    /// columns: of the part in the whole problem. threads: may be null.
+    void solve_part(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start, std::size_t number,
+                    std::span<const std::int32_t> columns, const std::shared_ptr<ThreadTeam>& threads,
+                    PartResult& result);
+    /// Adds to the effort; whether the part was solved.
+    bool take(const PartResult& result);
     /// Of a part, where the method makes this error: see docs/tolerance.md.
     [[nodiscard]] double tolerance_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
     /// solution, what it is worth in report.
-    void solve_again(const PreparedProblem& prepared, const Solution& first, SolveSettings again, Solution& solution,
-                     SolveReport& report);
-    void count(const SolveReport& report);
+    void solve_again(const PreparedProblem& prepared, Instance& by, SolveSettings again, Solution& solution,
+                     SolveReport& report, SolverEffort& spent) const;
     /// Whether the velocities without reactions vanish in rounding, so that no reactions are the answer: what recovers
     /// a penetration at constant speed is such a case. Errors relative to them say nothing. solution: that answer then.
     static bool moves_freely(const PreparedProblem& part, Solution& solution);
@@ -91,11 +130,10 @@ struct StepSolver::Implementation {
     std::uint64_t also_needs = 0;  ///< of every problem, where nothing is left out
     SolverConfig config;
     SolveSettings settings;
-    std::deque<KeptKind> kinds;      // few
-    std::optional<Solver> fallback;  // `auto`, where the configured solver is another
-    Solution before;                 // the start of the part that is solved
-    std::set<std::string> loaded;
+    std::deque<KeptKind> kinds;  // few
     Islands islands;
+    std::vector<PartResult> results;  // by the number of the part
+    std::vector<Chain> chains;
     Solution start;
     std::span<const double> method_error;
     SolverEffort effort;
@@ -115,10 +153,6 @@ constexpr std::uint64_t cones_of_scenes =
 
 }  // namespace
 
-bool StepSolver::leaves_out() const {
-    return implementation_->leaves_out;
-}
-
 void StepSolver::leave_nothing_out() {
     auto& self = *implementation_;
     self.leaves_out = false;
@@ -132,7 +166,7 @@ bool StepSolver::solve(const Problem& problem, Solution& solution, bool warm_sta
     return solve(std::move(given), solution, warm_start);
 }
 
-// The parts of a problem are solved one by one, each by a solver instance of its own: the k-th part of a step is, as
+// The parts of a problem are solved each by a solver instance of its own: the k-th part of a step is, as
 // long as bodies keep their neighbours, the k-th of the next, and what was prepared and analysed for it is used again.
 bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     auto& self = *implementation_;
@@ -145,46 +179,104 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     KeptKind& kind = self.kind(problem.name);
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
     if (!self.leaves_out || m == 0 || !Islands::can_part(problem))
-        return self.solve_part(kind, problem, solution, warm_start, 0, {});
+        return self.solve_whole(kind, problem, solution, warm_start);
 
     self.islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
     const auto list = self.islands.list();
     if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
-        return self.solve_part(kind, problem, solution, warm_start, 0, {});
+        return self.solve_whole(kind, problem, solution, warm_start);
     if (!warm_start) {
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
     }
     self.start = solution;
     std::fill(solution.lambda.begin(), solution.lambda.end(), 0.0);  // of rows that belong to no part
-    bool solved = true;
     for (std::size_t number = 0; number < list.size(); ++number) {
-        if (number == kind.parts.size()) kind.parts.emplace_back();
-        KeptPart& part = kind.parts[number];
+        KeptPart& part = Implementation::part(kind, number);
+        part.identity = resting && !list[number].cones.empty() ? self.islands.identity(list[number]) : 0;
+        part.rests = part.identity != 0 && resting->rests(list[number].columns, part.identity);
+        if (!part.rests) continue;
         self.islands.take(list[number], self.start, part.solution);
-        const std::uint64_t identity = resting && !list[number].cones.empty() ? self.islands.identity(list[number]) : 0;
-        if (identity != 0 && resting->rests(list[number].columns, identity)) {
-            std::fill(part.solution.x.begin(), part.solution.x.end(), 0.0);
-            ++self.effort.resting_parts;
-        } else {
-            self.islands.part(list[number], part.data);
-            solved =
-                self.solve_part(kind, part.data, part.solution, warm_start, number, list[number].columns) && solved;
-            if (identity != 0) resting->solved(list[number].columns, identity, part.solution.x);
-        }
+        std::fill(part.solution.x.begin(), part.solution.x.end(), 0.0);
+        ++self.effort.resting_parts;
+    }
+    const bool solved = self.solve_parts(kind, list, warm_start);
+    for (std::size_t number = 0; number < list.size(); ++number) {
+        KeptPart& part = kind.parts[number];
+        if (part.identity != 0 && !part.rests) resting->solved(list[number].columns, part.identity, part.solution.x);
         self.islands.put(list[number], part.solution, solution);
     }
     return solved;
 }
 
-bool StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start,
-                                            std::size_t number, std::span<const std::int32_t> columns) {
-    if (number == kind.parts.size()) kind.parts.emplace_back();
-    auto& kept = kind.parts[number].prepared;
+bool StepSolver::Implementation::solve_whole(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start) {
+    PartResult result;
+    solve_part(kind, problem, solution, warm_start, 0, {}, settings.team, result);
+    return take(result);
+}
+
+// A part that is more than a thread's share of the step is solved by all threads together. The others are dealt out,
+// the largest first. Parts that have the same solver follow one another: a chain. What a part's solution is depends on
+// neither. On several processes all of them solve the same part at the same time.
+bool StepSolver::Implementation::solve_parts(KeptKind& kind, std::span<const Island> list, bool warm_start) {
+    constexpr std::int64_t worth_sharing = 96, worth_a_team = 2048;  // rows
+    results.assign(list.size(), {});
+    const auto solve = [&](std::size_t number, const std::shared_ptr<ThreadTeam>& threads) {
+        KeptPart& part = kind.parts[number];
+        islands.take(list[number], start, part.solution);
+        islands.part(list[number], part.data);
+        solve_part(kind, part.data, part.solution, warm_start, number, list[number].columns, threads, results[number]);
+    };
+    const sdk::Team team = settings.team ? settings.team->team() : sdk::Team();
+    std::int64_t rows = 0, shared = 0;
+    for (std::size_t number = 0; number < list.size(); ++number)
+        if (!kind.parts[number].rests) rows += islands.rows(list[number]);
+    chains.assign(std::min(list.size(), most_instances), {});
+    for (std::size_t number = 0; number < list.size(); ++number) {
+        KeptPart& part = kind.parts[number];
+        const std::int64_t own = islands.rows(list[number]);
+        const bool alone = team.size() == 1 || process_count() > 1;
+        part.waits = !part.rests && !alone && !(own >= worth_a_team && own * team.size() > rows);
+        if (!part.waits && !part.rests) solve(number, settings.team);
+        if (!part.waits) continue;
+        if (own > 0) static_cast<void>(instance(kind, number));
+        chains[number % most_instances].rows += own;
+        shared += own;
+    }
+    for (std::size_t k = 0; k < chains.size(); ++k) chains[k].first = k;
+    std::ranges::sort(chains, std::greater{}, &Chain::rows);
+    team.if_worth(shared >= worth_sharing).for_each(chains.size(), [&](std::size_t k) {
+        for (std::size_t number = chains[k].first; number < list.size(); number += most_instances)
+            if (kind.parts[number].waits) solve(number, nullptr);
+    });
+    bool solved = true;
+    for (const PartResult& result : results) solved = take(result) && solved;
+    return solved;
+}
+
+bool StepSolver::Implementation::take(const PartResult& result) {
+    const SolverEffort& part = result.effort;
+    effort.plugin_solves += part.plugin_solves;
+    effort.iterations += part.iterations;
+    effort.seconds += part.seconds;
+    effort.repeated += part.repeated;
+    effort.worst_natural = std::max(effort.worst_natural, part.worst_natural);
+    effort.worst_miss = std::max(effort.worst_miss, part.worst_miss);
+    if (effort.unsolved.empty()) effort.unsolved = part.unsolved;
+    return result.solved;
+}
+
+void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start,
+                                            std::size_t number, std::span<const std::int32_t> columns,
+                                            const std::shared_ptr<ThreadTeam>& threads, PartResult& result) {
+    SolverEffort& spent = result.effort;
+    auto& kept = part(kind, number).prepared;
     if (!kept) {
         kept.emplace(std::move(problem), also_needs);
         problem = {};
+        kept->use(threads ? threads->team() : sdk::Team());
     } else {
+        kept->use(threads ? threads->team() : sdk::Team());
         kept->renew(std::move(problem));
     }
     const PreparedProblem& prepared = *kept;
@@ -199,32 +291,34 @@ bool StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
             solution.x = solve_by_lu(prepared);
         }
         solution.lambda.clear();
-        return true;
+        return;
     }
-    Solver& solver = this->solver(kind, number % most_instances);
+    Instance& by = instance(kind, number);
+    Solver& solver = by.solver;
     SolveSettings part_settings = settings;
+    part_settings.team = threads;
     part_settings.tolerance = tolerance_for(prepared, columns);
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
-    if (may_repeat && part_settings.warm_start) before = solution;
+    if (may_repeat && part_settings.warm_start) by.before = solution;
     SolveReport report = solver.solve(prepared, solution, part_settings);
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
-    ++effort.plugin_solves;
-    count(report);
+    ++spent.plugin_solves;
+    by.count(report, spent);
     const auto done = [&] {
         return report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit);
     };
-    if (!done() && moves_freely(prepared, solution)) return true;
-    if (!done() && may_repeat) solve_again(prepared, before, part_settings, solution, report);
-    effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
-    if (done()) return true;
-    effort.worst_miss = std::max(effort.worst_miss, std::max(report.error.natural, report.error.balance) /
-                                                        std::max(part_settings.tolerance, rounding_limit));
-    if (effort.unsolved.empty())
-        effort.unsolved =
+    if (!done() && moves_freely(prepared, solution)) return;
+    if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
+    spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
+    if (done()) return;
+    result.solved = false;
+    spent.worst_miss = std::max(spent.worst_miss, std::max(report.error.natural, report.error.balance) /
+                                                      std::max(part_settings.tolerance, rounding_limit));
+    if (spent.unsolved.empty())
+        spent.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
                         report.error.natural, report.message.empty() ? "" : ": ", report.message);
-    return false;
 }
 
 // What dry friction stops loses a share of its speed in each step that is as small as the tolerance, until the squares
@@ -260,27 +354,27 @@ bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solut
     return true;
 }
 
-void StepSolver::Implementation::count(const SolveReport& report) {
+void Instance::count(const SolveReport& report, SolverEffort& effort) {
     if (report.stages.empty() && report.solver != auto_name) loaded.insert(report.solver);
     for (const auto& stage : report.stages) loaded.insert(stage.solver);
     effort.iterations += report.iterations;
     effort.seconds += report.seconds_setup + report.seconds_solve;
 }
 
-void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, const Solution& first,
-                                             SolveSettings again, Solution& solution, SolveReport& report) {
-    if (!fallback) {
+void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, Instance& by, SolveSettings again,
+                                             Solution& solution, SolveReport& report, SolverEffort& spent) const {
+    if (!by.fallback) {
         SolverConfig other = config;
         other.name = auto_name;
         other.options = {{"simulation", "true"}};
-        fallback = make_solver(registry, other);
+        by.fallback = make_solver(registry, other);
     }
     again.max_iterations = SolveSettings{}.max_iterations;
-    Solution other = again.warm_start ? first : Solution{};
-    SolveReport second = fallback->solve(prepared, other, again);
+    Solution other = again.warm_start ? by.before : Solution{};
+    SolveReport second = by.fallback->solve(prepared, other, again);
     if (settings.cancelled && second.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
-    count(second);
-    ++effort.repeated;
+    by.count(second, spent);
+    ++spent.repeated;
     if (second.status != Status::Solved && !(second.error.natural < report.error.natural)) return;
     solution = std::move(other);
     report = std::move(second);
@@ -329,6 +423,14 @@ std::string StepSolver::choice(std::uint64_t needs) const {
     return choice.first.empty() ? std::string() : choice.first.front();
 }
 
+void StepSolver::use(std::shared_ptr<ThreadTeam> threads) {
+    implementation_->settings.team = std::move(threads);
+}
+sdk::Team StepSolver::team() const {
+    const auto& threads = implementation_->settings.team;
+    return threads ? threads->team() : sdk::Team();
+}
+
 Law StepSolver::law() const {
     return implementation_->config.law.value_or(law_of_scenes);
 }
@@ -340,7 +442,10 @@ void StepSolver::reset_effort() {
     implementation_->effort = {};
 }
 std::vector<std::string> StepSolver::loaded() const {
-    return {implementation_->loaded.begin(), implementation_->loaded.end()};
+    std::set<std::string> names;
+    for (const KeptKind& kind : implementation_->kinds)
+        for (const Instance& instance : kind.instances) names.insert(instance.loaded.begin(), instance.loaded.end());
+    return {names.begin(), names.end()};
 }
 
 }  // namespace delassus

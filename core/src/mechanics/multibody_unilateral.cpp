@@ -60,7 +60,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     self.collect_actuators(state.t, h, rows);
     if (!self.detector) return;
     self.place_shapes(state);
-    self.detector->detect(self.poses, self.envelope, rows.contacts());
+    self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team);
     if (!self.prescribed.empty())
         std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
             return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&

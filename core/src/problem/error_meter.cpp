@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "delassus/error.hpp"
 #include "delassus/errors.hpp"
@@ -115,7 +118,8 @@ struct ErrorMeter::Implementation {
     bool take_mobility() {
         const Vector* diagonal = &reference.diagonal;
         if (prepared.mobility) {
-            diagonal = &prepared.mobility->free_velocity(view, prepared.shares_columns, reference.r);
+            diagonal =
+                &prepared.mobility->free_velocity(view, prepared.shares_columns, prepared.useful_team(), reference.r);
         } else {
             reference = prepared.structure == Structure::Unsymmetric ? of_unsymmetric(view) : of_singular(view);
         }
@@ -137,9 +141,23 @@ struct ErrorMeter::Implementation {
         double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
         double velocity = 0.0;  ///< ‖u‖²
         double rounding = 0.0;
+
+        void operator+=(const Sums& other) {
+            natural += other.natural;
+            cone += other.cone;
+            dual += other.dual;
+            gap += other.gap;
+            siconos += other.siconos;
+            velocity += other.velocity;
+            rounding += other.rounding;
+        }
     };
 
+    /// What a pass over rows computes.
+    enum class Pass { Both, Velocities, Impulse };
+
     /// Multiplies the rows of one cone, which share their columns, by x, and adds their part of Dᵀλ to the impulse.
+    template <Pass pass>
     struct RowsAtSolution {
         const double *x, *lambda;  // λ: of the cone's rows
         double *u, *magnitude;     // of the cone's rows
@@ -147,30 +165,34 @@ struct ErrorMeter::Implementation {
         template <int length>
         void operator()(const DenseRows<length>& rows) const {
             using Array = typename DenseRows<length>::Array;
-            const Array x_of_columns = rows.gather(x);
-            Array pushed = Array::Zero();
+            Array x_of_columns, pushed = Array::Zero();
+            if constexpr (pass != Pass::Impulse) x_of_columns = rows.gather(x);
             for (std::int32_t i = 0; i < rows.count; ++i) {
                 const auto row = rows.row(i);
-                const Array terms = row * x_of_columns;
-                u[i] += terms.sum();
-                magnitude[i] += terms.abs().sum();
-                pushed += lambda[i] * row;
+                if constexpr (pass != Pass::Impulse) {
+                    const Array terms = row * x_of_columns;
+                    u[i] += terms.sum();
+                    magnitude[i] += terms.abs().sum();
+                }
+                if constexpr (pass != Pass::Velocities) pushed += lambda[i] * row;
             }
-            for (int k = 0; k < length; ++k) impulse[rows.column[k]] += pushed[k];
+            if constexpr (pass != Pass::Velocities)
+                for (int k = 0; k < length; ++k) impulse[rows.column[k]] += pushed[k];
         }
     };
 
     /// u and the sum of the magnitudes of its terms for the rows of a cone, and its part of impulse = Dᵀ λ.
+    template <Pass pass>
     void pass_over_rows(std::size_t c, const double* x, const double* lambda, double* u, double* magnitude) const {
         const delassus_matrix &D = view.raw->D, &E = view.raw->E;
         const auto& cone = prepared.cones[c];
         const auto first = cone.first_row;
-        for (std::int32_t i = 0; i < cone.rows; ++i) {
+        for (std::int32_t i = 0; i < cone.rows && pass != Pass::Impulse; ++i) {
             u[i] = view.b[first + i];
             magnitude[i] = std::abs(u[i]);
         }
         const bool done = prepared.shares_columns[c] && E.entries == 0 &&
-                          for_dense_rows(D, cone, RowsAtSolution{x, lambda + first, u, magnitude, impulse});
+                          for_dense_rows(D, cone, RowsAtSolution<pass>{x, lambda + first, u, magnitude, impulse});
         if (done) return;
         for (std::int32_t i = 0; i < cone.rows; ++i) {
             const auto row = first + i;
@@ -179,10 +201,11 @@ struct ErrorMeter::Implementation {
                 magnitude[i] += std::abs(term);
             };
             for (auto k = D.row_start[row]; k < D.row_start[row + 1]; ++k) {
-                add(D.value[k] * x[D.column[k]]);
-                impulse[D.column[k]] += D.value[k] * lambda[row];
+                if constexpr (pass != Pass::Impulse) add(D.value[k] * x[D.column[k]]);
+                if constexpr (pass != Pass::Velocities) impulse[D.column[k]] += D.value[k] * lambda[row];
             }
-            for (auto k = E.row_start[row]; k < E.row_start[row + 1]; ++k) add(E.value[k] * lambda[E.column[k]]);
+            for (auto k = E.row_start[row]; k < E.row_start[row + 1] && pass != Pass::Impulse; ++k)
+                add(E.value[k] * lambda[E.column[k]]);
         }
     }
 
@@ -223,16 +246,49 @@ struct ErrorMeter::Implementation {
     /// One pass over D and E, cone by cone, which leaves the impulse Dᵀ λ as well. On the rounding: a product of k
     /// terms is off by at most k ε times the product of the absolute values (Higham, Accuracy and Stability of
     /// Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts for one.
+    /// The sums are those of parts of the cones, added up in their order: the same bits for any number of threads.
     [[nodiscard]] Sums sums_over_cones(const double* x, const double* lambda) const {
-        Sums sums;
+        constexpr std::size_t part = 512;
+        const std::size_t cones = prepared.cones.size(), parts = (cones + part - 1) / part;
+        const sdk::Team team = prepared.useful_team();
         impulse.setZero(view.n);
-        work.resize(3 * largest_cone());
-        for (std::size_t c = 0; c < prepared.cones.size(); ++c) {
+        const std::size_t scratch = 3 * static_cast<std::size_t>(largest_cone());
+        work.resize(scratch * static_cast<std::size_t>(team.size()));
+        part_sums.assign(parts, {});
+        const auto range = [&](std::size_t k) { return std::pair(k * part, std::min(cones, (k + 1) * part)); };
+        if (team.size() == 1) {
+            for (std::size_t k = 0; k < parts; ++k)
+                add_cones<Pass::Both>(range(k), x, lambda, work.data(), part_sums[k]);
+        } else {
+            // The impulse is the sum of its terms in the order of the cones: one member makes it while others begin.
+            std::atomic<std::size_t> next = 0;
+            team.run([&](int member) {
+                double* memory = work.data() + scratch * static_cast<std::size_t>(member);
+                for (std::size_t task; (task = next.fetch_add(1)) <= parts;) {
+                    if (task == 0) {
+                        for (std::size_t c = 0; c < cones; ++c) pass_over_rows<Pass::Impulse>(c, x, lambda, {}, {});
+                    } else {
+                        add_cones<Pass::Velocities>(range(task - 1), x, lambda, memory, part_sums[task - 1]);
+                    }
+                }
+            });
+        }
+        Sums sums;
+        for (const Sums& one : part_sums) sums += one;
+        return sums;
+    }
+
+    /// Adds the parts of the cones from first to second − 1. memory: three times the rows of the largest cone.
+    template <Pass pass>
+    void add_cones(std::pair<std::size_t, std::size_t> range, const double* x, const double* lambda, double* memory,
+                   Sums& total) const {
+        Sums sums;  // in registers
+        for (std::size_t c = range.first; c < range.second; ++c) {
             const auto& cone = prepared.cones[c];
             const double* lambda_c = lambda + cone.first_row;
-            double *u = work.data(), *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
+            double *u = memory, *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
             prefetch_after(view.raw->D, cone.first_row);
-            pass_over_rows(c, x, lambda, u, magnitude);
+            pass_over_rows<pass>(c, x, lambda, u, magnitude);
             const double s = residual.scaling()[c];
             for (std::int32_t i = 0; i < cone.rows; ++i) {
                 const double scaled = s * magnitude[i] + std::abs(lambda_c[i]) / s;
@@ -246,7 +302,7 @@ struct ErrorMeter::Implementation {
                 add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, trial, sums);
             }
         }
-        return sums;
+        total = sums;
     }
 
     [[nodiscard]] std::int32_t largest_cone() const {
@@ -262,7 +318,9 @@ struct ErrorMeter::Implementation {
     double r_norm = 0.0;
     mutable std::int64_t measurements = 0;
     // Kept so that measuring again allocates nothing.
-    mutable Vector plain_u, work, momentum, impulse;
+    mutable Vector plain_u, momentum, impulse;
+    mutable std::vector<double> work;
+    mutable std::vector<Sums> part_sums;
 };
 
 ErrorMeter::ErrorMeter(const PreparedProblem& problem)

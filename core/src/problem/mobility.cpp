@@ -18,9 +18,9 @@ void Mobility::analyze(const sdk::ProblemView& problem) {
     }
 }
 
-void Mobility::factorize(const sdk::ProblemView& problem) {
+void Mobility::factorize(const sdk::ProblemView& problem, const sdk::Team& team) {
     rows_are_new_ = H_is_diagonal_;
-    if (!H_is_diagonal_) return operator_.factorize(problem);
+    if (!H_is_diagonal_) return operator_.factorize(problem, false, team);
     inverse_.factorize(problem);
     inverse_diagonal_.setOnes(problem.n);
     inverse_.apply(inverse_diagonal_);
@@ -47,10 +47,10 @@ struct FreeRows {
 }  // namespace
 
 const Vector& Mobility::free_velocity(const sdk::ProblemView& problem, std::span<const char> shares_columns,
-                                      Vector& r) {
+                                      const sdk::Team& team, Vector& r) {
     const bool new_rows = std::exchange(rows_are_new_, false);
     if (!H_is_diagonal_) {
-        if (new_rows) operator_.refresh(problem);
+        if (new_rows) operator_.refresh(problem, team);
         operator_.free_velocity(problem, r);
         return operator_.diagonal();
     }
@@ -64,7 +64,7 @@ const Vector& Mobility::free_velocity(const sdk::ProblemView& problem, std::span
     r.resize(problem.m);
     diagonal_.resize(problem.m);
     const delassus_matrix& D = problem.raw->D;
-    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+    const auto visit = [&](std::size_t c) {
         const delassus_cone& cone = problem.cones[c];
         const auto first = cone.first_row, last = first + cone.rows;
         prefetch_after(D, first);
@@ -80,7 +80,11 @@ const Vector& Mobility::free_velocity(const sdk::ProblemView& problem, std::span
                 diagonal_[row] = square;
             }
         for (auto row = first; row < last; ++row) r[row] += problem.b[row];
-    }
+    };
+    team.run([&](int member) {
+        const auto [first, last] = team.share(problem.cones.size(), member);
+        for (std::size_t c = first; c < last; ++c) visit(c);
+    });
     for (Eigen::Index row = 0; row < problem.m && problem.E.nonZeros() > 0; ++row)
         diagonal_[row] += problem.E.coeff(row, row);
     return diagonal_;

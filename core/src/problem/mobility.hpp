@@ -16,7 +16,7 @@ public:
     /// Reads the structure of H; throws std::invalid_argument unless it is definite or n = 0.
     void analyze(const sdk::ProblemView& problem);
     /// Throws NumericalFailure if H is not positive definite.
-    void factorize(const sdk::ProblemView& problem);
+    void factorize(const sdk::ProblemView& problem, const sdk::Team& team);
     /// Announces new D and E. The values of H must be those of the last factorisation.
     void refresh() { rows_are_new_ = true; }
 
@@ -24,7 +24,7 @@ public:
     /// r ← D H⁻¹ a + b, resized to m; the diagonal of N, m, valid until the next call. shares_columns: of cones,
     /// whether all their rows have entries in the same columns of D.
     const sdk::Vector& free_velocity(const sdk::ProblemView& problem, std::span<const char> shares_columns,
-                                     sdk::Vector& r);
+                                     const sdk::Team& team, sdk::Vector& r);
     /// x ← H⁻¹ (a + Dᵀ λ); resized to n. λ: m, or none for λ = 0.
     void velocity(const sdk::ProblemView& problem, const double* lambda, sdk::Vector& x) const;
 

@@ -95,6 +95,10 @@ void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<dou
     if (self.meter) self.meter->renew();
 }
 
+void PreparedProblem::use(const sdk::Team& team) {
+    implementation_->team = team;
+}
+
 void PreparedProblem::set_law(Law law) {
     auto& self = *implementation_;
     self.problem.law = law;
@@ -111,6 +115,7 @@ PreparedProblem PreparedProblem::with_law(Law law) const {
     to.problem.law = law;
     to.structure = from.structure;
     to.also_needs = from.also_needs;
+    to.team = from.team;
     to.mobility = from.mobility;
     to.redundancy = from.redundancy;
     to.lay_out();
@@ -136,7 +141,9 @@ void PreparedProblem::renew(const Problem& other) {
 void PreparedProblem::renew(Problem&& other) {
     auto& self = *implementation_;
     if (!self.same_places_of_H(other)) {
+        const sdk::Team team = self.team;
         *this = PreparedProblem(std::move(other), self.also_needs);
+        use(team);
         other = {};
         return;
     }
@@ -313,7 +320,7 @@ void PreparedProblem::Implementation::detect_structure() {
             candidate = std::make_shared<Mobility>();
             candidate->analyze(view);
         }
-        candidate->factorize(view);
+        candidate->factorize(view, useful_team());
         if (candidate->inverse().smallest_relative_pivot() > 1e-14) {
             mobility = std::move(candidate);
             return;

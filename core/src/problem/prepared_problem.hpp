@@ -24,6 +24,10 @@ struct PreparedProblem::Implementation {
     std::shared_ptr<Mobility> mobility;
     mutable std::unique_ptr<ErrorMeter> meter;
     RedundancyCheck redundancy;
+    sdk::Team team;
+
+    /// The team where the problem is large enough to share work on it.
+    [[nodiscard]] sdk::Team useful_team() const { return team.if_worth(raw.m >= 2048); }
 
     void lay_out();
     /// Points raw to the arrays of the problem and to the numbers of the cones, which lay_out() placed.

@@ -72,12 +72,20 @@ void put_values(const SceneOverrides& overrides, Source& source, YAML::Node map)
     if (overrides.leave_out) map["leave_out"] = *overrides.leave_out;
 }
 
+/// Takes out what does not change the steps.
+void keep_what_steps_depend_on(YAML::Node system) {
+    system.remove("end");
+    if (!system["solver"].IsDefined() || !system["solver"].IsMap()) return;
+    system["solver"].remove("threads");
+    if (system["solver"].size() == 0) system.remove("solver");
+}
+
 std::string canonical_text(const YAML::Node& root, const SceneOverrides& overrides) {
     YAML::Node copy = YAML::Clone(root);
-    copy.remove("end");
     copy.remove("title");
+    keep_what_steps_depend_on(copy);
     if (copy["systems"].IsDefined())
-        for (auto entry : copy["systems"]) entry.second.remove("end");
+        for (auto entry : copy["systems"]) keep_what_steps_depend_on(entry.second);
     return fmt::format("{}\nsolver {}\nintegrator {}\n{}", YAML::Dump(copy), overrides.solver, overrides.integrator,
                        overrides.law ? fmt::format("law {}\n", name_of(*overrides.law)) : "");
 }

@@ -218,6 +218,10 @@ private:
 
 std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution& solution,
                                         const SolveSettings& settings, SolveReport& report) {
+    if (border().use_team) {
+        const sdk::Team team = settings.team ? settings.team->team() : sdk::Team();
+        guarded([&] { return border().use_team(solver, team.raw()), DELASSUS_SOLVED; });
+    }
     Stopwatch setup, watch;
     setup.start();
     std::int32_t raw_status = set_up(problem);

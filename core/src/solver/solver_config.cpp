@@ -18,6 +18,7 @@ SolveSettings SolverConfig::settings() const {
     if (tolerance) settings.tolerance = *tolerance;
     if (max_iterations) settings.max_iterations = *max_iterations;
     if (time_limit) settings.time_limit = *time_limit;
+    settings.team = ThreadTeam::for_threads(threads);
     if (sweeps) {
         settings.max_iterations = *sweeps;
         settings.tolerance = std::numeric_limits<double>::min();

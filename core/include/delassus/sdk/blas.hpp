@@ -84,6 +84,9 @@ private:
         if (dlsym(library, mark) && gemm_ && syrk_ && trsm_) {
             core_ = reinterpret_cast<char* (*)()>(dlsym(library, "openblas_get_corename"));
             threads_ = reinterpret_cast<int (*)()>(dlsym(library, "openblas_get_num_threads"));
+            // One thread, until BlasThreads asks for more.
+            const auto set = reinterpret_cast<void (*)(int)>(dlsym(library, "openblas_set_num_threads"));
+            if (set) set(1);
             return true;
         }
         dlclose(library);

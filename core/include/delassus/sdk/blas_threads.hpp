@@ -1,49 +1,66 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One thread of the system's BLAS for small work, where its threads would only wait for one another.
+// How many threads the system's BLAS uses: one, but for large work of a solver that has a team.
 #pragma once
 
 #include <dlfcn.h>
 
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <limits>
+
+#include "delassus/sdk/team.hpp"
+
 namespace delassus::sdk {
 
-/// While it lives, OpenBLAS uses one thread if the work is small; afterwards as many as before. Its threads watch for
-/// work for some milliseconds after each call, which costs more than they save on fronts of a few hundred rows.
-/// Nothing happens where the process has no OpenBLAS.
+/// While it lives, OpenBLAS uses as many threads as the team of the calling thread's solver has members, if the work is
+/// large; afterwards one. Its threads watch for work for some milliseconds after each call, which costs more than they
+/// save on fronts of a few hundred rows. Solvers without a team never raise the number, so that those that work side by
+/// side do not change each other's. Nothing happens where the process has no OpenBLAS.
 class BlasThreads {
 public:
     /// flops: of the work to come, about.
-    explicit BlasThreads(double flops) : one_(flops < worth_more_threads && library().most > 1) {
-        if (one_) library().set(1);
+    explicit BlasThreads(double flops) : several_(flops >= worth_more_threads && members_ > 1) {
+        if (several_) set(std::min(members_, allowed()));
     }
     ~BlasThreads() {
-        if (one_) library().set(library().most);
+        if (several_) set(1);
     }
     BlasThreads(const BlasThreads&) = delete;
     BlasThreads& operator=(const BlasThreads&) = delete;
 
+    /// The team of what the calling thread is about to do.
+    static void use(const Team& team) {
+        members_ = team.size();
+        set(1);
+    }
+
 private:
     static constexpr double worth_more_threads = 2e8;  // some 20 ms of one thread
 
-    struct Library {
-        void (*set)(int) = nullptr;
-        int most = 1;
-    };
-    // The number is asked for once, so that two solves at the same time do not take each other's 1 for it.
-    static const Library& library() {
-        static const Library found = [] {
-            Library result;
-            void* handle = dlopen("libblas.so.3", RTLD_NOW | RTLD_LOCAL | RTLD_NOLOAD);
-            if (!handle) return result;
-            const auto get = reinterpret_cast<int (*)()>(dlsym(handle, "openblas_get_num_threads"));
-            result.set = reinterpret_cast<void (*)(int)>(dlsym(handle, "openblas_set_num_threads"));
-            if (get && result.set) result.most = get();
-            dlclose(handle);  // who loaded it keeps it
-            return result;
-        }();
-        return found;
+    /// By OpenBLAS's own variables.
+    static int allowed() {
+        for (const char* name : {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"})
+            if (const char* text = std::getenv(name); text && std::atoi(text) > 0) return std::atoi(text);
+        return std::numeric_limits<int>::max();
     }
 
-    bool one_;
+    static void set(int threads) {
+        static std::atomic<void (*)(int)> known = nullptr;  // the library may be loaded later
+        auto function = known.load();
+        if (!function) {
+            void* handle = dlopen("libblas.so.3", RTLD_NOW | RTLD_LOCAL | RTLD_NOLOAD);
+            if (!handle) return;
+            function = reinterpret_cast<void (*)(int)>(dlsym(handle, "openblas_set_num_threads"));
+            dlclose(handle);  // who loaded it keeps it
+            if (!function) return;
+            known = function;
+        }
+        function(threads);
+    }
+
+    inline static thread_local int members_ = 1;
+    bool several_;
 };
 
 }  // namespace delassus::sdk

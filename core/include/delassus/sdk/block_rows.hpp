@@ -10,6 +10,7 @@
 #include "delassus/sdk/block_kernels.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus::sdk {
 
@@ -40,7 +41,8 @@ public:
 
     /// Copies matrix, scaled by diag(left) · matrix · diag(right); a null pointer is an identity. Group k takes the
     /// matrix's rows groups[k], in any order, each row once; zeros that its rows do not share are stored.
-    BlockRows(const Matrix& matrix, std::span<const RowGroup> groups, const double* left, const double* right);
+    BlockRows(const Matrix& matrix, std::span<const RowGroup> groups, const double* left, const double* right,
+              const Team& team = {});
 
     /// The same rows with group order[k] in place k, and so in memory. renumber: rows are counted anew in that order.
     [[nodiscard]] BlockRows reordered(std::span<const std::int32_t> order, bool renumber) const;
@@ -68,6 +70,10 @@ public:
 
 private:
     std::vector<std::int32_t> columns_of(const Matrix& matrix, std::span<const RowGroup> groups);
+
+    static bool append_shared_columns(const Matrix& matrix, const RowGroup& rows, std::vector<std::int32_t>& columns);
+
+    void fill(const Matrix& matrix, const Group& group, const double* left, const double* right);
 
     [[nodiscard]] int cheapest_width(const std::vector<std::int32_t>& columns, std::span<const RowGroup> groups) const;
 

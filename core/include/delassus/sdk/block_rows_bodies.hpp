@@ -21,14 +21,15 @@ DELASSUS_SDK_FUNCTION std::vector<RowGroup> row_groups(const ConeRange& cones) {
 }
 
 DELASSUS_SDK_FUNCTION BlockRows::BlockRows(const Matrix& matrix, std::span<const RowGroup> groups, const double* left,
-                                           const double* right) {
+                                           const double* right, const Team& team) {
     const std::vector<std::int32_t> columns = columns_of(matrix, groups);
     width_ = cheapest_width(columns, groups);
-    value_.reserve(static_cast<std::size_t>(matrix.nonZeros()));
     std::size_t at = 0;
+    std::ptrdiff_t values = 0;
+    start_.reserve(columns.size());
     for (std::size_t k = 0; k < groups.size(); ++k) {
         Group& group = groups_[k];
-        group.value = static_cast<std::ptrdiff_t>(value_.size());
+        group.value = values;
         group.chunk = static_cast<std::ptrdiff_t>(start_.size());
         const std::size_t end = at + static_cast<std::size_t>(group.chunks);  // still its number of columns
         std::int32_t reached = -1;
@@ -38,18 +39,26 @@ DELASSUS_SDK_FUNCTION BlockRows::BlockRows(const Matrix& matrix, std::span<const
             reached = columns[at] + width_;
         }
         group.chunks = static_cast<std::int32_t>(static_cast<std::ptrdiff_t>(start_.size()) - group.chunk);
-        value_.resize(value_.size() +
-                      static_cast<std::size_t>(group.chunks) * static_cast<std::size_t>(group.rows * width_));
-        const std::int32_t* start = start_.data() + group.chunk;
-        for (std::int32_t i = 0; i < group.rows; ++i) {
-            for (Matrix::InnerIterator entry(matrix, group.first + i); entry; ++entry) {
-                const auto column = static_cast<std::int32_t>(entry.col());
-                const auto place = std::upper_bound(start, start + group.chunks, column) - start - 1;
-                const double scale = (left ? left[group.first + i] : 1.0) * (right ? right[column] : 1.0);
-                value_[static_cast<std::size_t>(group.value + column - start[place]) +
-                       place_of_chunk(width_, group.rows, group.chunks, static_cast<int>(place), i)] =
-                    scale * entry.value();
-            }
+        values += static_cast<std::ptrdiff_t>(group.chunks) * group.rows * width_;
+    }
+    value_.resize(static_cast<std::size_t>(values));
+    team.run([&](int member) {
+        const auto [first, last] = team.share(groups_.size(), member);
+        for (std::size_t k = first; k < last; ++k) fill(matrix, groups_[k], left, right);
+    });
+}
+
+DELASSUS_SDK_FUNCTION void BlockRows::fill(const Matrix& matrix, const Group& group, const double* left,
+                                           const double* right) {
+    const std::int32_t* start = start_.data() + group.chunk;
+    for (std::int32_t i = 0; i < group.rows; ++i) {
+        int place = 0;  // columns ascend
+        for (Matrix::InnerIterator entry(matrix, group.first + i); entry; ++entry) {
+            const auto column = static_cast<std::int32_t>(entry.col());
+            while (column >= start[place] + width_) ++place;
+            const double scale = (left ? left[group.first + i] : 1.0) * (right ? right[column] : 1.0);
+            value_[static_cast<std::size_t>(group.value + column - start[place]) +
+                   place_of_chunk(width_, group.rows, group.chunks, place, i)] = scale * entry.value();
         }
     }
 }
@@ -102,6 +111,20 @@ DELASSUS_SDK_FUNCTION void BlockRows::transpose_multiply_add(const double* v, do
     });
 }
 
+// Where all rows of a group have the same columns, as those of a contact have as a rule, these are the group's.
+DELASSUS_SDK_FUNCTION bool BlockRows::append_shared_columns(const Matrix& matrix, const RowGroup& rows,
+                                                            std::vector<std::int32_t>& columns) {
+    if (!matrix.isCompressed()) return false;
+    const auto* start = matrix.outerIndexPtr() + rows.first;
+    const auto* first = matrix.innerIndexPtr() + start[0];
+    const auto length = start[1] - start[0];
+    for (std::int32_t i = 1; i < rows.rows; ++i)
+        if (start[i + 1] - start[i] != length || !std::equal(first, first + length, matrix.innerIndexPtr() + start[i]))
+            return false;
+    columns.insert(columns.end(), first, first + length);
+    return true;
+}
+
 // The columns that each group touches, ascending, one group after another; fills groups_, with the number of
 // columns in place of chunks.
 DELASSUS_SDK_FUNCTION std::vector<std::int32_t> BlockRows::columns_of(const Matrix& matrix,
@@ -113,6 +136,10 @@ DELASSUS_SDK_FUNCTION std::vector<std::int32_t> BlockRows::columns_of(const Matr
     for (const RowGroup& rows : groups) {
         groups_.push_back({0, 0, rows.first, rows.rows, 0});
         const auto begin = static_cast<std::ptrdiff_t>(columns.size());
+        if (append_shared_columns(matrix, rows, columns)) {
+            groups_.back().chunks = static_cast<std::int32_t>(static_cast<std::ptrdiff_t>(columns.size()) - begin);
+            continue;
+        }
         for (std::int32_t i = 0; i < rows.rows; ++i)
             for (Matrix::InnerIterator entry(matrix, rows.first + i); entry; ++entry) {
                 auto& mark = last[static_cast<std::size_t>(entry.col())];

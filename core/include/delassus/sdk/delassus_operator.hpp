@@ -18,10 +18,10 @@ public:
 
     /// Factors H and computes the diagonal blocks of N. Throws NumericalFailure if H is not positive definite.
     /// will_form: formed() will be called, and N may be made in the same pass over D.
-    void factorize(const ProblemView& problem, bool will_form = false);
+    void factorize(const ProblemView& problem, bool will_form = false, const Team& team = {});
 
     /// As factorize, where the values of H are those of the last factorisation: only D and E are new.
-    void refresh(const ProblemView& problem) { compute_blocks(problem, false); }
+    void refresh(const ProblemView& problem, const Team& team = {}) { compute_blocks(problem, false, team); }
 
     /// result ← N λ; both m.
     void apply(const ProblemView& problem, const Vector& lambda, Vector& result) const;
@@ -57,11 +57,11 @@ private:
     /// Rows up to which N of a sparse H is made beside its blocks, as a dense matrix at first.
     static constexpr Eigen::Index most_rows_formed = 4000;
 
-    void compute_blocks(const ProblemView& problem, bool will_form);
+    void compute_blocks(const ProblemView& problem, bool will_form, const Team& team);
 
     void add_inertia_by_panels(const ProblemView& problem, bool will_form);
 
-    void add_inertia(const ProblemView& problem);
+    void add_inertia(const ProblemView& problem, const Team& team);
 
     void add_compliance(const ProblemView& problem);
 

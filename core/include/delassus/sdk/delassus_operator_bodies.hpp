@@ -10,9 +10,9 @@
 
 namespace delassus::sdk {
 
-DELASSUS_SDK_FUNCTION void DelassusOperator::factorize(const ProblemView& problem, bool will_form) {
+DELASSUS_SDK_FUNCTION void DelassusOperator::factorize(const ProblemView& problem, bool will_form, const Team& team) {
     inverse_.factorize(problem);
-    compute_blocks(problem, will_form);
+    compute_blocks(problem, will_form, team);
 }
 
 DELASSUS_SDK_FUNCTION void DelassusOperator::apply(const ProblemView& problem, const Vector& lambda,
@@ -76,7 +76,8 @@ DELASSUS_SDK_FUNCTION SparseRows DelassusOperator::formed(const ProblemView& pro
     return N;
 }
 
-DELASSUS_SDK_FUNCTION void DelassusOperator::compute_blocks(const ProblemView& problem, bool will_form) {
+DELASSUS_SDK_FUNCTION void DelassusOperator::compute_blocks(const ProblemView& problem, bool will_form,
+                                                            const Team& team) {
     if (inertia_.rows() > 0) inertia_.resize(0, 0);  // which allocates, even from nothing to nothing
     diagonal_.setZero(problem.m);
     block_offset_.assign(problem.cones.size(), -1);
@@ -90,7 +91,7 @@ DELASSUS_SDK_FUNCTION void DelassusOperator::compute_blocks(const ProblemView& p
     if (problem.n > 0 && inverse_.kind() == HInverse::Kind::Sparse) {
         add_inertia_by_panels(problem, will_form);
     } else if (problem.n > 0) {
-        add_inertia(problem);
+        add_inertia(problem, team);
     }
     if (problem.E.nonZeros() > 0) add_compliance(problem);
 }
@@ -141,8 +142,8 @@ DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia_by_panels(const Problem
 }
 
 // D_c H⁻¹ D_cᵀ from the rows of Z, kept for one block at a time as (index, value) pairs.
-DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& problem) {
-    inverse_.half_solve_rows(problem.D, whitened_);
+DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& problem, const Team& team) {
+    inverse_.half_solve_rows(problem.D, whitened_, team);
     const auto& start = whitened_.start;
     const auto& value = whitened_.value;
     // Rows of one contact mostly have the same columns.
@@ -164,7 +165,7 @@ DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& prob
         }
         return sum;
     };
-    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+    const auto add_block = [&](std::size_t c) {
         const std::int32_t first = problem.cones[c].first_row, rows = problem.cones[c].rows;
         double* block = block_offset_[c] < 0 ? nullptr : blocks_.data() + block_offset_[c];
         for (std::int32_t i = 0; i < rows; ++i) {
@@ -181,7 +182,11 @@ DELASSUS_SDK_FUNCTION void DelassusOperator::add_inertia(const ProblemView& prob
                 block[j * rows + i] += entry;
             }
         }
-    }
+    };
+    team.run([&](int member) {
+        const auto [first, last] = team.share(problem.cones.size(), member);
+        for (std::size_t c = first; c < last; ++c) add_block(c);
+    });
 }
 
 DELASSUS_SDK_FUNCTION void DelassusOperator::add_compliance(const ProblemView& problem) {

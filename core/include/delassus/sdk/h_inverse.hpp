@@ -9,6 +9,7 @@
 
 #include "delassus/sdk/problem_view.hpp"
 #include "delassus/sdk/sparse_factor.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus::sdk {
 
@@ -33,6 +34,8 @@ struct CompressedRows {
         value.push_back(entry);
     }
     void end_row() { start.push_back(static_cast<std::int32_t>(column.size())); }
+    /// Takes the rows of all parts, one after another.
+    void join(const std::vector<CompressedRows>& parts, const Team& team);
     /// As a matrix of so many columns; valid until the next change.
     [[nodiscard]] SparseRowsView view(Eigen::Index columns) const {
         return {static_cast<Eigen::Index>(start.size()) - 1,
@@ -64,19 +67,14 @@ public:
     [[nodiscard]] SparseColumns half_solved(const SparseRowsView& D) const;
 
     /// W ← Zᵀ = D L⁻ᵀ without its zeros, where H is diagonal or of blocks.
-    void half_solve_rows(const SparseRowsView& D, CompressedRows& W) const;
+    void half_solve_rows(const SparseRowsView& D, CompressedRows& W, const Team& team = {}) const;
 
     /// Visits L⁻¹ P Dᵀ row by row of D without storing it, where H is diagonal or of blocks: visit(row, reach, work),
     /// where work (n) is zero but for the indices in reach.
     template <class Visitor>
     void for_each_half_solved_row(const SparseRowsView& D, Visitor&& visit) const {
-        row_work_.setZero(n_);
-        mark_.assign(static_cast<std::size_t>(n_), -1);
-        for (Eigen::Index row = 0; row < D.rows(); ++row) {
-            half_solve_row(D, row, row_work_, reach_, mark_);
-            visit(row, reach_, row_work_);
-            for (const auto i : reach_) row_work_[i] = 0.0;
-        }
+        scratch_.resize(1);
+        for_each_half_solved_row(D, 0, D.rows(), scratch_[0], visit);
     }
 
     /// The factor of a sparse H.
@@ -98,6 +96,28 @@ private:
     /// Of the diagonal blocks that the host shows (DELASSUS_CAN_H_BLOCKS).
     static constexpr int largest_block = 16;
     using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, largest_block, largest_block>;
+
+    /// Memory for rows of Z; one for each thread.
+    struct RowScratch {
+        Vector work;
+        std::vector<std::int32_t> reach, mark;
+    };
+
+    template <class Visitor>
+    void for_each_half_solved_row(const SparseRowsView& D, Eigen::Index first, Eigen::Index last, RowScratch& scratch,
+                                  Visitor&& visit) const {
+        scratch.work.setZero(n_);
+        scratch.mark.assign(static_cast<std::size_t>(n_), -1);
+        for (Eigen::Index row = first; row < last; ++row) {
+            half_solve_row(D, row, scratch.work, scratch.reach, scratch.mark);
+            visit(row, scratch.reach, scratch.work);
+            for (const auto i : scratch.reach) scratch.work[i] = 0.0;
+        }
+    }
+
+    /// W ← rows first … last − 1 of Zᵀ.
+    void half_solve_rows(const SparseRowsView& D, Eigen::Index first, Eigen::Index last, RowScratch& scratch,
+                         CompressedRows& W) const;
 
     static Eigen::Map<const SparseColumns> columns_of(const ProblemView& problem);
 
@@ -125,8 +145,8 @@ private:
     std::unique_ptr<SparseFactor> sparse_;
     double smallest_relative_pivot_ = 1.0;
     std::int64_t analyses_ = 0, factorizations_ = 0;
-    mutable Vector row_work_;  // of for_each_half_solved_row
-    mutable std::vector<std::int32_t> reach_, mark_;
+    mutable std::vector<RowScratch> scratch_;
+    mutable std::vector<CompressedRows> parts_;  // by threads
 };
 
 }  // namespace delassus::sdk

@@ -89,13 +89,57 @@ DELASSUS_SDK_FUNCTION SparseColumns HInverse::half_solved(const SparseRowsView& 
     return Z;
 }
 
-DELASSUS_SDK_FUNCTION void HInverse::half_solve_rows(const SparseRowsView& D, CompressedRows& W) const {
+DELASSUS_SDK_FUNCTION void CompressedRows::join(const std::vector<CompressedRows>& parts, const Team& team) {
+    std::size_t rows = 0, entries = 0;
+    for (const CompressedRows& part : parts) {
+        rows += part.start.size() - 1;
+        entries += part.column.size();
+    }
+    start.resize(rows + 1);
+    column.resize(entries);
+    value.resize(entries);
+    start[0] = 0;
+    team.run([&](int member) {
+        const auto [first, last] = team.share(parts.size(), member);
+        std::size_t row = 0, entry = 0;
+        for (std::size_t k = 0; k < last; ++k) {
+            const CompressedRows& part = parts[k];
+            if (k >= first) {
+                for (std::size_t i = 1; i < part.start.size(); ++i)
+                    start[row + i] = static_cast<std::int32_t>(entry) + part.start[i];
+                std::copy(part.column.begin(), part.column.end(), column.begin() + static_cast<std::ptrdiff_t>(entry));
+                std::copy(part.value.begin(), part.value.end(), value.begin() + static_cast<std::ptrdiff_t>(entry));
+            }
+            row += part.start.size() - 1;
+            entry += part.column.size();
+        }
+    });
+}
+
+DELASSUS_SDK_FUNCTION void HInverse::half_solve_rows(const SparseRowsView& D, CompressedRows& W,
+                                                     const Team& team) const {
+    const auto members = static_cast<std::size_t>(team.size());
+    if (scratch_.size() < members) scratch_.resize(members);
+    if (members == 1) return half_solve_rows(D, 0, D.rows(), scratch_[0], W);
+    parts_.resize(members);
+    team.run([&](int member) {
+        const auto [first, last] = team.share(static_cast<std::size_t>(D.rows()), member);
+        const auto place = static_cast<std::size_t>(member);
+        half_solve_rows(D, static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(last), scratch_[place],
+                        parts_[place]);
+    });
+    W.join(parts_, team);
+}
+
+DELASSUS_SDK_FUNCTION void HInverse::half_solve_rows(const SparseRowsView& D, Eigen::Index first, Eigen::Index last,
+                                                     RowScratch& scratch, CompressedRows& W) const {
     W.clear();
-    W.start.reserve(static_cast<std::size_t>(D.rows()) + 1);
-    W.column.reserve(static_cast<std::size_t>(D.nonZeros()));
-    W.value.reserve(static_cast<std::size_t>(D.nonZeros()));
+    const auto entries = static_cast<std::size_t>(D.outerIndexPtr()[last] - D.outerIndexPtr()[first]);
+    W.start.reserve(static_cast<std::size_t>(last - first) + 1);
+    W.column.reserve(entries);
+    W.value.reserve(entries);
     if (kind_ == Kind::Diagonal) {
-        for (Eigen::Index row = 0; row < D.rows(); ++row) {
+        for (Eigen::Index row = first; row < last; ++row) {
             for (SparseRowsView::InnerIterator entry(D, row); entry; ++entry)
                 if (entry.value() != 0.0)
                     W.put(static_cast<std::int32_t>(entry.col()), entry.value() / root_[entry.col()]);
@@ -103,7 +147,7 @@ DELASSUS_SDK_FUNCTION void HInverse::half_solve_rows(const SparseRowsView& D, Co
         }
         return;
     }
-    for_each_half_solved_row(D, [&](Eigen::Index, std::vector<std::int32_t>& reach, const Vector& work) {
+    for_each_half_solved_row(D, first, last, scratch, [&](Eigen::Index, auto& reach, const Vector& work) {
         if (!std::is_sorted(reach.begin(), reach.end())) std::sort(reach.begin(), reach.end());
         for (const auto j : reach)
             if (work[j] != 0.0) W.put(j, work[j]);

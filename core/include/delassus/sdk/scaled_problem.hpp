@@ -53,7 +53,7 @@ public:
     void analyze(const ProblemView& problem) { operator_.analyze(problem); }
 
     /// Factors H and builds N̂. Throws NumericalFailure if H is not positive definite.
-    void factorize(const ProblemView& problem);
+    void factorize(const ProblemView& problem, const Team& team = {});
 
     /// Takes a, b, the cones' parameters and bounds for the solve that follows.
     void load(const ProblemView& problem);
@@ -61,9 +61,14 @@ public:
     /// The rows in parts, in their order; since load().
     [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
 
+    /// The team where there are rows enough to share, else the calling thread alone.
+    [[nodiscard]] static Team useful(const Team& team, const ProblemView& problem) {
+        return team.if_worth(problem.m >= 2 * part_rows);
+    }
+
     /// body(part) for all parts, by all members of the team.
     template <class Body>
-    void for_parts(Team& team, const Body& body) const {
+    void for_parts(const Team& team, const Body& body) const {
         team.run([&](int member) {
             const auto [first, last] = team.share(parts_.size(), member);
             for (std::size_t k = first; k < last; ++k) body(parts_[k]);
@@ -71,7 +76,7 @@ public:
     }
     /// The sums over all parts of the Count numbers that body(part) returns as an array.
     template <std::size_t Count, class Body>
-    [[nodiscard]] std::array<double, Count> sums_over_parts(Team& team, const Body& body) const {
+    [[nodiscard]] std::array<double, Count> sums_over_parts(const Team& team, const Body& body) const {
         partial_.resize(Count * parts_.size());
         team.run([&](int member) {
             const auto [first, last] = team.share(parts_.size(), member);
@@ -85,14 +90,42 @@ public:
         return total;
     }
 
+    /// before(part) for all parts, then what a product of N̂ with λ̂ (m, made by before) needs of all rows, then
+    /// after(part), which may call finish_product: by all members of the team, who wait for one another in between
+    /// only. The sums over all parts of the First numbers that before returns as an array, and the Second of after.
+    template <std::size_t First, std::size_t Second, class Before, class After>
+    [[nodiscard]] std::array<double, First + Second> sums_about_product(const Team& team, const Vector& lambda,
+                                                                        const Before& before,
+                                                                        const After& after) const {
+        constexpr std::size_t count = First + Second;
+        prepare_product(team);
+        partial_.resize(count * parts_.size());
+        team.run([&](int member) {
+            const auto [first, last] = team.share(parts_.size(), member);
+            for (std::size_t k = first; k < last; ++k) {
+                const std::array<double, First> sums = before(parts_[k]);
+                std::copy(sums.begin(), sums.end(), partial_.data() + count * k);
+            }
+            team.barrier();
+            begin_product(team, member, lambda);
+            for (std::size_t k = first; k < last; ++k) {
+                const std::array<double, Second> sums = after(parts_[k]);
+                std::copy(sums.begin(), sums.end(), partial_.data() + count * k + First);
+            }
+        });
+        std::array<double, count> total = {};
+        for (std::size_t k = 0; k < partial_.size(); ++k) total[k % count] += partial_[k];
+        return total;
+    }
+
     /// A product with N̂ in two steps: first what concerns all rows at once, by all members of the team …
-    void begin_product(Team& team, const Vector& lambda) const;
+    void begin_product(const Team& team, const Vector& lambda) const;
     /// … then the rows of a part: result ← N̂ λ̂ there (m), with the λ̂ of begin_product.
     void finish_product(const Part& part, Vector& result) const;
 
     /// result ← N̂ λ̂; both m. Allocates nothing (but in Eigen's solve with a sparse factor).
     void multiply(const Vector& lambda, Vector& result) const;
-    void multiply(Team& team, const Vector& lambda, Vector& result) const;
+    void multiply(const Team& team, const Vector& lambda, Vector& result) const;
 
     /// gradient ← N̂ λ̂ + r̂ = û; both m.
     void gradient(const Vector& lambda, Vector& result) const;
@@ -130,6 +163,11 @@ private:
         std::int32_t first, rows;  // rows: 0 where the block is not one of friction
     };
 
+    /// Before a run in which all members call begin_product().
+    void prepare_product(const Team& team) const;
+    /// By all members; they have come to the end together.
+    void begin_product(const Team& team, int member, const Vector& lambda) const;
+
     static constexpr std::int32_t longest_interval = 512, part_rows = 1024;
 
     static void project_block(const Block& block, double* lambda);
@@ -142,7 +180,7 @@ private:
 
     void divide();
 
-    void build_operator(const ProblemView& problem);
+    void build_operator(const ProblemView& problem, const Team& team);
 
     DelassusOperator operator_;
     NaturalResidual residual_;

@@ -11,10 +11,11 @@
 
 namespace delassus::sdk {
 
-DELASSUS_SDK_FUNCTION void ScaledProblem::factorize(const ProblemView& problem) {
-    operator_.factorize(problem, cheapest_form(problem) == Form::Formed);
+DELASSUS_SDK_FUNCTION void ScaledProblem::factorize(const ProblemView& problem, const Team& given) {
+    const Team team = useful(given, problem);
+    operator_.factorize(problem, cheapest_form(problem) == Form::Formed, team);
     scale_rows(problem);
-    build_operator(problem);
+    build_operator(problem, team);
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::load(const ProblemView& problem) {
@@ -47,22 +48,35 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::load(const ProblemView& problem) {
     divide();
 }
 
-DELASSUS_SDK_FUNCTION void ScaledProblem::begin_product(Team& team, const Vector& lambda) const {
+DELASSUS_SDK_FUNCTION void ScaledProblem::begin_product(const Team& team, const Vector& lambda) const {
+    prepare_product(team);
+    team.run([&](int member) { begin_product(team, member, lambda); });
+}
+
+DELASSUS_SDK_FUNCTION void ScaledProblem::prepare_product(const Team& team) const {
+    if (rows_.entries() > 0 && team.size() > 1 && shares_.members() != team.size())
+        shares_ = ColumnShares(rows_, work_.size(), team.size());
+}
+
+DELASSUS_SDK_FUNCTION void ScaledProblem::begin_product(const Team& team, int member, const Vector& lambda) const {
     if (rows_.entries() > 0) {
         if (team.size() > 1) {
-            if (shares_.members() != team.size()) shares_ = ColumnShares(rows_, work_.size(), team.size());
-            team.run([&](int member) { shares_.transpose_multiply(rows_, lambda.data(), work_.data(), member); });
+            shares_.transpose_multiply(rows_, lambda.data(), work_.data(), member);
         } else {
             work_.setZero();
             rows_.transpose_multiply_add(lambda.data(), work_.data());
         }
         if (!whitened_) {
-            velocity_ = work_.head(velocity_.size());
-            operator_.inverse().apply(velocity_);
-            work_.head(velocity_.size()) = velocity_;
+            team.barrier();
+            if (member == 0) {
+                velocity_ = work_.head(velocity_.size());
+                operator_.inverse().apply(velocity_);
+                work_.head(velocity_.size()) = velocity_;
+            }
         }
     }
-    if (square_.entries() > 0) padded_.head(lambda.size()) = lambda;
+    if (member == 0 && square_.entries() > 0) padded_.head(lambda.size()) = lambda;
+    team.barrier();
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::finish_product(const Part& part, Vector& result) const {
@@ -73,11 +87,10 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::finish_product(const Part& part, Vecto
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::multiply(const Vector& lambda, Vector& result) const {
-    Team alone(1);
-    multiply(alone, lambda, result);
+    multiply(Team(), lambda, result);
 }
 
-DELASSUS_SDK_FUNCTION void ScaledProblem::multiply(Team& team, const Vector& lambda, Vector& result) const {
+DELASSUS_SDK_FUNCTION void ScaledProblem::multiply(const Team& team, const Vector& lambda, Vector& result) const {
     result.resize(lambda.size());
     begin_product(team, lambda);
     for_parts(team, [&](const Part& part) { finish_product(part, result); });
@@ -220,7 +233,7 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::divide() {
     }
 }
 
-DELASSUS_SDK_FUNCTION void ScaledProblem::build_operator(const ProblemView& problem) {
+DELASSUS_SDK_FUNCTION void ScaledProblem::build_operator(const ProblemView& problem, const Team& team) {
     rows_ = {};
     square_ = {};
     shares_ = {};
@@ -235,7 +248,7 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::build_operator(const ProblemView& prob
         return;
     }
     if (problem.n > 0 && inverse.kind() != HInverse::Kind::Sparse) {
-        rows_ = BlockRows(operator_.whitened().view(problem.n), groups_, p_.data(), nullptr);
+        rows_ = BlockRows(operator_.whitened().view(problem.n), groups_, p_.data(), nullptr, team);
     } else if (problem.n > 0 && whitened_) {
         const SparseColumns Z = inverse.half_solved(problem.D);
         const SparseRowsView W(Z.cols(), Z.rows(), Z.nonZeros(), Z.outerIndexPtr(), Z.innerIndexPtr(),

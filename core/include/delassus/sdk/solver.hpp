@@ -24,9 +24,11 @@
 #include <string>
 
 #include "delassus/plugin.h"
+#include "delassus/sdk/blas_threads.hpp"
 #include "delassus/sdk/h_inverse.hpp"
 #include "delassus/sdk/options.hpp"
 #include "delassus/sdk/problem_view.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus::sdk {
 
@@ -85,6 +87,15 @@ public:
     /// Since construction; the default says that nothing was analysed or factorised.
     [[nodiscard]] virtual std::int64_t analyses() const { return 0; }
     [[nodiscard]] virtual std::int64_t factorizations() const { return 0; }
+
+protected:
+    /// The threads that the call at hand may use: the results must be the same to the bit for any size.
+    [[nodiscard]] const Team& team() const { return team_; }
+
+private:
+    template <class Implementation>
+    friend class Border;
+    Team team_;
 };
 
 /// What the descriptor says of a plugin.
@@ -136,7 +147,8 @@ private:
                 &factorize,
                 &solve,
                 &last_error,
-                &accepts};
+                &accepts,
+                &use_team};
     }
 
     static std::string& creation_error() {
@@ -191,6 +203,12 @@ private:
         if (refusal.empty()) return 1;
         std::snprintf(reason, static_cast<std::size_t>(capacity), "%s", refusal.c_str());
         return 0;
+    }
+
+    static void use_team(void* solver, const delassus_team* team) {
+        Team& own = static_cast<Solver&>(static_cast<Instance*>(solver)->solver).team_;
+        own = Team(team);
+        BlasThreads::use(own);
     }
 
     static std::int32_t analyze(void* solver, const delassus_problem* problem) {

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "delassus/sdk/blas_threads.hpp"
 #include "delassus/sdk/compiled_once.hpp"
 #include "delassus/sdk/dissection.hpp"
 #include "delassus/sdk/sparse_factor.hpp"
@@ -305,6 +306,7 @@ DELASSUS_SDK_FUNCTION void SparseFactor::find_places(const Eigen::Ref<const Spar
 }
 
 DELASSUS_SDK_FUNCTION bool SparseFactor::factorize(const Eigen::Ref<const SparseColumns>& matrix) {
+    const BlasThreads threads(front_.blas() ? flops_ : 0.0);
     value_.assign(static_cast<std::size_t>(entries_), 0.0);
     upper_.clear();
     for (std::size_t k = 0; k < 2; ++k) stack_[k].resize(stack_size_[k]);
