@@ -153,6 +153,10 @@ constexpr std::uint64_t cones_of_scenes =
 
 }  // namespace
 
+bool StepSolver::leaves_out() const {
+    return implementation_->leaves_out;
+}
+
 void StepSolver::leave_nothing_out() {
     auto& self = *implementation_;
     self.leaves_out = false;
