@@ -24,13 +24,13 @@ namespace py = pybind11;
 using Reals = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Integers = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 
-/// An array that takes over the vector's memory, or a view of it in this shape; their products are equal.
+/// An array of this shape that takes over the memory of a vector with as many entries.
 template <typename Value>
 py::array_t<Value> array_of(std::vector<Value>&& values, std::vector<py::ssize_t> shape) {
     auto owned = std::make_unique<std::vector<Value>>(std::move(values));
     const Value* data = owned->data();
     const py::capsule owner(owned.get(), [](void* vector) { delete static_cast<std::vector<Value>*>(vector); });
-    owned.release();
+    static_cast<void>(owned.release());
     return py::array_t<Value>(std::move(shape), data, owner);
 }
 template <typename Value>

@@ -14,7 +14,7 @@ namespace py = pybind11;
 /// An exception of the library as a class of the package; it derives from the classes given.
 template <typename Exception>
 py::object bind_error(py::module_& module, const char* name, const char* doc, const py::object& bases) {
-    const py::object type = py::register_exception<Exception>(module, name, bases);
+    py::object type = py::register_exception<Exception>(module, name, bases);
     type.attr("__doc__") = doc;
     type.attr("__module__") = "delassus";
     return type;

@@ -217,7 +217,7 @@ class Threads(unittest.TestCase):
 
         before = signal.signal(signal.SIGUSR1, again)
         try:
-            threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+            threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGUSR1)).start()
             with self.assertRaisesRegex(delassus.Error, "at work in the same thread"):
                 solver.solve(self.pile, **endless(100.0))
         finally:

@@ -44,4 +44,19 @@ export PKG_CONFIG_PATH
 g++ -std=c++20 $flags "$scratch/embed/embed.cpp" $(pkg-config --cflags --libs delassus) -Wl,-rpath,"$(pkg-config --variable=libdir delassus)" \
     -o "$scratch/embed-pc"
 "$scratch/embed-pc"
+package=$prefix/lib/python3/dist-packages
+if [ -d "$package/delassus" ]; then
+    for python in python3 /usr/bin/python3; do
+        if "$python" -c 'import numpy, scipy' 2>/dev/null; then break; fi
+    done
+    (cd "$scratch" && PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=$package "$python" - "$prefix" <<'END'
+import sys
+import delassus
+assert delassus.__file__.startswith(sys.argv[1]) and all(p["library"].startswith(sys.argv[1]) for p in delassus.plugins())
+result = delassus.solve(delassus.read("box_stack"))
+print(result)
+assert result.solved
+END
+    )
+fi
 echo "$prefix: used as strangers would"
