@@ -53,7 +53,8 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
     for (const delassus_cone& cone : problem.cones) sdk::project(cone, true_lambda_.data() + cone.first_row);
     best_x_ = true_x_;
     least_error_ = least_rest_ = std::numeric_limits<double>::infinity();
-    idle_iterations_ = 0;
+    idle_iterations_ = slow_iterations_ = 0;
+    halved_error_ = path_error_ = std::numeric_limits<double>::infinity();
     centre_next_ = 0;
     jam_ = 0.0;
     hops_ = 0;
@@ -87,6 +88,7 @@ bool InteriorPoint::judge(const sdk::ProblemView& problem, sdk::Monitor& monitor
     // The host accepts any balance below 1e-12.
     const double worst = error.balance > 1e-12 ? std::max(error.natural, error.balance) : error.natural;
     if (!(worst >= monitor.best_residual())) best_x_ = true_x_;
+    if (iteration > 0) path_error_ = std::min(path_error_, worst);
     return monitor.check(iteration, scaling_.definite() ? nullptr : true_x_.data(), true_lambda_, worst);
 }
 
@@ -190,11 +192,11 @@ void InteriorPoint::iterate(const sdk::ProblemView& problem, sdk::Monitor& monit
             return;
         }
         if (problem.coulomb && is_jammed()) {
-            if (monitor.best_residual() < error_for_ssn || !hop_on(judge_iterate)) {
+            if (path_error_ < error_for_ssn || !hop_on(judge_iterate)) {
                 if (!is_stopped_) stall("the path to the solution ends: steps inside the cones stay short");
                 return;
             }
-        } else if (is_stuck(monitor.best_residual())) {
+        } else if (is_stuck(monitor.best_residual()) || (problem.coulomb && is_slow())) {
             return stall("no progress for " + std::to_string(stall_iterations_) + " iterations");
         }
     }
@@ -208,6 +210,16 @@ bool InteriorPoint::is_stuck(double error) {
     least_error_ = std::min(least_error_, error);
     least_rest_ = std::min(least_rest_, rest);
     return stall_iterations_ > 0 && idle_iterations_ >= stall_iterations_;
+}
+
+// Near the end the error halves in a step or two, unless short steps or rounding hold it.
+bool InteriorPoint::is_slow() {
+    ++slow_iterations_;
+    if (path_error_ < 0.5 * halved_error_) {
+        halved_error_ = path_error_;
+        slow_iterations_ = 0;
+    }
+    return path_error_ < error_for_ssn && stall_iterations_ > 0 && slow_iterations_ >= stall_iterations_;
 }
 
 // Let d lie in the recession cone of the reactions. Every solution has ŝᵀd ≥ 0 there, hence

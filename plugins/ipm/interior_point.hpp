@@ -52,6 +52,7 @@ private:
     bool hop_on(const Judge& judge);
     /// Whether the iteration has stopped getting anywhere.
     bool is_stuck(double error);
+    bool is_slow();  // coulomb
     /// A lower bound of ‖(x̂, ẑ)‖ over all solutions that the iterates prove; zero if they prove nothing.
     [[nodiscard]] double proven_size() const;
 
@@ -69,6 +70,9 @@ private:
     sdk::Vector true_x_, true_lambda_, best_x_;     // in the problem's units
     double least_error_ = 0.0, least_rest_ = 0.0;   // of is_stuck
     std::int64_t idle_iterations_ = 0;
+    double path_error_ = 0.0;    // the smallest of the iterates, the given start left out
+    double halved_error_ = 0.0;  // of is_slow
+    std::int64_t slow_iterations_ = 0;
     int centre_next_ = 0;  // exact Coulomb: iterations that aim at the present products
     int hops_ = 0;
     double rise_ = 1.0, lowest_tau_ = 0.0;

@@ -20,7 +20,8 @@ constexpr delassus_option options[] = {
                 "static regularisation of the rows, relative to the diagonal of N; refinement removes its effect"),
     integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
     integer_option("stall_iterations", "15", 0, 1e9, "iterations",
-                   "give up after this many iterations without an improvement by 1 %; 0: never"),
+                   "give up after this many iterations without an improvement by 1 % (exact Coulomb near the end: by "
+                   "half); 0: never"),
     choice_option(
         "path", "product", paths,
         "exact Coulomb: the equation by which the start is left, the product of normal force and velocity, or "
