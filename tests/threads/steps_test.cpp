@@ -25,11 +25,11 @@ std::string heap() {
     return head(R"(
 bodies:
   - {name: ground, fixed: true, shapes: [{plane: {}, material: stone}]}
-  - name: ball_{k}
+  - name: ball_{i}_{j}_{k}
     density: 1000
     position: [0, 0, 0.0499]
     velocity: [0.1, 0.05, -0.3]
-    shapes: [{sphere: 0.05, material: stone}]
+    shapes: [{sphere: {radius: 0.05}, material: stone}]
     repeat: {count: [8, 8, 10], spacing: [0.0998, 0.0999, 0.0997]}
 )");
 }
@@ -46,7 +46,7 @@ bodies:
      shapes: [{box: {size: [0.3, 0.1, 0.1]}, material: stone}]}
 )");
     for (int k = 0; k < 6; ++k)
-        text += "  - name: heap_" + std::to_string(k) + "_{k}\n    density: 1000\n    position: [" +
+        text += "  - name: heap_" + std::to_string(k) + "_{i}_{j}_{k}\n    density: 1000\n    position: [" +
                 std::to_string(7 * k - 20) + R"(, 0, 0.06]
     shapes: [{box: {size: [0.1, 0.1, 0.1]}, material: stone}]
     repeat: {count: [2, 2, 4], spacing: [0.11, 0.0999, 0.1005]}
@@ -54,17 +54,17 @@ bodies:
     return text + "joints:\n  - {name: hinge, kind: revolute, second: hanger, point: [21, 0, 0.5], axis: [0, 1, 0]}\n";
 }
 
-struct Run {
+struct Course {
     std::vector<double> values;  ///< q and v after every step
     std::int64_t solves = 0, resting = 0, most_contacts = 0;
 };
 
-Run run(const std::string& text, int threads, int steps) {
+Course run(const std::string& text, int threads, int steps) {
     static const Registry registry;
     Scene scene = parse_scene(text, "test");
     Simulation simulation(scene.systems.at(0), registry);
     simulation.solver().use(std::make_shared<ThreadTeam>(threads));
-    Run result;
+    Course result;
     for (int step = 0; step < steps; ++step) {
         simulation.step();
         const State& state = simulation.state();
@@ -79,17 +79,17 @@ Run run(const std::string& text, int threads, int steps) {
 }
 
 TEST(StepsInThreads, OfOneLargePartHaveTheSameBits) {
-    const Run one = run(heap(), 1, 4);
+    const Course one = run(heap(), 1, 4);
     EXPECT_GT(one.most_contacts, 1100);  // enough for collision and solver to share
     for (const int threads : {2, 3}) EXPECT_EQ(run(heap(), threads, 4).values, one.values) << threads << " threads";
 }
 
 TEST(StepsInThreads, OfManyPartsHaveTheSameBits) {
-    const Run one = run(islands(), 1, 40);
+    const Course one = run(islands(), 1, 40);
     EXPECT_GT(one.solves, 3 * 40);
     EXPECT_GT(one.resting, 0);
     for (const int threads : {2, 3}) {
-        const Run several = run(islands(), threads, 40);
+        const Course several = run(islands(), threads, 40);
         EXPECT_EQ(several.values, one.values) << threads << " threads";
         EXPECT_EQ(several.solves, one.solves);
         EXPECT_EQ(several.resting, one.resting);
@@ -111,7 +111,7 @@ TEST(StepsInThreads, AreInterruptedAndGoOn) {
     simulation.solver().cancelled = {};
     for (int step = 5; step < 8; ++step) simulation.step();
     const State& state = simulation.state();
-    const Run one = run(islands(), 1, 8);
+    const Course one = run(islands(), 1, 8);
     const std::vector<double> end(one.values.end() - static_cast<std::ptrdiff_t>(state.v.size()), one.values.end());
     EXPECT_EQ(state.v, end);
 }
