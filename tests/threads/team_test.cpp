@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <ctime>
 #include <numeric>
@@ -17,12 +18,15 @@ namespace {
 
 using sdk::Team;
 
+/// More than there are processors: such a team never leaves a task to the calling thread alone.
+const int many = usable_processors() + 1;
+
 TEST(Team, EveryMemberPassesEveryBarrier) {
-    for (const int members : {1, 2, 4}) {
+    for (const int members : {1, many, many + 2}) {
         ThreadTeam threads(members);
         const Team team = threads.team();
         std::vector<int> step(static_cast<std::size_t>(members), 0);
-        for (int turn = 0; turn < 50; ++turn)
+        for (int turn = 0; turn < 10; ++turn)
             team.run([&](int member) {
                 for (int k = 0; k < 20; ++k) {
                     ++step[static_cast<std::size_t>(member)];
@@ -61,15 +65,14 @@ TEST(Team, TheCallerSeesWhatMembersWrote) {
 
 /// Waiting members look at a counter first and then sleep: a task must reach them there too.
 TEST(Team, WakesMembersThatSleep) {
-    ThreadTeam threads(2);
+    ThreadTeam threads(many);
     const Team team = threads.team();
-    int calls[2] = {0, 0};
+    std::vector<int> calls(static_cast<std::size_t>(many), 0);
     for (int turn = 0; turn < 3; ++turn) {
         std::this_thread::sleep_for(std::chrono::milliseconds(30));
-        team.run([&](int member) { ++calls[member]; });
+        team.run([&](int member) { ++calls[static_cast<std::size_t>(member)]; });
     }
-    EXPECT_EQ(calls[0], 3);
-    EXPECT_EQ(calls[1], 3);
+    for (const int count : calls) EXPECT_EQ(count, 3);
     std::this_thread::sleep_for(std::chrono::milliseconds(30));  // the end reaches them as well
 }
 
@@ -89,7 +92,7 @@ TEST(Team, DealsOutEachItemOnce) {
 
 TEST(Team, ThrowsTheExceptionOfTheFirstItemThatFails) {
     ThreadTeam threads(3);
-    for (int turn = 0; turn < 50; ++turn) {
+    for (int turn = 0; turn < 10; ++turn) {
         try {
             threads.team().for_each(40, [&](std::size_t k) {
                 if (k % 2 == 1) throw static_cast<int>(k);
@@ -122,20 +125,20 @@ TEST(Team, SleepsBetweenTasks) {
 
 #if !defined(__SANITIZE_THREAD__)  // which takes a fork of several threads for the end
 TEST(Team, WorksInTheChildOfAFork) {
-    ThreadTeam threads(2);
-    int sums[2] = {0, 0};
-    const auto add = [&](int member) { ++sums[member]; };
+    ThreadTeam threads(many);
+    std::vector<int> sums(static_cast<std::size_t>(many), 0);
+    const auto add = [&](int member) { ++sums[static_cast<std::size_t>(member)]; };
     threads.team().run(add);
     const pid_t child = fork();
     if (child == 0) {
         threads.team().run(add);
-        _exit(sums[0] == 2 && sums[1] == 2 ? 0 : 1);
+        _exit(sums.front() == 2 && sums.back() == 2 ? 0 : 1);
     }
     int status = -1;
     ASSERT_EQ(waitpid(child, &status, 0), child);
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
     threads.team().run(add);
-    EXPECT_EQ(sums[1], 2);
+    EXPECT_EQ(sums.back(), 2);
 }
 #endif
 
@@ -144,15 +147,39 @@ TEST(Team, TwoTeamsWorkAtTheSameTime) {
     std::vector<std::jthread> hosts;
     for (int& sum : sums)
         hosts.emplace_back([&sum] {
-            ThreadTeam threads(2);
+            ThreadTeam threads(many);
             const Team team = threads.team();
-            int parts[2] = {0, 0};
-            for (int turn = 0; turn < 100; ++turn) team.run([&](int member) { parts[member] += member + 1; });
-            sum = parts[0] + parts[1];
+            std::vector<int> parts(static_cast<std::size_t>(many), 0);
+            for (int turn = 0; turn < 100; ++turn)
+                team.run([&](int member) { ++parts[static_cast<std::size_t>(member)]; });
+            sum = std::accumulate(parts.begin(), parts.end(), 0);
         });
     hosts.clear();
-    EXPECT_EQ(sums[0], 300);
-    EXPECT_EQ(sums[1], 300);
+    EXPECT_EQ(sums[0], 100 * many);
+    EXPECT_EQ(sums[1], 100 * many);
+}
+
+/// Whatever the size is from task to task, shares cover everything.
+TEST(Team, WorksAloneWhereOthersNeedTheProcessors) {
+    std::atomic<bool> stop = false;
+    std::vector<std::jthread> others;
+    for (int k = 0; k < 2 * usable_processors(); ++k)
+        others.emplace_back([&] {
+            while (!stop) std::this_thread::yield();
+        });
+    ThreadTeam threads(2);
+    std::vector<int> values(100, 0);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(300);
+    int turns = 0;
+    for (; std::chrono::steady_clock::now() < end; ++turns) {
+        const Team team = threads.team();
+        team.run([&](int member) {
+            const auto [first, last] = team.share(values.size(), member);
+            for (std::size_t i = first; i < last; ++i) ++values[i];
+        });
+    }
+    stop = true;
+    EXPECT_EQ(values, std::vector<int>(100, turns));
 }
 
 }  // namespace

@@ -55,15 +55,17 @@ private:
 
 }  // namespace
 
+// A task has a part for each member. Whoever comes first does a part: the member, or the caller once it has done its
+// own. So the caller waits for nobody who has not begun, but inside a barrier of the task.
 struct ThreadTeam::Threads {
     using Task = void (*)(void* data, std::int32_t member);
 
-    explicit Threads(int members) : size(members), patient(members <= usable_processors()) {
+    explicit Threads(int members)
+        : size(members), patient(members <= usable_processors()), parts(static_cast<std::size_t>(members)) {
         const WithoutSignals blocked;
         try {
             for (int index = 1; index < members; ++index) workers.emplace_back([this, index] { work(index); });
         } catch (...) {
-            size = static_cast<int>(workers.size()) + 1;
             dismiss();
             throw;
         }
@@ -71,18 +73,107 @@ struct ThreadTeam::Threads {
     ~Threads() { dismiss(); }
 
     void run(Task body, void* argument) {
+        const auto begin = Clock::now();
+        caller = pthread_self();
         task = body;
         data = argument;
-        caller = pthread_self();
-        const auto begin = Clock::now();
-        barrier(true);
+        left.store(size - 1, std::memory_order_relaxed);
+        const std::uint64_t now = 2 * ++tasks;
+        for (Part& part : parts) part.state.store(now, std::memory_order_release);
+        publish(turn, static_cast<std::uint32_t>(tasks));
         body(argument, 0);
-        barrier(true);
+        for (int index = 1; index < size; ++index)
+            if (take(index, now)) finish(index);
+        await(
+            left, [](int count) { return count == 0; }, true);
         judge(std::chrono::duration<double>(Clock::now() - begin).count());
+    }
+
+    void barrier(bool by_caller) {
+        const std::uint32_t now = passed.load(std::memory_order_relaxed);
+        if (arrived.fetch_add(1, std::memory_order_acq_rel) + 1 == size) {
+            arrived.store(0, std::memory_order_relaxed);
+            publish(passed, now + 1);
+            return;
+        }
+        await(
+            passed, [now](std::uint32_t value) { return value != now; }, by_caller);
     }
 
     /// Whether the calling thread should work alone for now: others keep the members from running.
     [[nodiscard]] bool rests() const { return patient && Clock::now() < rest_until; }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    // Waking a sleeper takes about as long; a sweep over a thousand contacts takes less.
+    static constexpr std::chrono::microseconds patience{30};
+    static constexpr int looks_between_yields = 64;
+
+    /// A member's part of the task: twice the number of the task, and one more when somebody has taken it.
+    struct alignas(64) Part {
+        std::atomic<std::uint64_t> state{0};
+    };
+
+    [[nodiscard]] bool take(int index, std::uint64_t now) {
+        return parts[static_cast<std::size_t>(index)].state.compare_exchange_strong(now, now + 1,
+                                                                                    std::memory_order_acq_rel);
+    }
+    void finish(int index) {
+        task(data, index);
+        if (left.fetch_sub(1, std::memory_order_acq_rel) == 1) left.notify_all();
+    }
+
+    template <class Value>
+    static void publish(std::atomic<Value>& where, Value value) {
+        where.store(value, std::memory_order_release);
+        where.notify_all();
+    }
+
+    /// Waits until the value is as wanted: looks for a while, then sleeps.
+    template <class Value, class Wanted>
+    void await(std::atomic<Value>& where, const Wanted& wanted, bool by_caller) {
+        Value value = where.load(std::memory_order_acquire);
+        if (patient) {
+            const auto end = Clock::now() + patience;
+            for (int k = 1; !wanted(value); ++k, value = where.load(std::memory_order_acquire)) {
+                if (k % looks_between_yields != 0) {
+                    pause();
+                } else if (Clock::now() < end) {
+                    std::this_thread::yield();  // the one that is waited for may need this very processor
+                } else {
+                    break;
+                }
+            }
+        }
+        if (wanted(value)) return;
+        const bool counts = patient && by_caller;
+        const double before = counts ? processor_time() : 0.0;
+        const auto begin = Clock::now();
+        for (; !wanted(value); value = where.load(std::memory_order_acquire))
+            where.wait(value, std::memory_order_acquire);
+        if (!counts) return;
+        // Waiting for members that work is not lost.
+        const double waited = std::chrono::duration<double>(Clock::now() - begin).count();
+        lost += std::max(0.0, waited - (processor_time() - before));
+    }
+
+    void work(int index) {
+        std::uint32_t seen = 0;
+        while (true) {
+            await(
+                turn, [seen](std::uint32_t value) { return value != seen; }, false);
+            seen = turn.load(std::memory_order_acquire);
+            if (ended.load(std::memory_order_acquire)) return;
+            const std::uint64_t state = parts[static_cast<std::size_t>(index)].state.load(std::memory_order_acquire);
+            if (state % 2 == 0 && take(index, state)) finish(index);
+        }
+    }
+
+    void dismiss() {
+        ended.store(true, std::memory_order_release);
+        publish(turn, turn.load(std::memory_order_relaxed) + 1);
+        for (std::thread& worker : workers) worker.join();
+    }
 
     /// Called after each task of so many seconds.
     void judge(double seconds) {
@@ -109,71 +200,26 @@ struct ThreadTeam::Threads {
         return sum;
     }
 
-    void barrier(bool by_caller) {
-        const std::uint32_t now = turn.load(std::memory_order_relaxed);
-        if (arrived.fetch_add(1, std::memory_order_acq_rel) + 1 == size) {
-            arrived.store(0, std::memory_order_relaxed);
-            turn.store(now + 1, std::memory_order_release);
-            turn.notify_all();
-            return;
-        }
-        if (patient && appears(now)) return;
-        const bool counts = patient && by_caller;
-        const double before = counts ? processor_time() : 0.0;
-        const auto begin = Clock::now();
-        while (turn.load(std::memory_order_acquire) == now) turn.wait(now, std::memory_order_acquire);
-        if (!counts) return;
-        // Waiting for members that work is not lost.
-        const double waited = std::chrono::duration<double>(Clock::now() - begin).count();
-        lost += std::max(0.0, waited - (processor_time() - before));
-    }
-
-    /// Looks for the next turn for a while; whether it came.
-    [[nodiscard]] bool appears(std::uint32_t now) const {
-        const auto end = Clock::now() + patience;
-        do {
-            for (int k = 0; k < looks_between_yields; ++k) {
-                if (turn.load(std::memory_order_acquire) != now) return true;
-                pause();
-            }
-            std::this_thread::yield();  // the one that is waited for may need this very processor
-        } while (Clock::now() < end);
-        return false;
-    }
-
-    void work(int index) {
-        while (true) {
-            barrier(false);
-            if (!task) return;
-            task(data, index);
-            barrier(false);
-        }
-    }
-
-    void dismiss() {
-        if (workers.empty()) return;
-        task = nullptr;
-        barrier(false);
-        for (std::thread& worker : workers) worker.join();
-    }
-
-    using Clock = std::chrono::steady_clock;
-    // Waking a sleeper takes about as long; a sweep over a thousand contacts takes less.
-    static constexpr std::chrono::microseconds patience{30};
-    static constexpr int looks_between_yields = 64;
-
-    int size;
-    const bool patient;
+public:
+    const int size;
     const unsigned born = forks().load();
+    pthread_t caller = pthread_self();
+
+private:
+    const bool patient;
     Task task = nullptr;
     void* data = nullptr;
+    std::uint64_t tasks = 0;
+    std::vector<Part> parts;
+    alignas(64) std::atomic<int> left{0};  // parts that are not done
+    alignas(64) std::atomic<std::uint32_t> turn{0};
+    alignas(64) std::atomic<int> arrived{0};
+    alignas(64) std::atomic<std::uint32_t> passed{0};
+    std::atomic<bool> ended{false};
     // Of the calling thread alone.
-    pthread_t caller = pthread_self();
     double worked = 0.0, lost = 0.0;  // s since the last judgement
     std::chrono::milliseconds rest{50};
     Clock::time_point rest_until{};
-    alignas(64) std::atomic<int> arrived{0};
-    alignas(64) std::atomic<std::uint32_t> turn{0};
     std::vector<std::thread> workers;
 };
 
@@ -191,19 +237,27 @@ std::shared_ptr<ThreadTeam> ThreadTeam::for_threads(std::optional<std::int64_t> 
                                               : processors);
 }
 
+// A team that rests has one member. It shrinks at the end of a task and grows here, so that its size stays while a task
+// is prepared and run.
 sdk::Team ThreadTeam::team() const {
-    return threads_ && threads_->rests() ? sdk::Team() : sdk::Team(&raw_);
+    if (threads_ && raw_.size != threads_->size && !threads_->rests())
+        const_cast<ThreadTeam*>(this)->raw_.size = threads_->size;
+    return sdk::Team(&raw_);
 }
 
 void ThreadTeam::run(void* context, void (*task)(void* data, std::int32_t member), void* data) {
     auto& self = *static_cast<ThreadTeam*>(context);
+    if (self.raw_.size == 1) return task(data, 0);
     if (self.threads_ && self.threads_->born != forks().load()) static_cast<void>(self.threads_.release());
     if (!self.threads_) self.threads_ = std::make_unique<Threads>(self.raw_.size);
     self.threads_->run(task, data);
+    if (self.threads_->rests()) self.raw_.size = 1;
 }
 
 void ThreadTeam::wait(void* context) {
-    Threads& threads = *static_cast<ThreadTeam*>(context)->threads_;
+    const ThreadTeam& self = *static_cast<ThreadTeam*>(context);
+    if (self.raw_.size == 1) return;
+    Threads& threads = *self.threads_;
     threads.barrier(pthread_equal(threads.caller, pthread_self()) != 0);
 }
 

@@ -91,27 +91,22 @@ public:
     }
 
     /// before(part) for all parts, then what a product of N̂ with λ̂ (m, made by before) needs of all rows, then
-    /// after(part), which may call finish_product: by all members of the team, who wait for one another in between
-    /// only. The sums over all parts of the First numbers that before returns as an array, and the Second of after.
+    /// after(part), which may call finish_product: by all members of the team. The sums over all parts of the First
+    /// numbers that before returns as an array, and the Second of after.
     template <std::size_t First, std::size_t Second, class Before, class After>
     [[nodiscard]] std::array<double, First + Second> sums_about_product(const Team& team, const Vector& lambda,
                                                                         const Before& before,
                                                                         const After& after) const {
         constexpr std::size_t count = First + Second;
-        prepare_product(team);
         partial_.resize(count * parts_.size());
-        team.run([&](int member) {
-            const auto [first, last] = team.share(parts_.size(), member);
-            for (std::size_t k = first; k < last; ++k) {
-                const std::array<double, First> sums = before(parts_[k]);
-                std::copy(sums.begin(), sums.end(), partial_.data() + count * k);
-            }
-            team.barrier();
-            begin_product(team, member, lambda);
-            for (std::size_t k = first; k < last; ++k) {
-                const std::array<double, Second> sums = after(parts_[k]);
-                std::copy(sums.begin(), sums.end(), partial_.data() + count * k + First);
-            }
+        for_parts(team, [&](const Part& part) {
+            const std::array<double, First> sums = before(part);
+            std::copy(sums.begin(), sums.end(), partial_.data() + count * number_of(part));
+        });
+        begin_product(team, lambda);
+        for_parts(team, [&](const Part& part) {
+            const std::array<double, Second> sums = after(part);
+            std::copy(sums.begin(), sums.end(), partial_.data() + count * number_of(part) + First);
         });
         std::array<double, count> total = {};
         for (std::size_t k = 0; k < partial_.size(); ++k) total[k % count] += partial_[k];
@@ -163,10 +158,9 @@ private:
         std::int32_t first, rows;  // rows: 0 where the block is not one of friction
     };
 
-    /// Before a run in which all members call begin_product().
-    void prepare_product(const Team& team) const;
-    /// By all members; they have come to the end together.
-    void begin_product(const Team& team, int member, const Vector& lambda) const;
+    [[nodiscard]] std::size_t number_of(const Part& part) const {
+        return static_cast<std::size_t>(&part - parts_.data());
+    }
 
     static constexpr std::int32_t longest_interval = 512, part_rows = 1024;
 

@@ -49,34 +49,21 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::load(const ProblemView& problem) {
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::begin_product(const Team& team, const Vector& lambda) const {
-    prepare_product(team);
-    team.run([&](int member) { begin_product(team, member, lambda); });
-}
-
-DELASSUS_SDK_FUNCTION void ScaledProblem::prepare_product(const Team& team) const {
-    if (rows_.entries() > 0 && team.size() > 1 && shares_.members() != team.size())
-        shares_ = ColumnShares(rows_, work_.size(), team.size());
-}
-
-DELASSUS_SDK_FUNCTION void ScaledProblem::begin_product(const Team& team, int member, const Vector& lambda) const {
     if (rows_.entries() > 0) {
-        if (team.size() > 1) {
-            shares_.transpose_multiply(rows_, lambda.data(), work_.data(), member);
+        if (const int members = team.size(); members > 1) {
+            if (shares_.members() != members) shares_ = ColumnShares(rows_, work_.size(), members);
+            team.run([&](int member) { shares_.transpose_multiply(rows_, lambda.data(), work_.data(), member); });
         } else {
             work_.setZero();
             rows_.transpose_multiply_add(lambda.data(), work_.data());
         }
         if (!whitened_) {
-            team.barrier();
-            if (member == 0) {
-                velocity_ = work_.head(velocity_.size());
-                operator_.inverse().apply(velocity_);
-                work_.head(velocity_.size()) = velocity_;
-            }
+            velocity_ = work_.head(velocity_.size());
+            operator_.inverse().apply(velocity_);
+            work_.head(velocity_.size()) = velocity_;
         }
     }
-    if (member == 0 && square_.entries() > 0) padded_.head(lambda.size()) = lambda;
-    team.barrier();
+    if (square_.entries() > 0) padded_.head(lambda.size()) = lambda;
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::finish_product(const Part& part, Vector& result) const {
