@@ -103,7 +103,7 @@ TEST(Run, DumpedProblemsCanBeSolved) {
         names.insert(entry.path().filename().string());
     EXPECT_EQ(names, (std::set<std::string>{"main_000005", "main_000010"}));
     const auto solved = run_command("solve " + (folder / "problems" / "main_000010").string() +
-                                    " --solver apgd --tolerance 1e-6 --json");
+                                    " --solver ssn --tolerance 1e-6 --json");
     EXPECT_EQ(solved.exit_code, 0) << solved.err;
     EXPECT_EQ(Json::parse(solved.out).at("status"), "solved");
 }

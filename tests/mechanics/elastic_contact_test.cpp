@@ -118,6 +118,7 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
 
     for (const char* name : {"pgs", "apgd", "spg", "ipm"}) {
         config.name = name;
+        for (Problem& problem : problems) problem.law = Law::Associated;
         Solver plugin = make_solver(registry, config);
         SolveReport report;
         for (const Problem& problem : problems) {

@@ -17,7 +17,7 @@ namespace {
 
 std::string head(const std::string& more) {
     return "step: 0.004\nend: 10\nsolver: {name: " + std::string(DELASSUS_TEST_PLUGINS) +
-           "/apgd.so, tolerance: 1.0e-4}\nmaterials: {stone: {friction: 0.6}}\n" + more;
+           "/apgd.so, law: associated, tolerance: 1.0e-4}\nmaterials: {stone: {friction: 0.6}}\n" + more;
 }
 
 /// A block of balls that touch, a little out of line, and so one part of some 5000 rows.
@@ -86,7 +86,7 @@ TEST(StepsInThreads, OfOneLargePartHaveTheSameBits) {
 
 TEST(StepsInThreads, OfManyPartsHaveTheSameBits) {
     const Course one = run(islands(), 1, 40);
-    EXPECT_GT(one.solves, 3 * 40);
+    EXPECT_GT(one.solves, 40);
     EXPECT_GT(one.resting, 0);
     for (const int threads : {2, 3}) {
         const Course several = run(islands(), threads, 40);
@@ -119,8 +119,10 @@ TEST(StepsInThreads, AreInterruptedAndGoOn) {
 /// A part whose solver cannot take it fails the step with its sentence, whatever the others do.
 TEST(StepsInThreads, FailWithTheSentenceOfTheFirstPartThatCannotBeSolved) {
     static const Registry registry;
+    // Cholesky's factor holds no contact.
     std::string text = islands();
-    text.replace(text.find("tolerance: 1.0e-4"), 17, "law: coulomb");
+    const std::size_t solver = text.find("name: ");
+    text.replace(solver, text.find(", law") - solver, "name: cholmod");
     std::string sentences[2];
     for (const int threads : {1, 3}) {
         Scene scene = parse_scene(text, "test");
@@ -132,7 +134,7 @@ TEST(StepsInThreads, FailWithTheSentenceOfTheFirstPartThatCannotBeSolved) {
             sentences[threads == 1 ? 0 : 1] = error.what();
         }
     }
-    EXPECT_NE(sentences[0].find("apgd cannot"), std::string::npos) << sentences[0];
+    EXPECT_NE(sentences[0].find("cholmod cannot"), std::string::npos) << sentences[0];
     EXPECT_EQ(sentences[1], sentences[0]);
 }
 
