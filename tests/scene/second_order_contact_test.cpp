@@ -212,6 +212,17 @@ TEST_P(SecondOrderContact, ABlockRidesOnAShakenTable) {
     EXPECT_LT(error(120), 1.5e-5);
 }
 
+// Links of 1 g that a pull of 10⁴ N holds swing too fast for these steps: the run ends, and says so.
+TEST(SecondOrderJoints, AreNotLeftApartInSilence) {
+    for (const char* method : {"moreau_jean", "moreau_jean(theta=1)"}) {
+        SceneOverrides overrides;
+        overrides.integrator = method;
+        Running run(read_scene(example_scene("chain_heavy_end"), overrides));
+        EXPECT_THROW(run.finish(), Error) << method;
+        EXPECT_LT(run.simulation.totals().worst_drift, 1e-2) << method;
+    }
+}
+
 TEST_P(SecondOrderContact, ArePlannedForAndRefuseToSleep) {
     Scene scene = example("box_on_incline");
     EXPECT_EQ(make_plan(scene, registry()).size(), 2U);

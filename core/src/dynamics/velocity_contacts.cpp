@@ -539,14 +539,14 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     require_nearer(begin, end, h, method);
 }
 
-// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is no more than ten
-// times the resolution may be rounding.
+// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below 10⁻⁶, or
+// 10⁴ times the resolution, may be the tolerance of the solver.
 void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
     double off = 0.0, left = 0.0;
     for (std::size_t i = 0; i < constraint_.size(); ++i) off = std::max(off, std::abs(constraint_[i]));
     if (m_ > 0) system_.constraint(end, constraint_.data());
     for (const double C : constraint_) left = std::max(left, std::abs(C));
-    if (left <= 0.5 * off || left <= 10.0 * resolution_ + 1e-9) return;
+    if (left <= 0.5 * off || left <= std::max(1e4 * resolution_, 1e-6)) return;
     throw StepFailure(fmt::format(
         "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
         "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",
