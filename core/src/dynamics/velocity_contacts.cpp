@@ -397,15 +397,16 @@ void VelocityContacts::report_closing(const Contact& contact, StepReport& report
 
 bool VelocityContacts::landed(const Solution& solution) const {
     return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& contact) {
-        if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.steady())
+        if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.forced())
             return false;
         const double gap = contact.gap + h_ * ((theta_ - 1.0) * contact.approach + theta_ * contact.end_speed);
         return gap < std::min(contact.gap, 0.0) - gap_resolution_;
     });
 }
 
-// A contact that closed is one that pushes and did not in the step before; it closes after g/|u⁻|, or with at least g/h
-// where it was slower at first. Gaps are reported as they were at the beginning of the step.
+// A contact that closed is one that pushes and did not in the step before (`once`: and whose impulse does not come from
+// forces, since its rows leave gaps and speeds of O(h²) that are no impacts); it closes after g/|u⁻|, or with at least
+// g/h where it was slower at first. Gaps are reported as they were at the beginning of the step.
 void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& report) {
     report.unilateral_blocks = static_cast<std::int32_t>(contacts_.size());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -424,6 +425,7 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         report.recovered +=
             lambda[first] * std::clamp(0.5 * (contact.end_speed - contact.approach), 0.0, contact.recovery);
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
+        if (settings_.once && speed <= 0.25 * contact.change) continue;
         if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
             report.impact_speed = speed;
             report.impact_time = contact.approach < 0.0 ? h_ : gap / speed;
