@@ -397,15 +397,16 @@ void VelocityContacts::report_closing(const Contact& contact, StepReport& report
 
 bool VelocityContacts::landed(const Solution& solution) const {
     return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& contact) {
-        if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.steady())
+        if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.forced())
             return false;
         const double gap = contact.gap + h_ * ((theta_ - 1.0) * contact.approach + theta_ * contact.end_speed);
         return gap < std::min(contact.gap, 0.0) - gap_resolution_;
     });
 }
 
-// A contact that closed is one that pushes and did not in the step before; it closes after g/|u⁻|, or with at least g/h
-// where it was slower at first. Gaps are reported as they were at the beginning of the step.
+// A contact that closed is one that pushes and did not in the step before (`once`: and whose impulse does not come from
+// forces, since its rows leave gaps and speeds of O(h²) that are no impacts); it closes after g/|u⁻|, or with at least
+// g/h where it was slower at first. Gaps are reported as they were at the beginning of the step.
 void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& report) {
     report.unilateral_blocks = static_cast<std::int32_t>(contacts_.size());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -424,6 +425,7 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         report.recovered +=
             lambda[first] * std::clamp(0.5 * (contact.end_speed - contact.approach), 0.0, contact.recovery);
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
+        if (settings_.once && speed <= 0.25 * contact.change) continue;
         if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
             report.impact_speed = speed;
             report.impact_time = contact.approach < 0.0 ? h_ : gap / speed;
@@ -539,14 +541,14 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     require_nearer(begin, end, h, method);
 }
 
-// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is no more than ten
-// times the resolution may be rounding.
+// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below 10⁻⁶, or
+// 10⁴ times the resolution, may be the tolerance of the solver.
 void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
     double off = 0.0, left = 0.0;
     for (std::size_t i = 0; i < constraint_.size(); ++i) off = std::max(off, std::abs(constraint_[i]));
     if (m_ > 0) system_.constraint(end, constraint_.data());
     for (const double C : constraint_) left = std::max(left, std::abs(C));
-    if (left <= 0.5 * off || left <= 10.0 * resolution_ + 1e-9) return;
+    if (left <= 0.5 * off || left <= std::max(1e4 * resolution_, 1e-6)) return;
     throw StepFailure(fmt::format(
         "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
         "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",

@@ -99,9 +99,10 @@ private:
         bool pushed = false;                         ///< in the step before
         bool bounces = false;                        ///< b has restitution
 
-        /// Its impulse does not come from the speed with which it closed: less than a quarter of the change is due to
-        /// that. Of a contact that pushes.
-        [[nodiscard]] bool steady() const { return pushed && approach <= 0.25 * change; }
+        /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
+        /// due to that. Of a contact that pushes.
+        [[nodiscard]] bool forced() const { return approach <= 0.25 * change; }
+        [[nodiscard]] bool steady() const { return pushed && forced(); }
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
