@@ -101,6 +101,7 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
     const Registry registry;
     SolverConfig config;
     config.name = "pgs";
+    config.law = Law::Associated;
     config.tolerance = 1e-8;
     StepSolver solver(registry, config);
     std::vector<Problem> problems;
@@ -118,7 +119,6 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
 
     for (const char* name : {"pgs", "apgd", "spg", "ipm"}) {
         config.name = name;
-        for (Problem& problem : problems) problem.law = Law::Associated;
         Solver plugin = make_solver(registry, config);
         SolveReport report;
         for (const Problem& problem : problems) {
