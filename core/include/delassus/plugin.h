@@ -256,8 +256,9 @@ typedef struct delassus_plugin_descriptor {
      * after writing a short NUL-terminated reason. Cheap: no factorisation. */
     int32_t (*accepts)(void* solver, const delassus_problem* problem, char* reason, int32_t capacity);
 
-    /* Since 2.2. Optional (may be NULL): the threads that analyze, factorize and solve may use from now on, NULL for the
-     * calling thread alone. *team stays as it is until the next call. Results must not depend on the size, to the bit.
+    /* Since 2.2. Optional (may be NULL): the threads that analyze, factorize and solve may use from now on, NULL for
+     * the calling thread alone. *team stays as it is until the next call. Results must not depend on the size, to the
+     * bit.
      */
     void (*use_team)(void* solver, const delassus_team* team);
 } delassus_plugin_descriptor;
