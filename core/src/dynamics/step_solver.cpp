@@ -299,7 +299,7 @@ void StepSolver::Implementation::solve_part(Problem& problem, Solution& solution
     if (done()) return;
     result.solved = false;
     spent.worst_miss = std::max(spent.worst_miss, std::max(report.error.natural, report.error.balance) /
-                                                        std::max(part_settings.tolerance, rounding_limit));
+                                                      std::max(part_settings.tolerance, rounding_limit));
     if (spent.unsolved.empty())
         spent.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
