@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/theta_method.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -99,6 +101,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     end_.v = solution_.x;
     require_finite(state, end_, h, settings_.name);
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
+    if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
     if (!settings_.linearly_implicit || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
     if (settings_.linearly_implicit) remember_change(result_, h);
@@ -350,6 +353,33 @@ void ThetaMethod::judge_linearization(const State& begin, double h, const Vector
     const auto n = static_cast<std::size_t>(n_);
     report.linearization = linearization_.error(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H);
     linearization_.judge(report.linearization, begin, h, settings_.name);
+}
+
+// A row's C at the end is what the linear model of its step missed. Beyond linearization_limit times the way h |D| |v|
+// of what it holds, and where it grows, the step was too long for the model. What is below 10⁻⁶ may be a solver's.
+void ThetaMethod::judge_constraints(const State& begin, double h) {
+    const auto& D = problem_.D;
+    system_.constraint(begin, constraint_.data());
+    double before = 1e-6;
+    for (const double C : constraint_) before = std::max(before, std::abs(C));
+    system_.constraint(end_, constraint_.data());
+    for (std::size_t row = 0; row < constraint_.size(); ++row) {
+        const double off = std::abs(constraint_[row]);
+        if (off <= 2.0 * before) continue;
+        double way = 0.0;
+        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
+            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
+            way += h * std::abs(D.value[static_cast<std::size_t>(e)]) *
+                   std::max(std::abs(begin.v[column]), std::abs(end_.v[column]));
+        }
+        if (off <= settings_.linearization_limit * way) continue;
+        throw StepFailure(fmt::format(
+            "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, which is "
+            "{:.2g} "
+            "of the way of what it holds, where linearization_limit is {:.2g}; take shorter steps, or a method that "
+            "iterates (euler_implicit, hht)",
+            settings_.name, begin.t, h, off, off / way, settings_.linearization_limit));
+    }
 }
 
 }  // namespace delassus

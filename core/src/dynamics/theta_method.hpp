@@ -55,6 +55,7 @@ private:
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
+    void judge_constraints(const State& begin, double h);
     void judge_linearization(const State& begin, double h, const Vector& result, StepReport& report);
 
     static constexpr int most_iterations = 50;
