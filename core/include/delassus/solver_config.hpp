@@ -26,7 +26,7 @@ struct SolverConfig {
     std::optional<double> tolerance;
     std::optional<std::int64_t> max_iterations;
     std::optional<double> time_limit;     ///< seconds
-    std::optional<std::int64_t> threads;  ///< ≥ 1; no more are used than there are processors, without it as many
+    std::optional<std::int64_t> threads;  ///< ≥ 1, at most the processors; absent: all of them, in scenes one
     std::optional<Law> law;
     /// Iterations to be done in each step of a simulation, whatever error they leave: the cheap mode. The error is
     /// measured and reported, and a step that misses no limit but this one counts as solved. Needs a plugin's name.
