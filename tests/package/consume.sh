@@ -33,11 +33,11 @@ if "$scratch/embed/build/embed" "solver: {name: nobody}"; then echo "an unknown 
 
 cmake -S "$scratch/system" -B "$scratch/system/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
 cmake --build "$scratch/system/build"
-for timestepper in euler_implicit_linearized euler_implicit newmark hht generalized_alpha; do
+for timestepper in euler_implicit_linearized euler_implicit newmark hht generalized_alpha rk4; do
     for solver in cholmod minres; do "$scratch/system/build/system" "$timestepper" "$solver"; done
 done
 for timestepper in euler_explicit rk4 trapezoidal trapezoidal_linearized; do "$scratch/system/build/system" "$timestepper" free; done
-if "$scratch/system/build/system" rk4; then echo "rk4 took a constraint" >&2; exit 1; fi
+if "$scratch/system/build/system" euler_explicit; then echo "euler_explicit took a constraint" >&2; exit 1; fi
 
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name delassus.pc)")
 export PKG_CONFIG_PATH
