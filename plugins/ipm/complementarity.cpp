@@ -245,19 +245,6 @@ double Complementarity::products(double step) const {
     return sum;
 }
 
-double Complementarity::smallest_product() const {
-    double smallest = infinity;
-    for (const Interval& row : intervals_) {
-        if (row.has_lower) smallest = std::min(smallest, row.p * row.wl);
-        if (row.has_upper) smallest = std::min(smallest, row.q * row.wu);
-    }
-    for (const Block& block : blocks_) {
-        smallest = std::min(smallest, smallest_eigenvalue(block.product, block.det_z * block.det_s));
-        if (path_ == Path::Product) smallest = std::min(smallest, z_[block.first] * block.v);
-    }
-    return smallest;
-}
-
 double Complementarity::smallest_product(double step) const {
     double smallest = infinity;
     for (const Interval& row : intervals_) {
@@ -265,8 +252,13 @@ double Complementarity::smallest_product(double step) const {
         if (row.has_upper) smallest = std::min(smallest, (row.q - step * row.dz) * (row.wu + step * row.dwu));
     }
     for (const Block& block : blocks_) {
-        const Triple z = plus(block.ell, step, block.dz), s = plus(block.ell, step, block.ds);
-        smallest = std::min(smallest, smallest_eigenvalue(dot(z, s), determinant(z) * determinant(s)));
+        double product = block.product, squared = block.det_z * block.det_s;
+        if (step > 0.0) {
+            const Triple z = plus(block.ell, step, block.dz), s = plus(block.ell, step, block.ds);
+            product = dot(z, s);
+            squared = determinant(z) * determinant(s);
+        }
+        smallest = std::min(smallest, smallest_eigenvalue(product, squared));
         if (path_ == Path::Product) smallest = std::min(smallest, normal_product(block, step));
     }
     return smallest;

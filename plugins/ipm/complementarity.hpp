@@ -69,9 +69,8 @@ public:
     /// The same after a step of the given length along the direction.
     [[nodiscard]] double mean_product(double step) const { return degree_ > 0.0 ? products(step) / degree_ : 0.0; }
 
-    /// The smallest product after such a step: of a block, the smallest eigenvalue of (W z) ∘ (W⁻¹ s).
+    /// The smallest product after such a step, or now (0): of a block, the smallest eigenvalue of (W z) ∘ (W⁻¹ s).
     [[nodiscard]] double smallest_product(double step) const;
-    [[nodiscard]] double smallest_product() const;  ///< now
 
     /// Finds W; leaves θ (m) by rows of the blocks' bases, its diagonal.
     void scale(sdk::Vector& theta);

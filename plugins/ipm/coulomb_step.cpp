@@ -37,7 +37,7 @@ bool InteriorPoint::coulomb_step() {
         find_direction(corrector_residual);
         return move(std::min(1.0, step_fraction_ * cones_.longest_step()));
     }
-    const double smallest = cones_.smallest_product() / tau;
+    const double smallest = cones_.smallest_product(0.0) / tau;
     if (centre_next_ > 0) {
         aim(centre_next_ > 1 ? tau : 0.8 * tau, false);
     } else {

@@ -42,11 +42,16 @@ protected:
         friction.name = "friction";
         friction.cones = {Cone::friction(0.5)};
         write_problem(friction, folder / "friction");
+        setenv("DELASSUS_TEST_AT_WORK", at_work().c_str(), 1);
     }
     void TearDown() override {
+        unsetenv("DELASSUS_TEST_AT_WORK");
         std::error_code ignored;
         fs::remove_all(folder, ignored);
     }
+
+    /// The file that appears when the misbehaving solver is some iterations into its slow or hanging behaviour.
+    [[nodiscard]] fs::path at_work() const { return folder / "at_work"; }
 
     [[nodiscard]] bench::WorkerSettings worker() const { return {DELASSUS_COMMAND, {DELASSUS_TEST_PLUGINS}, 0, {}}; }
 

@@ -8,29 +8,32 @@
 namespace delassus::bench_test::interrupt_test {
 namespace {
 
-TEST_F(BenchTest, InterruptEndsASolveWithWhatWasReached) {
-    // A solver that never ends by itself; the signal comes long after the tiny problem was read, on a busy machine too.
-    const auto result =
-        tests::run_shell("timeout -s INT 5 " DELASSUS_COMMAND " solve " + (folder / "stops").string() +
-                         " --solver " DELASSUS_TEST_PLUGINS "/misbehaving.so --set behaviour=slow --json --solution " +
-                         (folder / "solution").string());
+class Interrupt : public BenchTest {
+protected:
+    /// Starts `delassus solve` on the tiny problem with these further arguments, and goes on with the shell's lines
+    /// once the solver is at work ($! is the command's process). A command that ended before does not keep the test
+    /// waiting.
+    [[nodiscard]] tests::CommandResult solve_then(const std::string& arguments, const std::string& lines) const {
+        return tests::run_shell(DELASSUS_COMMAND " solve " + (folder / "stops").string() + " --solver " +
+                                DELASSUS_TEST_PLUGINS "/misbehaving.so " + arguments + " & until [ -e " +
+                                at_work().string() + " ] || ! kill -0 $!; do sleep 0.02; done; " + lines + "; wait $!");
+    }
+};
+
+TEST_F(Interrupt, EndsASolveWithWhatWasReached) {
+    const auto result = solve_then("--set behaviour=slow --json --solution " + (folder / "solution").string(),  //
+                                   "kill -INT $!");
     EXPECT_NE(result.out.find("\"status\": \"cancelled\""), std::string::npos) << result.out << result.err;
     EXPECT_TRUE(fs::exists(folder / "solution" / "lambda.mtx"));
 }
 
-TEST_F(BenchTest, OneRequestMayArriveAsTwoSignals) {
-    const auto result = tests::run_shell(
-        DELASSUS_COMMAND " solve " + (folder / "stops").string() +
-        " --solver " DELASSUS_TEST_PLUGINS
-        "/misbehaving.so --set behaviour=slow --json & sleep 4; kill -INT $!; sleep 0.1; kill -INT $!; wait $!");
+TEST_F(Interrupt, OneRequestMayArriveAsTwoSignals) {
+    const auto result = solve_then("--set behaviour=slow --json", "kill -INT $!; sleep 0.1; kill -INT $!");
     EXPECT_NE(result.out.find("\"status\": \"cancelled\""), std::string::npos) << result.out << result.err;
 }
 
-TEST_F(BenchTest, AnInsistentInterruptEndsASolverThatNeverLooks) {
-    const auto result = tests::run_shell(
-        DELASSUS_COMMAND " solve " + (folder / "stops").string() +
-        " --solver " DELASSUS_TEST_PLUGINS
-        "/misbehaving.so --set behaviour=hang & sleep 4; kill -INT $!; sleep 1; kill -INT $!; wait $!");
+TEST_F(Interrupt, AnInsistentOneEndsASolverThatNeverLooks) {
+    const auto result = solve_then("--set behaviour=hang", "kill -INT $!; sleep 1; kill -INT $!");
     EXPECT_EQ(result.exit_code, 128 + SIGINT) << result.out << result.err;
 }
 

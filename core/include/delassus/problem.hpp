@@ -45,6 +45,16 @@ struct SparseMatrix {
 
     [[nodiscard]] DELASSUS_API SparseMatrix transposed() const;
 
+    /// One entry of this · vector (columns).
+    [[nodiscard]] double row_times(std::int32_t row, const double* vector) const {
+        double sum = 0.0;
+        for (auto k = static_cast<std::size_t>(row_start[static_cast<std::size_t>(row)]),
+                  end = static_cast<std::size_t>(row_start[static_cast<std::size_t>(row) + 1]);
+             k < end; ++k)
+            sum += value[k] * vector[column[k]];
+        return sum;
+    }
+
     /// Adds factor · (this · vector) to result; sizes columns and rows.
     DELASSUS_API void multiply_add(double factor, const double* vector, double* result) const;
 

@@ -55,7 +55,7 @@ void ExplicitMethod::load(const std::vector<double>& memory) {
     at += q;
     known_at_.v.assign(at, at + n_);
     at += n_;
-    last_.x = Eigen::Map<const Vector>(&*memory.begin() + (at - memory.begin()), n_);
+    last_.x = Eigen::Map<const Vector>(memory.data() + (at - memory.begin()), n_);
     at += n_;
     last_.lambda.resize(m_);
     std::copy(at, memory.end(), last_.lambda.data());
@@ -130,8 +130,7 @@ void ExplicitMethod::take_step(State& state, double h, StepSolver& solver, StepR
     std::swap(state, end_);
 }
 
-void ExplicitMethod::solve_nearest(const State& state, const std::vector<double>& b, StepSolver& solver,
-                                   StepReport& report) {
+Problem ExplicitMethod::nearest(const State& state) {
     Problem problem;
     M_.begin(n_, n_);
     system_.add_mass(state, 1.0, M_);
@@ -140,9 +139,8 @@ void ExplicitMethod::solve_nearest(const State& state, const std::vector<double>
     system_.add_constraint_jacobian(state, 0, D_);
     problem.D = D_.finish();
     problem.a.assign(static_cast<std::size_t>(n_), 0.0);
-    problem.b = b;
     problem.cones = cones_;
-    solution_ = solve_linear(std::move(problem), solver, report);
+    return problem;
 }
 
 namespace {
@@ -172,17 +170,19 @@ void ExplicitMethod::project_positions(const State& begin, State& end, double h,
                 "constraints hold (off by {:.3g}); take shorter steps",
                 tableau_.name, begin.t, h, off));
         last = off;
-        solve_nearest(end, constraint_, solver, report);
+        Problem problem = nearest(end);
+        problem.b = constraint_;
+        solution_ = solve_linear(std::move(problem), solver, report);
         system_.increment(end.q.data(), solution_.x.data(), end.q.data());
     }
 }
 
 void ExplicitMethod::project_velocities(State& end, StepSolver& solver, StepReport& report) {
+    Problem problem = nearest(end);
     system_.constraint_rate(end, constraint_.data());
-    D_.begin(m_, n_);
-    system_.add_constraint_jacobian(end, 0, D_);
-    D_.finish().multiply_add(1.0, end.v.data(), constraint_.data());
-    solve_nearest(end, constraint_, solver, report);
+    problem.D.multiply_add(1.0, end.v.data(), constraint_.data());
+    problem.b = constraint_;
+    solution_ = solve_linear(std::move(problem), solver, report);
     for (std::int32_t i = 0; i < n_; ++i) end.v[static_cast<std::size_t>(i)] += solution_.x[i];
 }
 

@@ -63,8 +63,8 @@ private:
     void begin(const State& state, StepSolver& solver, StepReport& report);
     void project_positions(const State& begin, State& end, double h, StepSolver& solver, StepReport& report);
     void project_velocities(State& end, StepSolver& solver, StepReport& report);
-    /// solution_ ← of M x − Dᵀ μ = 0, D x + b = 0, M and D at the state.
-    void solve_nearest(const State& state, const std::vector<double>& b, StepSolver& solver, StepReport& report);
+    /// M x − Dᵀ μ = 0, D x + b = 0 with M and D at the state; b is left to the caller.
+    [[nodiscard]] Problem nearest(const State& state);
 
     DynamicalSystem& system_;
     ButcherTableau tableau_;

@@ -229,7 +229,7 @@ void ThetaMethod::set_constraint_rows(const State& begin, double h) {
         rate_ = 0.5 * rate_ + Eigen::Map<const Vector>(constraint_.data(), m_) / (2.0 * theta_ * h);
     }
     for (std::int32_t row = 0; row < m_; ++row)
-        problem_.b[static_cast<std::size_t>(row)] = rate_[row] - times(row, guess_);
+        problem_.b[static_cast<std::size_t>(row)] = rate_[row] - problem_.D.row_times(row, guess_.data());
 }
 
 /// force_ ← h f at at_theta_, where spinning bodies have their own impulse instead of what they feel alone.
@@ -242,13 +242,9 @@ void ThetaMethod::impulse_of_forces(double h) {
                 spins_[k].impulse[i] - h * theta_spins_[k].torque[i];
 }
 
-/// D x in a row of the problem.
-double ThetaMethod::times(std::int32_t row, const Vector& x) const {
-    const auto& D = problem_.D;
-    double sum = 0.0;
-    for (auto e = D.row_start[static_cast<std::size_t>(row)]; e < D.row_start[static_cast<std::size_t>(row) + 1]; ++e)
-        sum += D.value[static_cast<std::size_t>(e)] * x[D.column[static_cast<std::size_t>(e)]];
-    return sum;
+void ThetaMethod::set_b_of_contacts(int iteration, const StepSolver& solver) {
+    contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration,
+                    solver.effort().worst_natural);
 }
 
 // Right-hand sides in √mass · speed: a by the diagonal of H, b by that of D diag(H)⁻¹ Dᵀ.
@@ -284,8 +280,7 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     const bool before = report.solved;
     for (int iteration = 0;; ++iteration) {
         linearize(begin, h);
-        contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration,
-                        solver.effort().worst_natural);
+        set_b_of_contacts(iteration, solver);
         if (iteration > 0 && (unchanged() || (iteration >= settings_.iterations && contacts_.settled()))) return;
         if (iteration == most_iterations) {
             report.solved = false;
@@ -310,8 +305,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         linearize(begin, h);
         solved_from_ = guess_;
         solved_force_ = force_;
-        contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, 0,
-                        solver.effort().worst_natural);
+        set_b_of_contacts(0, solver);
     };
     const auto found = [&] {
         if (!solve(solver, report)) return false;
@@ -325,8 +319,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         if (!found()) return;
     }
     for (int iteration = 1; iteration <= most_iterations; ++iteration) {
-        contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration,
-                        solver.effort().worst_natural);
+        set_b_of_contacts(iteration, solver);
         if (contacts_.settled()) return;
         if (!found()) return;
     }
@@ -375,9 +368,8 @@ void ThetaMethod::judge_constraints(const State& begin, double h) {
         if (off <= settings_.linearization_limit * way) continue;
         throw StepFailure(fmt::format(
             "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, which is "
-            "{:.2g} "
-            "of the way of what it holds, where linearization_limit is {:.2g}; take shorter steps, or a method that "
-            "iterates (euler_implicit, hht)",
+            "{:.2g} of the way of what it holds, where linearization_limit is {:.2g}; take shorter steps, or a method "
+            "that iterates (euler_implicit, hht)",
             settings_.name, begin.t, h, off, off / way, settings_.linearization_limit));
     }
 }

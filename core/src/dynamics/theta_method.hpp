@@ -49,7 +49,7 @@ private:
     void linearize(const State& begin, double h);
     void set_constraint_rows(const State& begin, double h);
     void impulse_of_forces(double h);
-    [[nodiscard]] double times(std::int32_t row, const Vector& x) const;
+    void set_b_of_contacts(int iteration, const StepSolver& solver);
     void scale();
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);

@@ -289,18 +289,11 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
         double squares = 0.0, along = 0.0;  // of the sliding speed at the end; that times the one at the beginning
         for (std::size_t i = 0; i < size; ++i) {
             const std::size_t row = first + i;
-            double here = 0.0;
-            for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
-                const auto entry = static_cast<std::size_t>(e);
-                here += D.value[entry] * guess[static_cast<std::size_t>(D.column[entry])];
-            }
+            const double here = D.row_times(static_cast<std::int32_t>(row), guess.data());
             double& b = problem.b[row];
             b = rows_.rows()[contact.row + i].rate;
             if (contact.servo) {
-                double speed = 0.0;
-                for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
-                    speed +=
-                        D.value[static_cast<std::size_t>(e)] * begin_speeds_[D.column[static_cast<std::size_t>(e)]];
+                const double speed = D.row_times(static_cast<std::int32_t>(row), begin_speeds_);
                 b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
             } else if (contact.turns) {
                 const std::size_t then = contact.before + i;

@@ -406,8 +406,9 @@ void JointCoordinates::add_gyroscopic_damping(const State& state, double factor,
     self.bodies.add_gyroscopic_damping(self.state, factor, tangent, self.matrix);
     const SparseMatrix& R = self.matrix.finish();
     for (std::int32_t row = 0; row < n; ++row) {
-        const Link& link = self.tree.links()[self.link_at[static_cast<std::size_t>(row / 6)]];
-        if (link.kind != LinkJoint::Free || !link.leaf) continue;
+        const std::size_t k = self.link_at[static_cast<std::size_t>(row / 6)];
+        if (!self.spins_alone(k)) continue;
+        const Link& link = self.tree.links()[k];
         for (auto e = R.row_start[static_cast<std::size_t>(row)]; e < R.row_start[static_cast<std::size_t>(row) + 1];
              ++e)
             H.add(link.column + row % 6, link.column + R.column[static_cast<std::size_t>(e)] % 6,

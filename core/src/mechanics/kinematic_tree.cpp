@@ -16,28 +16,6 @@ namespace delassus::mechanics {
 
 namespace {
 
-/// Rows that a joint has in maximal coordinates and saves as a joint of a tree; 0 of kinds that are none.
-int rows_saved(JointKind kind) {
-    switch (kind) {
-        case JointKind::Fixed:
-            return 6;
-        case JointKind::Revolute:
-        case JointKind::Prismatic:
-            return 5;
-        case JointKind::Cylindrical:
-        case JointKind::Universal:
-            return 4;
-        case JointKind::Spherical:
-        case JointKind::Planar:
-            return 3;
-        case JointKind::PointOnPlane:
-        case JointKind::Distance:
-        case JointKind::Gear:
-            break;
-    }
-    return 0;
-}
-
 struct Shape {
     LinkJoint kind;
     std::int32_t freedoms, coordinates;
@@ -65,6 +43,11 @@ Shape shape_of(JointKind kind) {
             break;
     }
     return {LinkJoint::Free, 6, 7};
+}
+
+/// Rows that a joint has in maximal coordinates and saves as a joint of a tree; 0 of kinds that are none.
+int rows_saved(JointKind kind) {
+    return 6 - shape_of(kind).freedoms;
 }
 
 /// Pose of a body that does not move with the tree.
@@ -410,44 +393,38 @@ void KinematicTree::read(const State& bodies, State& state) const {
     }
 }
 
-void KinematicTree::velocities(const double* u, double* bodies) {
+Spatial KinematicTree::carried(std::size_t link) const {
+    const Spatial& base = acceleration_[static_cast<std::size_t>(links_[link].parent)];
+    return {base.angular, base.linear + base.angular.cross(motions_[link].d)};
+}
+
+// u̇ = 0.
+void KinematicTree::find_bias() {
     for (std::size_t k = 1; k < links_.size(); ++k) {
-        const Link& link = links_[k];
-        const LinkMotion& own = motions_[k];
-        const Spatial& base = acceleration_[static_cast<std::size_t>(link.parent)];
-        Spatial& moved = acceleration_[k];
-        moved = {base.angular, base.linear + base.angular.cross(own.d)};
-        for (int j = 0; j < link.freedoms; ++j) {
-            moved.angular += u[link.column + j] * own.angular.col(j);
-            moved.linear += u[link.column + j] * own.linear.col(j);
-        }
-        Eigen::Map<Vector3d> linear(bodies + link.body_column), angular(bodies + link.body_column + 3);
-        linear = moved.linear;
-        angular = own.A.transpose() * moved.angular;
+        acceleration_[k] = carried(k);
+        acceleration_[k].angular += motions_[k].turn_bias;
+        acceleration_[k].linear += motions_[k].bias;
     }
+}
+
+Spatial KinematicTree::inertial(std::size_t link) const {
+    const Matrix3d& A = motions_[link].A;
+    const Spatial& moved = acceleration_[link];
+    return {A * (links_[link].inertia * (A.transpose() * moved.angular)), links_[link].mass * moved.linear};
 }
 
 // In the frame of the body the angular velocity changes by Aᵀ ω̇.
 void KinematicTree::bias(double* bodies) {
+    find_bias();
     for (std::size_t k = 1; k < links_.size(); ++k) {
-        const Link& link = links_[k];
-        const LinkMotion& own = motions_[k];
-        const Spatial& base = acceleration_[static_cast<std::size_t>(link.parent)];
-        acceleration_[k] = {base.angular + own.turn_bias, base.linear + base.angular.cross(own.d) + own.bias};
-        Eigen::Map<Vector3d> linear(bodies + link.body_column), angular(bodies + link.body_column + 3);
+        double* own = bodies + links_[k].body_column;
+        Eigen::Map<Vector3d> linear(own), angular(own + 3);
         linear = acceleration_[k].linear;
-        angular = own.A.transpose() * acceleration_[k].angular;
+        angular = motions_[k].A.transpose() * acceleration_[k].angular;
     }
 }
 
 // ---- Projections ----
-
-void KinematicTree::take_wrenches(const double* f) {
-    for (std::size_t k = 1; k < links_.size(); ++k) {
-        const double* own = f + links_[k].body_column;
-        wrench_[k] = {motions_[k].A * Eigen::Map<const Vector3d>(own + 3), Eigen::Map<const Vector3d>(own)};
-    }
-}
 
 void KinematicTree::gather(double factor, double* result) {
     for (std::size_t k = links_.size() - 1; k > 0; --k) {
@@ -464,21 +441,13 @@ void KinematicTree::gather(double factor, double* result) {
     }
 }
 
-void KinematicTree::project(const double* f, double factor, double* result) {
-    take_wrenches(f);
-    gather(factor, result);
-}
-
 void KinematicTree::project_with_bias(const double* f, double factor, double* result) {
-    take_wrenches(f);
+    find_bias();
     for (std::size_t k = 1; k < links_.size(); ++k) {
-        const Link& link = links_[k];
-        const LinkMotion& own = motions_[k];
-        const Spatial& base = acceleration_[static_cast<std::size_t>(link.parent)];
-        Spatial& moved = acceleration_[k];
-        moved = {base.angular + own.turn_bias, base.linear + base.angular.cross(own.d) + own.bias};
-        wrench_[k].angular -= own.A * (link.inertia * (own.A.transpose() * moved.angular));
-        wrench_[k].linear -= link.mass * moved.linear;
+        const double* own = f + links_[k].body_column;
+        const Spatial lost = inertial(k);
+        wrench_[k] = {motions_[k].A * Eigen::Map<const Vector3d>(own + 3) - lost.angular,
+                      Eigen::Map<const Vector3d>(own) - lost.linear};
     }
     gather(factor, result);
 }
@@ -486,15 +455,13 @@ void KinematicTree::project_with_bias(const double* f, double factor, double* re
 void KinematicTree::multiply_mass(double factor, const double* x, double* result) {
     for (std::size_t k = 1; k < links_.size(); ++k) {
         const Link& link = links_[k];
-        const LinkMotion& own = motions_[k];
-        const Spatial& base = acceleration_[static_cast<std::size_t>(link.parent)];
-        Spatial& moved = acceleration_[k];
-        moved = {base.angular, base.linear + base.angular.cross(own.d)};
+        Spatial moved = carried(k);
         for (int j = 0; j < link.freedoms; ++j) {
-            moved.angular += x[link.column + j] * own.angular.col(j);
-            moved.linear += x[link.column + j] * own.linear.col(j);
+            moved.angular += x[link.column + j] * motions_[k].angular.col(j);
+            moved.linear += x[link.column + j] * motions_[k].linear.col(j);
         }
-        wrench_[k] = {own.A * (link.inertia * (own.A.transpose() * moved.angular)), link.mass * moved.linear};
+        acceleration_[k] = moved;
+        wrench_[k] = inertial(k);
     }
     gather(factor, result);
 }

@@ -63,7 +63,6 @@ struct Link {
 /// Where a link is and how it moves.
 struct LinkMotion {
     static constexpr int most = 6;
-    using Columns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, most>;
     Quaterniond Q = Quaterniond::Identity();
     Matrix3d A = Matrix3d::Identity();
     Vector3d x = Vector3d::Zero(), v = Vector3d::Zero(), omega = Vector3d::Zero();
@@ -100,14 +99,11 @@ public:
     [[nodiscard]] const LinkMotion& motion(std::size_t link) const { return motions_[link]; }
     /// q and v of the bodies.
     void write(State& bodies) const;
-    /// J u, the velocities of the bodies.
-    void velocities(const double* u, double* bodies);
     /// J̇ u, the accelerations of the bodies at u̇ = 0.
     void bias(double* bodies);
 
-    /// result += factor · Jᵀ f, f being forces and torques on the bodies (torques in their frames).
-    void project(const double* f, double factor, double* result);
-    /// result += factor · Jᵀ (f − M̄ J̇ u), M̄ being the masses of the bodies.
+    /// result += factor · Jᵀ (f − M̄ J̇ u), f being forces and torques on the bodies (torques in their frames) and M̄ the
+    /// masses of the bodies.
     void project_with_bias(const double* f, double factor, double* result);
     /// M += factor · Jᵀ M̄ J: by composite bodies, with entries for pairs of which one is on the way of the other to the
     /// ground.
@@ -120,8 +116,12 @@ public:
 private:
     void choose_joints(const MultibodySystem& system);
     void add_link(const MultibodySystem& system, BodyIndex body, std::int32_t parent, std::int32_t joint);
-    /// wrench_ ← f of the bodies, in the axes of the world.
-    void take_wrenches(const double* f);
+    /// The acceleration of the parent as the link takes part in it: (ω̇_p, v̇_p + ω̇_p × d).
+    [[nodiscard]] Spatial carried(std::size_t link) const;
+    /// acceleration_ ← J̇ u, in the axes of the world.
+    void find_bias();
+    /// The wrench that gives the link its acceleration_.
+    [[nodiscard]] Spatial inertial(std::size_t link) const;
     /// result += factor · Σ S · wrench, which is handed on to the parents.
     void gather(double factor, double* result);
     /// The inertia of a link about its mass centre in the axes of the world.

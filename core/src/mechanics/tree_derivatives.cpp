@@ -134,7 +134,7 @@ void TreeDerivatives::for_pairs(Visitor&& visit) const {
         for (std::int32_t at = columns_[i].link; at > 0; at = links[static_cast<std::size_t>(at)].parent) {
             const Link& link = links[static_cast<std::size_t>(at)];
             for (std::int32_t j = link.column; j < link.column + link.freedoms; ++j)
-                visit(static_cast<std::int32_t>(i), j);
+                visit(static_cast<std::int32_t>(i), j, columns_[i], columns_[static_cast<std::size_t>(j)]);
         }
 }
 
@@ -145,9 +145,7 @@ void TreeDerivatives::positions(const Add& add) const {
     };
     Vector6 row_i = Vector6::Zero(), coupled_i = row_i, own = row_i;
     std::int32_t last = -1;
-    for_pairs([&](std::int32_t number_i, std::int32_t number_j) {
-        const Column &i = columns_[static_cast<std::size_t>(number_i)],
-                     &j = columns_[static_cast<std::size_t>(number_j)];
+    for_pairs([&](std::int32_t number_i, std::int32_t number_j, const Column& i, const Column& j) {
         const auto m = static_cast<std::size_t>(i.link);
         if (skips_(m)) return;
         Vector6 speed, rest;
@@ -169,9 +167,7 @@ void TreeDerivatives::positions(const Add& add) const {
 void TreeDerivatives::rates(const Add& add) const {
     Vector6 row_i = Vector6::Zero(), coupled_i = row_i, own = row_i;
     std::int32_t last = -1;
-    for_pairs([&](std::int32_t number_i, std::int32_t number_j) {
-        const Column &i = columns_[static_cast<std::size_t>(number_i)],
-                     &j = columns_[static_cast<std::size_t>(number_j)];
+    for_pairs([&](std::int32_t number_i, std::int32_t number_j, const Column& i, const Column& j) {
         const auto m = static_cast<std::size_t>(i.link);
         if (skips_(m)) return;
         if (number_i != last) {
@@ -206,9 +202,7 @@ void TreeDerivatives::geometry(const double* f, const Add& add) const {
         wrench[parent] += wrench[k];
         turning[parent] += turning[k];
     }
-    for_pairs([&](std::int32_t number_i, std::int32_t number_j) {
-        const Column &i = columns_[static_cast<std::size_t>(number_i)],
-                     &j = columns_[static_cast<std::size_t>(number_j)];
+    for_pairs([&](std::int32_t number_i, std::int32_t number_j, const Column& i, const Column& j) {
         const auto m = static_cast<std::size_t>(i.link);
         double value = i.S.dot(turning[m] * j.S);
         if (moves_with(j, i)) value += cross(j.S, i.S).dot(wrench[m]);

@@ -83,11 +83,7 @@ SparseMatrix SparseMatrix::transposed() const {
 }
 
 void SparseMatrix::multiply_add(double factor, const double* vector, double* result) const {
-    for (std::int32_t row = 0; row < rows; ++row) {
-        double sum = 0.0;
-        for (std::int32_t k = row_start[row]; k < row_start[row + 1]; ++k) sum += value[k] * vector[column[k]];
-        result[row] += factor * sum;
-    }
+    for (std::int32_t row = 0; row < rows; ++row) result[row] += factor * row_times(row, vector);
 }
 
 void SparseMatrix::transpose_multiply_add(double factor, const double* vector, double* result) const {

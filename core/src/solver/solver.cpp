@@ -194,16 +194,15 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
         const RoundingOfBalance rounding =
             n > 0 ? rounding_of_balance(problem.problem(), solution) : RoundingOfBalance();
         const bool natural = report.error.natural <= natural_bound;
-        if (natural && report.error.balance <= rounding_slack * rounding.reactions &&
-            rounding_slack * report.error.rounding <= natural_bound) {
-            // The claim stands.
-        } else if (natural && report.error.balance <= rounding_slack * rounding.all) {
+        const bool stands = natural && report.error.balance <= rounding_slack * rounding.reactions &&
+                            rounding_slack * report.error.rounding <= natural_bound;
+        if (!stands && natural && report.error.balance <= rounding_slack * rounding.all) {
             report.status = Status::NumericalFailure;
             report.message = fmt::format(
                 "the balance error is {:.2e}, the tolerance {:.2e}: H is so stiff that rounding x to double "
                 "precision alone may leave {:.1e}",
                 report.error.balance, settings.tolerance, rounding.all);
-        } else {
+        } else if (!stands) {
             report.status = Status::FalseClaim;
             report.message = fmt::format(
                 "{} claimed convergence; the natural error is {:.2e} and the balance error {:.2e}, the "

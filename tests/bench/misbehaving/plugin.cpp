@@ -49,6 +49,7 @@ public:
             const auto answer = request.progress(k, x.data(), lambda.data());
             if (answer != DELASSUS_CONTINUE && behaviour_ != "deaf") return {status_of(answer), k, NAN, ""};
             if (behaviour_ == "crash_late" && k == 5) std::abort();
+            if (k == 5 && (behaviour_ == "slow" || behaviour_ == "hang")) say_at_work();
             while (behaviour_ == "hang" && k == 5) usleep(1000);
             if (behaviour_ == "slow" || behaviour_ == "deaf") {
                 usleep(1000);
@@ -63,6 +64,11 @@ public:
     }
 
 private:
+    /// Makes the file that a test waits for before it interrupts: $DELASSUS_TEST_AT_WORK.
+    static void say_at_work() {
+        if (const char* file = std::getenv("DELASSUS_TEST_AT_WORK")) std::fclose(std::fopen(file, "w"));
+    }
+
     std::string behaviour_;
 };
 
