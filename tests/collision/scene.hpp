@@ -87,6 +87,13 @@ inline double least_gap(const std::vector<ContactPoint>& contacts) {
     return least;
 }
 
+/// Of the point with the least gap.
+inline Vector3d nearest_normal(const std::vector<ContactPoint>& contacts) {
+    return vector(std::min_element(contacts.begin(), contacts.end(), [](const auto& one, const auto& other) {
+                      return one.gap < other.gap;
+                  })->normal);
+}
+
 /// What every contact point promises.
 inline void expect_consistent(const std::vector<ContactPoint>& contacts, double envelope) {
     for (std::size_t i = 0; i < contacts.size(); ++i) {

@@ -27,7 +27,7 @@ using Clock = std::chrono::steady_clock;
 struct RunArguments {
     SceneArguments scene;
     std::filesystem::path output, resume;
-    std::int64_t every = 1, dump = 0;
+    std::int64_t every = 1, dump = 0, pictures = RunFolder::default_pictures;
     bool contact_forces = false, json = false;
 };
 
@@ -140,6 +140,7 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
 
 int run(const RunArguments& arguments) {
     if (arguments.every < 1) throw InputError("--every must be at least 1");
+    if (arguments.pictures < 0) throw InputError("--pictures must be at least 0");
     if (arguments.dump < 0) throw InputError("--dump-problems must be at least 1");
     const bool resume = !arguments.resume.empty();
     if (resume && !arguments.output.empty() && arguments.output != arguments.resume)
@@ -157,13 +158,13 @@ int run(const RunArguments& arguments) {
 
     std::unique_ptr<RunFolder> folder;
     if (resume) {
-        folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every);
+        folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every, arguments.pictures);
         if (arguments.contact_forces && !folder->contact_forces())
             throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
                                          arguments.resume.string()));
     } else if (!arguments.output.empty()) {
         folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
-                                             arguments.every, arguments.contact_forces);
+                                             arguments.every, arguments.contact_forces, arguments.pictures);
     }
     if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
 
@@ -200,6 +201,11 @@ void add_run(CLI::App& program, Action& action) {
     command->add_option("-o,--output", arguments->output, "Folder for trajectory.h5, VTK files, checkpoint, report")
         ->type_name("DIR");
     command->add_option("--every", arguments->every, "Write the state of every N-th step [1]")->type_name("N");
+    command
+        ->add_option("--pictures", arguments->pictures,
+                     fmt::format("Of these states, write about N, evenly in time, for ParaView too [{}]; 0: none",
+                                 RunFolder::default_pictures))
+        ->type_name("N");
     command->add_flag("--contact-forces", arguments->contact_forces,
                       "Write the bodies and the force of each contact with the state");
     command->add_option("--dump-problems", arguments->dump, "Write the problem of every N-th step as a problem folder")

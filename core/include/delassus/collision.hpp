@@ -54,6 +54,12 @@ struct Shape {
                           ///< it and swept by a sphere of this radius, so that gaps are smooth near edges
 };
 
+/// How a body would move in the coming step if nothing touched it, in the axes of the world.
+struct BodyDisplacement {
+    Vector3 translation{};  ///< of the origin of its pose, m
+    Vector3 rotation{};     ///< rotation vector about that origin, rad
+};
+
 /// Finds contacts among a fixed set of shapes that move with their bodies.
 class DELASSUS_API CollisionDetector {
 public:
@@ -64,8 +70,11 @@ public:
     /// outputs, bit for bit. poses: of the bodies by index. Pairs of flat faces give up to four points or more, edges
     /// two, the rest one.
     /// team: threads that share the work where there is enough of it.
+    /// displacements: of the bodies by index, or none. Shapes that could meet on their way are found too, farther away
+    /// than the envelope: their points are where they would meet, the normal is that of the meeting, and the gap is
+    /// what the points have to go along it (docs/mechanics.md).
     virtual void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
-                        const sdk::Team& team = {}) = 0;
+                        const sdk::Team& team = {}, std::span<const BodyDisplacement> displacements = {}) = 0;
 };
 
 /// What a detector is made of.

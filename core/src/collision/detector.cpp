@@ -95,21 +95,54 @@ void Detector::place(std::span<const Pose> poses) {
     }
 }
 
+void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplacement> displacements) {
+    if (!displacements.empty() && displacements.size() != poses.size())
+        throw InputError(fmt::format("Collision detection got the displacements of {} bodies; there are {}.",
+                                     displacements.size(), poses.size()));
+    sweeps_.assign(placed_.size(), {});
+    if (displacements.empty()) return;
+    for (std::size_t i = 0; i < placed_.size(); ++i) {
+        const std::int32_t body = setup_.shapes[i].body;
+        if (body < 0) continue;
+        const auto& [translation, rotation] = displacements[static_cast<std::size_t>(body)];
+        if (!vector(translation).allFinite() || !vector(rotation).allFinite())
+            throw InputError(fmt::format("The motion of body {} is not finite.", body));
+        Sweep& sweep = sweeps_[i];
+        sweep.rotation = vector(rotation);
+        const double angle = sweep.rotation.norm();
+        sweep.translation = vector(translation);
+        if (angle > 0.0) {
+            const Vector3d arm = placed_[i].position - vector(poses[static_cast<std::size_t>(body)].position);
+            sweep.translation += Eigen::AngleAxisd(angle, sweep.rotation / angle) * arm - arm;
+            sweep.turned = angle * placed_[i].solid->reach;
+        }
+    }
+}
+
 // Cost: linear in shapes, near pairs and points, but for the tree's logarithm where shapes left their boxes; planes and
 // terrains are tried against every shape.
 void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
-                      const sdk::Team& team) {
+                      const sdk::Team& team, std::span<const BodyDisplacement> displacements) {
     contacts.clear();
     if (!(envelope >= 0.0) || !std::isfinite(envelope))
         throw InputError(
             fmt::format("The envelope of contacts is {} m; it should be finite and not negative.", envelope));
     place(poses);
+    sweep(poses, displacements);
+    // Of shapes that move less than half of the envelope, two cannot come nearer by more than it.
     for (std::size_t i = 0; i < bounded_.size(); ++i) {
         const Placed& placed = placed_[bounded_[i]];
-        const Vector3d half = half_extent(placed) + Vector3d::Constant(0.5 * envelope);
+        const Sweep& sweep = sweeps_[bounded_[i]];
+        const double way = sweep.translation.norm() + sweep.turned;
+        const double more = 0.5 * envelope + (way <= 0.5 * envelope ? 0.0 : sweep.turned);
+        const Vector3d half = half_extent(placed) + Vector3d::Constant(more);
         boxes_[i].min_ = placed.position - half;
         boxes_[i].max_ = placed.position + half;
         balls_[i] = {placed.position, (1.0 + 1e-12) * placed.solid->reach + 0.5 * envelope};
+        if (way <= 0.5 * envelope) continue;
+        boxes_[i].min_ += sweep.translation.cwiseMin(0.0);
+        boxes_[i].max_ += sweep.translation.cwiseMax(0.0);
+        balls_[i].radius += way;
     }
     pairs_.clear();
     for (const auto& [a, b] : broad_phase_.near_pairs(boxes_, slack_)) {
@@ -122,7 +155,8 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         const Vector3d normal = placed_[plane].axis();
         for (const std::int32_t shape : bounded_) {
             const Placed& placed = placed_[shape];
-            if (normal.dot(placed.position - placed_[plane].position) - placed.solid->reach >= envelope) continue;
+            const double bound = std::max(envelope, approach_bound(sweeps_[plane], sweeps_[shape]));
+            if (normal.dot(placed.position - placed_[plane].position) - placed.solid->reach >= bound) continue;
             if (may_touch(plane, shape)) with_ground_.emplace_back(std::min(plane, shape), std::max(plane, shape));
         }
     }
@@ -144,9 +178,8 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
 void Detector::collide_pairs(double envelope, std::vector<ContactPoint>& contacts, const sdk::Team& given) {
     constexpr std::size_t run = 128, worth_sharing = 1024;
     const sdk::Team team = given.if_worth(pairs_.size() >= worth_sharing);
-    if (narrow_phases_.size() < static_cast<std::size_t>(team.size()))
-        narrow_phases_.resize(static_cast<std::size_t>(team.size()));
-    if (team.size() == 1) return collide_pairs(0, pairs_.size(), envelope, narrow_phases_[0], contacts);
+    if (workers_.size() < static_cast<std::size_t>(team.size())) workers_.resize(static_cast<std::size_t>(team.size()));
+    if (team.size() == 1) return collide_pairs(0, pairs_.size(), envelope, workers_[0], contacts);
     // A placed core that several pairs share is turned before.
     team.run([&](int member) {
         const auto [first, last] = team.share(bounded_.size(), member);
@@ -157,17 +190,21 @@ void Detector::collide_pairs(double envelope, std::vector<ContactPoint>& contact
     team.for_each_by_member(runs, [&](std::size_t k, int member) {
         found_[k].clear();
         collide_pairs(k * run, std::min((k + 1) * run, pairs_.size()), envelope,
-                      narrow_phases_[static_cast<std::size_t>(member)], found_[k]);
+                      workers_[static_cast<std::size_t>(member)], found_[k]);
     });
     for (std::size_t k = 0; k < runs; ++k) contacts.insert(contacts.end(), found_[k].begin(), found_[k].end());
 }
 
-void Detector::collide_pairs(std::size_t first, std::size_t last, double envelope, NarrowPhase& by,
+void Detector::collide_pairs(std::size_t first, std::size_t last, double envelope, Worker& by,
                              std::vector<ContactPoint>& contacts) {
     for (std::size_t k = first; k < last; ++k) {
         const auto& [a, b] = pairs_[k];
         const std::size_t before = contacts.size();
-        by.collide(placed_[a], placed_[b], envelope, contacts);
+        if (approach_bound(sweeps_[a], sweeps_[b]) <= envelope) {
+            by.still.collide(placed_[a], placed_[b], envelope, contacts);
+        } else {
+            by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], envelope, contacts);
+        }
         for (std::size_t i = before; i < contacts.size(); ++i) {
             contacts[i].shape_a = a;
             contacts[i].shape_b = b;

@@ -150,7 +150,9 @@ void Manifold::clip(const Placed& reference, std::int32_t face, const Vector3d& 
             // A segment is not a closed polygon: it has one edge.
             if (from_in == to_in || (corners == 2 && i == 1)) continue;
             Corner corner;
-            corner.point = from.point + from_outside / (from_outside - to_outside) * (to.point - from.point);
+            // Both may be outside, one of them within the tolerance: then the cut is at that one.
+            const double share = std::clamp(from_outside / (from_outside - to_outside), 0.0, 1.0);
+            corner.point = from.point + share * (to.point - from.point);
             if (from.leaving >= 0) {
                 corner.edge = from.leaving;
                 corner.cut = sides.edges[side];
@@ -235,6 +237,37 @@ bool Manifold::from_edges(const Placed& a, const Placed& b, const Vector3d& offs
     return false;
 }
 
+/// Faces that nearly meet touch first where two edges cross, and then turn until they lie on each other. Their other
+/// corners within the limit are points too, each with the distance and the normal of the face; those near a point that
+/// is there already would only repeat it with a normal a little off.
+void Manifold::beside_edges(const Placed& a, const Placed& b, const Vector3d& offset, const Separation& nearest,
+                            double limit, std::vector<CorePoint>& points) {
+    constexpr double least_cosine = 0.87;  // 30°
+    constexpr double apart = 0.1;          // of the smaller reach
+    const auto aligned = [&](const Placed& placed, const Vector3d& direction) {
+        std::pair<double, std::int32_t> best{least_cosine, -1};
+        for (std::size_t f = 0; f < placed.normals.size(); ++f)
+            best = std::max(best, std::pair(placed.normals[f].dot(direction), static_cast<std::int32_t>(f)));
+        return best;
+    };
+    const auto [cosine_a, face_a] = aligned(a, nearest.normal);
+    const auto [cosine_b, face_b] = aligned(b, -nearest.normal);
+    if (face_a < 0 && face_b < 0) return;
+    beside_.clear();
+    if (cosine_b > cosine_a) {
+        from_face(b, face_b, a, -offset, false, limit, beside_);
+    } else {
+        from_face(a, face_a, b, offset, true, limit, beside_);
+    }
+    const double least = apart * std::min(a.solid->reach, b.solid->reach);
+    for (const CorePoint& point : beside_) {
+        const bool repeats = std::any_of(points.begin(), points.end(), [&](const CorePoint& other) {
+            return other.feature == point.feature || (other.point_a - point.point_a).norm() < least;
+        });
+        if (!repeats && point.distance > nearest.distance) points.push_back(point);
+    }
+}
+
 // Points nearer to each other than a thousandth of the patch say the same: the one with the lower feature stays. Of too
 // many, the deepest is taken first, then always the one furthest from those taken; of equals the lower feature.
 void Manifold::reduce(std::vector<CorePoint>& points) {
@@ -290,6 +323,7 @@ void Manifold::between(Placed& a, Placed& b, const Vector3d& offset, const Separ
     // The sampled cap of a cylinder may miss the nearest point.
     const bool sampled = a.is_cylinder() || b.is_cylinder();
     if (!found || (sampled && std::none_of(points.begin(), points.end(), deeper))) points.push_back(nearest);
+    if (!sampled && face_a < 0 && face_b < 0) beside_edges(a, b, offset, nearest, limit, points);
     reduce(points);
 }
 

@@ -47,10 +47,13 @@ private:
                    bool reference_is_a, double limit, std::vector<CorePoint>& points);
     static bool from_edges(const Placed& a, const Placed& b, const Vector3d& offset, const Separation& nearest,
                            double limit, std::vector<CorePoint>& points);
+    void beside_edges(const Placed& a, const Placed& b, const Vector3d& offset, const Separation& nearest, double limit,
+                      std::vector<CorePoint>& points);
     [[nodiscard]] static std::uint32_t feature(const Corner& corner, bool incident_is_a);
     static void reduce(std::vector<CorePoint>& points);
 
     std::vector<Corner> polygon_, clipped_;
+    std::vector<CorePoint> beside_;
 };
 
 }  // namespace delassus::collision

@@ -121,6 +121,12 @@ struct StepSolver::Implementation {
     static bool moves_freely(const PreparedProblem& part, Solution& solution);
     /// Whether x = 0 without reactions is the answer, but for numbers too small to be squared.
     static bool is_at_rest(const Problem& problem);
+    /// Whether the answer is as near as rounding lets it be. A body that is pushed along at a constant speed needs next
+    /// to no reaction: errors are relative to it, and the speed's own rounding is large beside it.
+    static bool is_rounding(const Errors& error) {
+        constexpr double slack = 32.0;
+        return error.natural <= slack * error.rounding && error.balance <= slack * error.rounding;
+    }
 
     /// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
     static constexpr double rounding_limit = 1e-8;
@@ -314,7 +320,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     const auto done = [&] {
         return report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit);
     };
-    if (!done() && moves_freely(prepared, solution)) return;
+    if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
     if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (done()) return;
@@ -355,7 +361,7 @@ bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solut
     part.meter().velocity_of(free.lambda, free.x);
     const Errors error = part.meter().measure(free.x, free.lambda);
     constexpr double no_digits = 1e-3;  // of rounding: what is measured has three digits at most
-    if (!(error.rounding > no_digits && error.natural <= 32.0 * error.rounding)) return false;
+    if (!(error.rounding > no_digits && is_rounding(error))) return false;
     solution = std::move(free);
     return true;
 }

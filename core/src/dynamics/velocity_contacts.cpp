@@ -163,6 +163,37 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = theta * h * begin.v[i];
     system_.increment(begin.q.data(), delta_.data(), middle_.q.data());
     system_.collect_unilateral(middle_, std::max(1.0 - theta, shortest_rest) * h, rows_);
+    require_same_side(begin, h);
+}
+
+// What closes before the middle of the step is as deep there as at the end of the step: the position moves on with (1 −
+// θ) of the old velocity. So the same shapes must touch there, and on the same side.
+void VelocityContacts::require_same_side(const State& begin, double h) const {
+    constexpr double least_cosine = 0.5;
+    const auto& contacts = before_.contacts();
+    const auto& later = rows_.contacts();
+    const std::size_t first = before_.blocks().size() - contacts.size();
+    const auto shapes = [](const ContactPoint& contact) { return std::pair(contact.shape_a, contact.shape_b); };
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+        const ContactPoint& contact = contacts[k];
+        const double speed = before_.blocks()[first + k].speed;
+        if (!(contact.gap > 0.0 && contact.gap + theta_ * h * speed < 0.0)) continue;
+        auto same = std::lower_bound(
+            later.begin(), later.end(), contact,
+            [&](const ContactPoint& one, const ContactPoint& other) { return shapes(one) < shapes(other); });
+        bool found = false;
+        for (; same != later.end() && shapes(*same) == shapes(contact) && !found; ++same) {
+            double cosine = 0.0;
+            for (std::size_t i = 0; i < 3; ++i) cosine += contact.normal[i] * same->normal[i];
+            found = cosine > least_cosine;
+        }
+        if (!found)
+            throw StepFailure(fmt::format(
+                "the step from t = {:.9g} with h = {:.9g} is too long: a body would go through another one, which it "
+                "meets after {:.3g} s at {:.3g} m/s, before the method looks for contacts in the middle of the step; "
+                "take shorter steps, or euler_implicit_linearized, which looks for them on the way",
+                begin.t, h, contact.gap / -speed, -speed));
+    }
 }
 
 /// Null where there is none, or several: then nothing tells them apart.

@@ -40,6 +40,7 @@ public:
     void restart() { kept_.clear(); }
 
     /// Collects the rows of a step of size h from `begin`: their gaps there, D at begin.q ∘ exp(θ h v); θ in (0, 1].
+    /// Throws StepFailure if a body would go through another one before the contacts at that place are known.
     void collect(const State& begin, double h, double theta);
     /// Whether there are any.
     [[nodiscard]] bool any() const { return !rows_.blocks().empty(); }
@@ -73,6 +74,8 @@ public:
     void load(std::span<const double> memory) { kept_.load(memory); }
 
 private:
+    void require_same_side(const State& begin, double h) const;
+
     /// A block at the beginning of the step.
     struct Before {
         std::uint64_t key;

@@ -67,7 +67,8 @@ struct MultibodySystem::Implementation {
     mutable mechanics::Placements at;
     mutable mechanics::RowVector gradient;
     mutable mechanics::RowMatrix hessian;
-    std::vector<Pose> poses;  // of the detector's bodies; those of fixed ones stay
+    std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
+    std::vector<BodyDisplacement> displacements;  // of the same; fixed ones have none
 
     void must_be_finished() const;
     void must_not_be_finished() const;
@@ -163,6 +164,8 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] Pose pose_of(std::size_t body, const State& state) const;
     /// The poses of all that collides, for the detector.
     void place_shapes(const State& state);
+    /// displacements ← of a step of length h (s).
+    void predict_displacements(double h, const State& state);
     void make_detector();
     void find_bodies_alone(const MultibodySystem& system);
 

@@ -60,7 +60,8 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     self.collect_actuators(state.t, h, rows);
     if (!self.detector) return;
     self.place_shapes(state);
-    self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team);
+    self.predict_displacements(h, state);
+    self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
     if (!self.prescribed.empty())
         std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
             return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&
@@ -79,6 +80,26 @@ void MultibodySystem::Implementation::place_shapes(const State& state) {
     for (std::size_t k = 0; k < nodes.size(); ++k)
         poses[bodies.size() + k].position =
             mechanics::array(node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
+}
+
+// At the velocities of the beginning and those that weight adds: other forces are small over a step, or meet a contact
+// of the next one.
+void MultibodySystem::Implementation::predict_displacements(double h, const State& state) {
+    displacements.resize(poses.size());
+    const Vector3d fall = h * load_factor * vector(gravity);
+    for (const auto& body : moving) {
+        const auto& place = at[body.body];
+        displacements[static_cast<std::size_t>(body.body)] = {mechanics::array(h * (place.v + fall)),
+                                                              mechanics::array(h * (place.A * place.omega))};
+    }
+    for (const auto index : prescribed) {
+        const auto& place = at[index];
+        displacements[static_cast<std::size_t>(index)] = {mechanics::array(h * place.v),
+                                                          mechanics::array(h * (place.A * place.omega))};
+    }
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+        if (const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()); node.column >= 0)
+            displacements[bodies.size() + k].translation = mechanics::array(h * (node.v + fall));
 }
 
 namespace {

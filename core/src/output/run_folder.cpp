@@ -40,15 +40,18 @@ void prepare(const fs::path& folder) {
 }  // namespace
 
 RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& scene_text,
-                     std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces)
+                     std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces,
+                     std::int64_t most_pictures)
     : folder_(std::move(folder)),
       scene_(scene.canonical),
       simulations_(simulations),
       every_(every),
-      contact_forces_(contact_forces) {
+      contact_forces_(contact_forces),
+      most_pictures_(most_pictures) {
     prepare(folder_);
     write_file_atomically(folder_ / "scene.yaml", scene_text);
     frame_times_.resize(simulations.size());
+    picture_times_.resize(simulations.size());
     open(scene, false);
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         trajectory_->add_step(i, simulations_[i].record());
@@ -57,8 +60,13 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& sce
     checkpoint();
 }
 
-RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every)
-    : folder_(std::move(folder)), scene_(scene.canonical), simulations_(simulations), every_(every) {
+RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every,
+                     std::int64_t most_pictures)
+    : folder_(std::move(folder)),
+      scene_(scene.canonical),
+      simulations_(simulations),
+      every_(every),
+      most_pictures_(most_pictures) {
     Checkpoint checkpoint = read_checkpoint(folder_ / "checkpoint.json");
     if (checkpoint.scene != scene.canonical || checkpoint.systems.size() != simulations.size())
         throw InputError(
@@ -68,6 +76,7 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation
     contact_forces_ = checkpoint.contact_forces;
     for (std::size_t i = 0; i < simulations.size(); ++i) {
         frame_times_.push_back(std::move(checkpoint.systems[i].frame_times));
+        picture_times_.push_back(std::move(checkpoint.systems[i].picture_times));
         simulations[i].load(std::move(checkpoint.systems[i].simulation));
     }
     open(scene, true);
@@ -125,10 +134,20 @@ void RunFolder::add_frame(std::size_t system) {
         poses.push_back(mechanics.pose(simulation.state(), body));
     const auto contacts = simulation.contacts();
     trajectory_->add_frame(system, simulation.state(), poses, contacts);
-    const auto number = static_cast<std::int64_t>(frame_times_[system].size());
+    frame_times_[system].push_back(simulation.state().t);
+    if (!picture_is_due(system)) return;
+    const auto number = static_cast<std::int64_t>(picture_times_[system].size());
     series_[system].write(number, simulation.state());
     if (contact_forces_) series_[system].write_contacts(number, simulation.state().t, contacts);
-    frame_times_[system].push_back(simulation.state().t);
+    picture_times_[system].push_back(simulation.state().t);
+}
+
+bool RunFolder::picture_is_due(std::size_t system) const {
+    if (most_pictures_ == 0) return false;
+    if (picture_times_[system].empty()) return true;
+    const double end = simulations_[system].system().end, t = simulations_[system].state().t;
+    const double between = end / static_cast<double>(most_pictures_);
+    return t - picture_times_[system].back() >= (1.0 - 1e-9) * between;
 }
 
 void RunFolder::checkpoint() {
@@ -136,8 +155,9 @@ void RunFolder::checkpoint() {
     std::vector<VtkCollectionPart> parts;
     Checkpoint checkpoint{scene_, {}, contact_forces_};
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
-        parts.push_back({&series_[i], &frame_times_[i], contact_forces_});
-        checkpoint.systems.push_back({simulations_[i].system().name, simulations_[i].save(), frame_times_[i]});
+        parts.push_back({&series_[i], &picture_times_[i], contact_forces_});
+        checkpoint.systems.push_back(
+            {simulations_[i].system().name, simulations_[i].save(), frame_times_[i], picture_times_[i]});
     }
     write_vtk_collection(folder_ / "scene.pvd", "vtk", parts);
     write_checkpoint(checkpoint, folder_ / "checkpoint.json");

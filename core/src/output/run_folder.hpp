@@ -19,16 +19,20 @@ namespace delassus {
 
 class DELASSUS_API RunFolder {
 public:
+    static constexpr std::int64_t default_pictures = 200;
+
     /// Begins a new run in the folder, which must be absent, empty, or hold an earlier run, which is removed.
-    /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder. contact_forces: whether frames
-    /// have them.
+    /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder. every: how many steps there are
+    /// from frame to frame. contact_forces: whether frames have them. most_pictures: about how many frames, evenly in
+    /// time, are written for ParaView too; a picture of 1000 spheres takes 1.5 MB.
     RunFolder(std::filesystem::path folder, const Scene& scene, const std::string& scene_text,
-              std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces = false);
+              std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces = false,
+              std::int64_t most_pictures = default_pictures);
     /// Goes on with the run in the folder, with contact forces if it has them: puts the simulations where its
     /// checkpoint is, and cuts off what was written after it. Throws InputError if there is none or if it belongs to
     /// another scene.
     RunFolder(std::filesystem::path folder, const Scene& scene, std::vector<Simulation>& simulations,
-              std::int64_t every);
+              std::int64_t every, std::int64_t most_pictures = default_pictures);
     ~RunFolder();
     RunFolder(const RunFolder&) = delete;
     RunFolder& operator=(const RunFolder&) = delete;
@@ -49,13 +53,15 @@ public:
 private:
     void open(const Scene& scene, bool resume);
     void add_frame(std::size_t system);
+    [[nodiscard]] bool picture_is_due(std::size_t system) const;
 
     std::filesystem::path folder_;
     std::string scene_;
     std::vector<Simulation>& simulations_;
     std::int64_t every_;
     bool contact_forces_ = false;
-    std::vector<std::vector<double>> frame_times_;
+    std::int64_t most_pictures_;
+    std::vector<std::vector<double>> frame_times_, picture_times_;
     std::vector<VtkSeries> series_;
     std::unique_ptr<TrajectoryWriter> trajectory_;
     std::chrono::steady_clock::time_point last_checkpoint_;

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "output/surfaces.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 namespace delassus {
 namespace {
 
-constexpr int around = 24;  ///< corners of a circle
-
 // A surface of revolution about z: rings of (radius, z) from bottom to top. A ring of radius zero is one point.
 struct Ring {
     double radius, z;
 };
 
-Mesh revolved(const std::vector<Ring>& rings) {
+Mesh revolved(const std::vector<Ring>& rings, int around) {
     Mesh mesh;
     std::vector<std::int32_t> first;
     std::vector<int> count;
@@ -37,8 +36,8 @@ Mesh revolved(const std::vector<Ring>& rings) {
 }
 
 /// Half circles of radius r around (0, ±l), with the poles.
-Mesh capsule(double r, double l) {
-    constexpr int steps = around / 4;
+Mesh capsule(double r, double l, int around) {
+    const int steps = around / 4;
     std::vector<Ring> rings;
     for (int half = 0; half < 2; ++half)
         for (int i = 0; i <= steps; ++i) {
@@ -47,7 +46,7 @@ Mesh capsule(double r, double l) {
             const bool pole = (half == 0 && i == 0) || (half == 1 && i == steps);
             rings.push_back({pole ? 0.0 : r * std::cos(angle), r * std::sin(angle) + (half == 0 ? -l : l)});
         }
-    return revolved(rings);
+    return revolved(rings, around);
 }
 
 Mesh box(const Vector3& half) {
@@ -60,17 +59,17 @@ Mesh box(const Vector3& half) {
     return mesh;
 }
 
-Mesh in_own_frame(const Shape& shape, double plane_size) {
+Mesh in_own_frame(const Shape& shape, double plane_size, int around) {
     const auto& [a, b, c] = shape.size;
     switch (shape.kind) {
         case ShapeKind::Sphere:
-            return capsule(a, 0.0);
+            return capsule(a, 0.0, around);
         case ShapeKind::Box:
             return box(shape.size);
         case ShapeKind::Capsule:
-            return capsule(a, b);
+            return capsule(a, b, around);
         case ShapeKind::Cylinder:
-            return revolved({{0.0, -b}, {a, -b}, {a, b}, {0.0, b}});
+            return revolved({{0.0, -b}, {a, -b}, {a, b}, {0.0, b}}, around);
         case ShapeKind::Convex:
         case ShapeKind::Terrain:
         case ShapeKind::HeightField:
@@ -93,8 +92,18 @@ Vector3 transformed(const Pose& pose, const Vector3& p) {
             pose.position[2] + p[2] + 2.0 * (w * s[2] + x * s[1] - y * s[0])};
 }
 
-Mesh surface_of(const Shape& shape, double plane_size) {
-    Mesh mesh = in_own_frame(shape, plane_size);
+int corners_of_circles(std::span<const Shape> shapes) {
+    constexpr std::ptrdiff_t most_triangles = 50000;
+    const auto round = std::count_if(shapes.begin(), shapes.end(), [](const Shape& shape) {
+        return shape.kind == ShapeKind::Sphere || shape.kind == ShapeKind::Capsule || shape.kind == ShapeKind::Cylinder;
+    });
+    int corners = 24;
+    while (corners > 8 && round * corners * (corners - 2) > most_triangles) corners -= 4;
+    return corners;
+}
+
+Mesh surface_of(const Shape& shape, double plane_size, int corners) {
+    Mesh mesh = in_own_frame(shape, plane_size, corners);
     for (auto& vertex : mesh.vertices) vertex = transformed(shape.pose, vertex);
     return mesh;
 }

@@ -59,7 +59,8 @@ double extent_of(const MultibodySystem& system) {
 VtkSeries::VtkSeries(std::filesystem::path folder, std::string name, const MultibodySystem& system)
     : folder_(std::move(folder)), name_(std::move(name)), system_(system) {
     const double plane_size = extent_of(system);
-    for (const auto& shape : system.shapes()) surfaces_.push_back(surface_of(shape, plane_size));
+    const int corners = corners_of_circles(system.shapes());
+    for (const auto& shape : system.shapes()) surfaces_.push_back(surface_of(shape, plane_size, corners));
     elements_ = system.element_surface();
     loose_nodes_ = system.loose_nodes();
     cables_ = system.cables();

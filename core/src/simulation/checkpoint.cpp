@@ -119,7 +119,8 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"rows_left_out", simulation.rows_left_out},
                                    {"sleeping", bits(simulation.sleeping)},
                                    {"totals", json_of(simulation.totals)},
-                                   {"frame_times", bits(system.frame_times)}});
+                                   {"frame_times", bits(system.frame_times)},
+                                   {"picture_times", bits(system.picture_times)}});
     }
     write_file_atomically(file, json_text(json, 1) + "\n");
 }
@@ -148,6 +149,9 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
                 one.at("rows_left_out").get_to(system.simulation.rows_left_out);
             system.simulation.totals = totals_of(written == 2 ? totals_with_names(one.at("totals")) : one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
+            // Older checkpoints had a picture of each frame.
+            system.picture_times =
+                one.contains("picture_times") ? numbers(one.at("picture_times")) : system.frame_times;
             checkpoint.systems.push_back(std::move(system));
         }
         return checkpoint;

@@ -14,7 +14,8 @@ namespace delassus {
 struct CheckpointedSystem {
     std::string name;
     SimulationState simulation;
-    std::vector<double> frame_times;  ///< of the frames written so far, s
+    std::vector<double> frame_times;      ///< of the frames written so far, s
+    std::vector<double> picture_times{};  ///< of those that were written for ParaView too, s
 };
 
 struct Checkpoint {

@@ -143,7 +143,7 @@ std::uint64_t Series::growth() const {
     /// A node of the tree that finds the chunks, with room to spare.
     constexpr std::uint64_t tree_node = 8192;
     if (waiting_.empty()) return 0;
-    return sizeof(double) * (waiting_.size() + 2 * rows_of_chunk() * width()) + tree_node;
+    return waiting() + sizeof(double) * 2 * rows_of_chunk() * width() + tree_node;
 }
 
 hsize_t Series::rows_of_chunk() const {

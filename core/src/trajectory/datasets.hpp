@@ -55,6 +55,8 @@ public:
 
     /// How many bytes write() makes the file longer, at most.
     [[nodiscard]] std::uint64_t growth() const;
+    /// Bytes that wait.
+    [[nodiscard]] std::uint64_t waiting() const { return sizeof(double) * waiting_.size(); }
 
     /// The last number on disk, 0 if there is none.
     [[nodiscard]] double last() const;

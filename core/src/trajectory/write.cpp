@@ -19,8 +19,10 @@ using hdf5::Handle;
 class SystemFile {
 public:
     /// file: the open file's name, which outlives this.
-    SystemFile(hid_t open_file, hid_t parent, const TrajectorySystem& system, bool resume, const std::string& file)
-        : file_(open_file), name_(file) {
+    /// unflushed: bytes that were written since the last flush; it outlives this.
+    SystemFile(hid_t open_file, hid_t parent, const TrajectorySystem& system, bool resume, const std::string& file,
+               std::uint64_t& unflushed)
+        : file_(open_file), name_(file), unflushed_(unflushed) {
         const Handle group = group_in(parent, system.name.c_str(), resume, file);
         if (!resume) {
             put_text(group.get(), "integrator", system.integrator, file);
@@ -114,12 +116,17 @@ public:
     }
 
     void write() {
-        std::uint64_t growth = 0;
+        std::uint64_t growth = 0, waiting = 0;
         for (const auto* all : {&steps_, &contacts_, &frames_})
-            for (const auto& series : *all) growth += series.growth();
+            for (const auto& series : *all) {
+                growth += series.growth();
+                waiting += series.waiting();
+            }
         if (growth == 0) return;
         hdf5::require_memory(growth);
-        reserve(file_, growth, name_);
+        // What HDF5 still holds in its caches has no place in the file yet.
+        reserve(file_, unflushed_ + growth, name_);
+        unflushed_ += waiting;
         for (auto* all : {&steps_, &contacts_, &frames_})
             for (auto& series : *all) series.write();
         waiting_ = 0;
@@ -128,6 +135,7 @@ public:
 private:
     hid_t file_;
     const std::string& name_;
+    std::uint64_t& unflushed_;
     std::vector<Series> steps_, frames_, contacts_;
     std::int64_t waiting_ = 0, contacts_before_ = 0;
 };
@@ -148,7 +156,8 @@ public:
         }
         const Handle group = group_in(file_.get(), "systems", resume, name_);
         systems_.reserve(systems.size());
-        for (const auto& system : systems) systems_.emplace_back(file_.get(), group.get(), system, resume, name_);
+        for (const auto& system : systems)
+            systems_.emplace_back(file_.get(), group.get(), system, resume, name_, unflushed_);
     }
     Hdf5Writer(const Hdf5Writer&) = delete;
     Hdf5Writer& operator=(const Hdf5Writer&) = delete;
@@ -165,11 +174,13 @@ public:
         for (auto& system : systems_) system.write();
         if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0)
             throw InputError(fmt::format("{}: the trajectory cannot be written", name_));
+        unflushed_ = 0;
     }
 
 private:
     std::string name_;
     Handle file_;
+    std::uint64_t unflushed_ = 0;  // bytes written since the last flush
     std::vector<SystemFile> systems_;
 };
 

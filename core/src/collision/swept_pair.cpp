@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "collision/swept_pair.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+
+namespace delassus::collision {
+namespace {
+
+Vector3d vector(const Vector3& v) {
+    return {v[0], v[1], v[2]};
+}
+
+Vector3 array(const Vector3d& v) {
+    return {v[0], v[1], v[2]};
+}
+
+Vector3d displacement(const Placed& placed, const Sweep& sweep, const Vector3& point) {
+    return sweep.translation + sweep.rotation.cross(vector(point) - placed.position);
+}
+
+/// moved ← placed, after the share t of its way.
+void advance(const Placed& placed, const Sweep& sweep, double t, Placed& moved) {
+    moved.solid = placed.solid;
+    moved.rotated = false;
+    moved.position = placed.position + t * sweep.translation;
+    const double angle = sweep.rotation.norm();
+    moved.rotation = placed.rotation;
+    if (angle > 0.0)
+        moved.rotation = Eigen::AngleAxisd(t * angle, sweep.rotation / angle).toRotationMatrix() * placed.rotation;
+}
+
+/// Where a point of the moved solid was at the beginning.
+Vector3d carried_back(const Placed& placed, const Placed& moved, const Vector3& point) {
+    return placed.position + placed.rotation * (moved.rotation.transpose() * (vector(point) - moved.position));
+}
+
+bool is_bounded(const Placed& placed) {
+    return placed.solid->kind != ShapeKind::Plane && !placed.solid->terrain;
+}
+
+/// How far away points are found with the shapes where they are. The normal of a plane does not turn at all.
+double near_limit(const Placed& a, const Placed& b) {
+    constexpr double share = 0.25;
+    if (a.solid->kind == ShapeKind::Plane || b.solid->kind == ShapeKind::Plane)
+        return std::numeric_limits<double>::infinity();
+    return share *
+           std::min(is_bounded(a) ? a.solid->reach : b.solid->reach, is_bounded(b) ? b.solid->reach : a.solid->reach);
+}
+
+}  // namespace
+
+double approach_bound(const Sweep& a, const Sweep& b) {
+    return (b.translation - a.translation).norm() + a.turned + b.turned;
+}
+
+void SweptPair::collide(NarrowPhase& by, Placed& a, Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope,
+                        std::vector<ContactPoint>& contacts) {
+    const double bound = approach_bound(of_a, of_b), limit = near_limit(a, b);
+    found_.clear();
+    by.collide(a, b, std::clamp(limit, envelope, bound), found_);
+    if (!near(a, b, of_a, of_b, envelope)) {
+        found_.clear();
+        if (bound > limit) far(by, a, b, of_a, of_b, envelope);
+    }
+    contacts.insert(contacts.end(), found_.begin(), found_.end());
+}
+
+bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope) const {
+    return std::any_of(found_.begin(), found_.end(), [&](const ContactPoint& contact) {
+        const double closing =
+            vector(contact.normal).dot(displacement(a, of_a, contact.point_a) - displacement(b, of_b, contact.point_b));
+        return contact.gap - std::max(closing, 0.0) < envelope;
+    });
+}
+
+void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
+                    double envelope) {
+    constexpr int most_advances = 64;
+    const double bound = approach_bound(of_a, of_b);
+    double t = 0.0;
+    for (int i = 0; i < most_advances; ++i) {
+        advance(a, of_a, t, moved_a_);
+        advance(b, of_b, t, moved_b_);
+        found_.clear();
+        by.collide(moved_a_, moved_b_, std::max((1.0 - t) * bound, envelope), found_);
+        const auto nearest = std::min_element(found_.begin(), found_.end(),
+                                              [](const auto& one, const auto& other) { return one.gap < other.gap; });
+        if (nearest == found_.end()) return;
+        if (nearest->gap < envelope) break;
+        const double speed =
+            vector(nearest->normal).dot(of_a.translation - of_b.translation) + of_a.turned + of_b.turned;
+        if (speed > 0.0) t += (nearest->gap - 0.5 * envelope) / speed;
+        if (!(speed > 0.0) || t >= 1.0) {
+            found_.clear();
+            return;
+        }
+    }
+    std::erase_if(found_, [&](const ContactPoint& contact) { return !(contact.gap < envelope); });
+    for (ContactPoint& contact : found_) {
+        const Vector3d on_a = carried_back(a, moved_a_, contact.point_a);
+        const Vector3d on_b = carried_back(b, moved_b_, contact.point_b);
+        contact.point_a = array(on_a);
+        contact.point_b = array(on_b);
+        contact.gap = vector(contact.normal).dot(on_b - on_a);
+    }
+}
+
+}  // namespace delassus::collision
