@@ -46,6 +46,28 @@ TEST(Run, WritesWhatTheDocumentationSays) {
     EXPECT_EQ(report.at("systems")[0].at("steps"), 100);
 }
 
+TEST(Run, PicturesAreFewAndEvenlyInTime) {
+    const ScratchFolder scratch;
+    const auto times = [&](const std::string& more) {
+        const auto folder = scratch / "run";
+        const auto result = run_command("run " + scene("bouncing_ball") + " --end 0.3 -o " + folder.string() + more);
+        EXPECT_EQ(result.exit_code, 0) << result.err;
+        const std::string collection = text_of(folder / "scene.pvd"), word = "timestep=\"";
+        std::vector<double> found;
+        for (auto at = collection.find(word); at != std::string::npos; at = collection.find(word, at + 1))
+            found.push_back(std::stod(collection.substr(at + word.size())));
+        const auto files = std::filesystem::directory_iterator(folder / "vtk");
+        EXPECT_EQ(std::distance(begin(files), end(files)), static_cast<std::ptrdiff_t>(found.size()));
+        return found;
+    };
+    const auto all = times("");  // 600 steps
+    ASSERT_EQ(all.size(), 201u);
+    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_NEAR(all[i], 0.0015 * static_cast<double>(i), 1e-9);
+    EXPECT_EQ(times(" --pictures 7").size(), 7u);  // of 0.043 s each, in steps
+    EXPECT_EQ(times(" --pictures 0 ").size(), 0u);
+    EXPECT_EQ(times(" --pictures 5000").size(), 601u);
+}
+
 TEST(Run, JsonIsTheReport) {
     const auto result = run_command("run " + scene("box_on_incline") + " --end 0.05 --json");
     ASSERT_EQ(result.exit_code, 0) << result.err;
