@@ -24,9 +24,9 @@ namespace {
 
 using tests::dense;
 using tests::diagonal_matrix;
-using tests::identity;
 using tests::infinity;
 using tests::one_row;
+using tests::point_on_line;
 using tests::point_on_plane;
 using tests::to;
 
@@ -54,13 +54,7 @@ TEST_P(Gradient, SticksSlidesAndOpens) {
 
 TEST_P(Gradient, SlidesInThePlane) {
     const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
-    Problem problem;
-    problem.H = diagonal_matrix({2.0, 2.0});
-    problem.D = identity(2);
-    problem.a = {-6.0, 5.0};
-    problem.b = {0.0, 0.0};
-    problem.cones = {Cone::friction(mu, 2)};
-    expect_answer(problem, {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0}, {s, -mu * s});
+    expect_answer(point_on_line(mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0}, {s, -mu * s});
 }
 
 TEST_P(Gradient, SharesTheLoadOfRedundantRows) {

@@ -20,6 +20,7 @@ using tests::diagonal_matrix;
 using tests::identity;
 using tests::infinity;
 using tests::one_row;
+using tests::point_on_line;
 using tests::point_on_plane;
 using tests::to;
 
@@ -37,18 +38,6 @@ void expect_answer(const Problem& problem, const std::vector<double>& x, const s
     tests::expect_solution(solve(problem, 1e-11, options), x, lambda);
 }
 
-/// H = 2 I, D = I in the plane; without friction λ = (6, 0).
-Problem planar_point_on_line(double mu, Law law) {
-    Problem problem;
-    problem.H = diagonal_matrix({2.0, 2.0});
-    problem.D = identity(2);
-    problem.a = {-6.0, 5.0};
-    problem.b = {0.0, 0.0};
-    problem.cones = {Cone::friction(mu, 2)};
-    problem.law = law;
-    return problem;
-}
-
 TEST(Ipm, SolvesEachKindOfRow) {
     for (const auto& [problem, x, lambda] : tests::known_answers_of_rows()) expect_answer(problem, x, lambda);
     expect_answer(one_row(2.0, 5.0, Cone::box({-infinity}, {2.0})), {0.0}, {-5.0});
@@ -58,7 +47,7 @@ TEST(Ipm, SticksSlidesAndOpens) {
     const double mu = 0.5, s = (6.0 + 5.0 * mu) / (1.0 + mu * mu);
     for (const auto& [problem, x, lambda] : tests::known_answers_of_associated_friction())
         expect_answer(problem, x, lambda);
-    expect_answer(planar_point_on_line(mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0}, {s, -mu * s});
+    expect_answer(point_on_line(mu, Law::Associated), {(s - 6.0) / 2.0, (5.0 - mu * s) / 2.0}, {s, -mu * s});
 }
 
 // λ and u both vanish: on the central path both are √τ, so that τ must fall to the square of the tolerance.
@@ -178,7 +167,7 @@ TEST(Ipm, SticksSlidesAndOpensWithTheExactLaw) {
         expect_answer(point_on_plane(2.0, -6.0, 1.0, mu, Law::Coulomb), {3.0, 0.5, 0.0}, {0.0, 0.0, 0.0}, options);
         expect_answer(point_on_plane(2.0, 6.0, 5.0, 0.0, Law::Coulomb), {0.0, 2.5, 0.0}, {6.0, 0.0, 0.0}, options);
     }
-    expect_answer(planar_point_on_line(mu, Law::Coulomb), {0.0, (5.0 - mu * 6.0) / 2.0}, {6.0, -mu * 6.0});
+    expect_answer(point_on_line(mu, Law::Coulomb), {0.0, (5.0 - mu * 6.0) / 2.0}, {6.0, -mu * 6.0});
 }
 
 // All kinds of rows and a full E, as a reduced problem and with the half of E made by bodies: N is the same, and with

@@ -33,6 +33,18 @@ inline Problem point_on_plane(double mass, double press, double push, double mu,
     return problem;
 }
 
+/// A point of mass 2 in the plane, pressed by 6 and pushed by 5: H = 2 I, D = I; without friction λ = (6, 0).
+inline Problem point_on_line(double mu, Law law) {
+    Problem problem;
+    problem.H = diagonal_matrix({2.0, 2.0});
+    problem.D = identity(2);
+    problem.a = {-6.0, 5.0};
+    problem.b = {0.0, 0.0};
+    problem.cones = {Cone::friction(mu, 2)};
+    problem.law = law;
+    return problem;
+}
+
 /// Two equal masses on a line, tied to each other by one free row: they share the momentum.
 inline Problem tied_masses() {
     Problem problem;

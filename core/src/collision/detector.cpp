@@ -14,10 +14,6 @@
 namespace delassus::collision {
 namespace {
 
-Vector3d vector(const Vector3& v) {
-    return {v[0], v[1], v[2]};
-}
-
 /// Normalises: a quaternion drifts from unit length by rounding. False if it is zero or not finite.
 bool rotation_of(const Quaternion& orientation, Matrix3d& rotation) {
     const Eigen::Quaterniond q(orientation[0], orientation[1], orientation[2], orientation[3]);
@@ -109,13 +105,12 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
             throw InputError(fmt::format("The motion of body {} is not finite.", body));
         Sweep& sweep = sweeps_[i];
         sweep.rotation = vector(rotation);
-        const double angle = sweep.rotation.norm();
         sweep.translation = vector(translation);
-        if (angle > 0.0) {
-            const Vector3d arm = placed_[i].position - vector(poses[static_cast<std::size_t>(body)].position);
+        const double angle = sweep.rotation.norm();
+        sweep.turned = angle * placed_[i].solid->reach;
+        const Vector3d arm = placed_[i].position - vector(poses[static_cast<std::size_t>(body)].position);
+        if (angle > 0.0 && !arm.isZero(0.0))
             sweep.translation += Eigen::AngleAxisd(angle, sweep.rotation / angle) * arm - arm;
-            sweep.turned = angle * placed_[i].solid->reach;
-        }
     }
 }
 

@@ -11,6 +11,13 @@
 
 namespace delassus::collision {
 
+inline Vector3d vector(const Vector3& v) {
+    return {v[0], v[1], v[2]};
+}
+inline Vector3 array(const Vector3d& v) {
+    return {v[0], v[1], v[2]};
+}
+
 /// Sides of the prism that starts searches for a cylinder and samples its caps; its last two faces are the caps, top
 /// and bottom.
 constexpr std::int32_t kPrismSides = 18;

@@ -8,14 +8,6 @@
 namespace delassus::collision {
 namespace {
 
-Vector3d vector(const Vector3& v) {
-    return {v[0], v[1], v[2]};
-}
-
-Vector3 array(const Vector3d& v) {
-    return {v[0], v[1], v[2]};
-}
-
 Vector3d displacement(const Placed& placed, const Sweep& sweep, const Vector3& point) {
     return sweep.translation + sweep.rotation.cross(vector(point) - placed.position);
 }
@@ -36,17 +28,14 @@ Vector3d carried_back(const Placed& placed, const Placed& moved, const Vector3& 
     return placed.position + placed.rotation * (moved.rotation.transpose() * (vector(point) - moved.position));
 }
 
-bool is_bounded(const Placed& placed) {
-    return placed.solid->kind != ShapeKind::Plane && !placed.solid->terrain;
-}
-
 /// How far away points are found with the shapes where they are. The normal of a plane does not turn at all.
 double near_limit(const Placed& a, const Placed& b) {
     constexpr double share = 0.25;
     if (a.solid->kind == ShapeKind::Plane || b.solid->kind == ShapeKind::Plane)
         return std::numeric_limits<double>::infinity();
-    return share *
-           std::min(is_bounded(a) ? a.solid->reach : b.solid->reach, is_bounded(b) ? b.solid->reach : a.solid->reach);
+    if (a.solid->terrain) return share * b.solid->reach;
+    if (b.solid->terrain) return share * a.solid->reach;
+    return share * std::min(a.solid->reach, b.solid->reach);
 }
 
 }  // namespace

@@ -87,16 +87,13 @@ void MultibodySystem::Implementation::place_shapes(const State& state) {
 void MultibodySystem::Implementation::predict_displacements(double h, const State& state) {
     displacements.resize(poses.size());
     const Vector3d fall = h * load_factor * vector(gravity);
-    for (const auto& body : moving) {
-        const auto& place = at[body.body];
-        displacements[static_cast<std::size_t>(body.body)] = {mechanics::array(h * (place.v + fall)),
-                                                              mechanics::array(h * (place.A * place.omega))};
-    }
-    for (const auto index : prescribed) {
-        const auto& place = at[index];
-        displacements[static_cast<std::size_t>(index)] = {mechanics::array(h * place.v),
-                                                          mechanics::array(h * (place.A * place.omega))};
-    }
+    const auto put = [&](BodyIndex body, const Vector3d& v) {
+        const auto& place = at[body];
+        displacements[static_cast<std::size_t>(body)] = {mechanics::array(h * v),
+                                                         mechanics::array(h * (place.A * place.omega))};
+    };
+    for (const auto& body : moving) put(body.body, at[body.body].v + fall);
+    for (const auto index : prescribed) put(index, at[index].v);
     for (std::size_t k = 0; k < nodes.size(); ++k)
         if (const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()); node.column >= 0)
             displacements[bodies.size() + k].translation = mechanics::array(h * (node.v + fall));
