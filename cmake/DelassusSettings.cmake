@@ -20,7 +20,7 @@ add_library(delassus_settings INTERFACE)
 target_compile_options(delassus_settings INTERFACE -Wall -Wextra -Wshadow -Wpedantic -Wconversion -Wno-sign-conversion)
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # In a batch of files none is the main one, whose types in unnamed namespaces g++ would let pass as members.
-  target_compile_options(delassus_settings INTERFACE -Wno-subobject-linkage)
+  target_compile_options(delassus_settings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
 endif()
 if(DELASSUS_WERROR)
   target_compile_options(delassus_settings INTERFACE -Werror)

@@ -12,8 +12,8 @@
 // At a fixed point μ = λ, hence u = z. One vector of state is what the acceleration works on.
 #pragma once
 
-#include "anderson.hpp"
 #include "contact_law.hpp"
+#include "delassus/sdk/anderson.hpp"
 #include "delassus/sdk/monitor.hpp"
 #include "measure.hpp"
 #include "penalty_rule.hpp"
@@ -52,7 +52,7 @@ private:
     Resolvent resolvent_;
     ContactLaw law_;
     PenaltyRule penalty_rule_;
-    Anderson anderson_;
+    sdk::Anderson anderson_;
     double theta_ = 1.0;                               // Nesterov's sequence
     bool has_last_ = false;                            // whether last_ is there to extrapolate from
     sdk::Vector y_, lambda_;                           // the state and its λ̂

@@ -109,12 +109,21 @@ public:
     void state_of(const sdk::Vector& lambda, SweepState& state) const {
         if (on_velocities_) {
             to_sweep(lambda, state.lambda);
-            state.z = free_state_;
-            rows_.transpose_multiply_add(state.lambda.data(), state.z.data());
+            renew(state);
         } else {
             state.z.setZero(states_ + sdk::chunk_padding);
             state.z.head(lambda.size()) = lambda;
         }
+    }
+    /// λ of a state; m, in the order of the sweep.
+    [[nodiscard]] Eigen::VectorBlock<sdk::Vector> swept(SweepState& state) const {
+        return on_velocities_ ? state.lambda.head(offset_.size()) : state.z.head(offset_.size());
+    }
+    /// The rest of the state from swept(state).
+    void renew(SweepState& state) const {
+        if (!on_velocities_) return;
+        state.z = free_state_;
+        rows_.transpose_multiply_add(state.lambda.data(), state.z.data());
     }
     /// λ of a state; m, as the problem counts rows.
     void reactions(const SweepState& state, sdk::Vector& lambda) const {
@@ -165,6 +174,34 @@ public:
         } else {
             u = velocities_;
         }
+    }
+
+    /// De Saxcé's terms μ‖u_t‖ in the normal rows, 0 in the others; m, in the order of the sweep.
+    void sliding_terms(const SweepState& state, bool coulomb, sdk::Vector& terms) {
+        terms.setZero(offset_.size());
+        if (!coulomb) return;
+        rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), 0, blocks_.size());
+        for (std::size_t k = 0; k < blocks_.size(); ++k) {
+            if (local_.block[k].kind != LocalBlock::Kind::Friction) continue;
+            const auto& group = rows_.groups()[k];
+            terms[group.first] = local_.block[k].mu * velocities_.segment(group.first + 1, group.rows - 1).norm();
+        }
+    }
+    /// ½λᵀNλ + (r + terms)ᵀλ, up to a constant; on velocities ½ λᵀNλ + rᵀλ = ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖².
+    [[nodiscard]] double objective(SweepState& state, const sdk::Vector& terms) {
+        const auto lambda = swept(state);
+        if (on_velocities_) return 0.5 * state.z.head(states_).squaredNorm() + lambda.dot(offset_ + terms);
+        rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), 0, blocks_.size());
+        return lambda.dot(0.5 * (velocities_ + offset_) + terms);
+    }
+    /// √N_ii in the order of the sweep, 1 where it is zero: ‖√N_ii δ_i‖ is free of units.
+    [[nodiscard]] sdk::Vector metric(const sdk::DelassusOperator& N) const {
+        sdk::Vector result(static_cast<Eigen::Index>(row_.size()));
+        for (std::size_t i = 0; i < row_.size(); ++i) {
+            const double diagonal = N.diagonal()[row_[i]];
+            result[static_cast<Eigen::Index>(i)] = diagonal > 0.0 ? std::sqrt(diagonal) : 1.0;
+        }
+        return result;
     }
 
     [[nodiscard]] bool on_velocities() const { return on_velocities_; }

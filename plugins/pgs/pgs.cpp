@@ -9,6 +9,7 @@
 #include "delassus/sdk/residual.hpp"
 #include "delassus/sdk/solver.hpp"
 #include "delassus/sdk/team.hpp"
+#include "extrapolation.hpp"
 #include "model.hpp"
 
 namespace delassus::pgs {
@@ -20,6 +21,7 @@ using sdk::Vector;
 constexpr const char* variants[] = {"forward", "symmetric", "jacobi"};
 constexpr const char* local_solvers[] = {"diagonal", "exact"};
 constexpr const char* orderings[] = {"given", "spaced", "coloured"};
+constexpr const char* accelerations[] = {"none", "anderson"};
 constexpr const char* forms[] = {"auto", "velocities", "operator"};
 
 constexpr delassus_option option_table[] = {
@@ -35,8 +37,11 @@ constexpr delassus_option option_table[] = {
     sdk::choice_option("ordering", "spaced", orderings,
                        "order of the blocks in a sweep: as in the problem; as in the problem, with neighbours kept a "
                        "little apart; by colours that share no body"),
-    sdk::integer_option("check_every", "0", 0, 1e9, "iterations",
-                        "iterations between measurements of the natural error; 0: every 5 % of the iterations done"),
+    sdk::choice_option("acceleration", "anderson", accelerations, "extrapolation of the sweeps"),
+    sdk::integer_option("memory", "5", 1, 100, "points", "differences that anderson keeps"),
+    sdk::integer_option(
+        "check_every", "0", 0, 1e9, "iterations",
+        "iterations between measurements of the natural error; 0: four, and 5 % of the iterations done"),
     sdk::integer_option("stall_window", "1000000", 0, 1e15, "iterations",
                         "the solve ends as stalled after this many iterations without a gain of 1 %; 0: never"),
 };
@@ -47,6 +52,7 @@ public:
         : symmetric_(options.choice("variant") == "symmetric"),
           jacobi_(options.choice("variant") == "jacobi"),
           form_(options.choice("form")),
+          memory_(options.choice("acceleration") == "anderson" ? static_cast<int>(options.integer("memory")) : 0),
           check_every_(options.integer("check_every")),
           stall_window_(options.integer("stall_window")) {
         rule_.local = options.choice("local_solver") == "exact" ? Local::Exact : Local::Diagonal;
@@ -94,16 +100,24 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     static constexpr std::chrono::milliseconds patience{20};  // between two calls of progress
+    static constexpr std::int64_t fewest_extrapolated = 30;
 
     void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor,
                  const sdk::Team& team) {
         model_.state_of(lambda_, state_);
-        // A tolerance below rounding asks for all iterations: then only their end is measured.
+        // A tolerance below rounding asks for all iterations: then only their end is measured. A few of them gain less
+        // by extrapolation than it costs.
         const bool to_the_end = request.tolerance() < std::numeric_limits<double>::epsilon();
+        const bool few = to_the_end && request.max_iterations() < fewest_extrapolated;
+        extrapolation_.reset(model_, operator_, few ? 0 : memory_);
         std::int64_t next_check = to_the_end ? request.max_iterations() : 0;
         Clock::time_point shown = Clock::now();
         for (std::int64_t iteration = 0;; ++iteration) {
-            if (iteration > 0) advance(team);
+            if (iteration > 0) {
+                extrapolation_.before(model_, state_);
+                advance(team);
+                extrapolation_.after(model_, problem.coulomb, state_);
+            }
             bool due = iteration >= next_check || iteration >= request.max_iterations();
             if (!due && request.has_listener() && Clock::now() - shown > patience) {
                 model_.reactions(state_, lambda_);
@@ -120,7 +134,7 @@ private:
             if (!due) continue;
             if (monitor.check(iteration, nullptr, lambda_, measure(problem, request, team))) return;
             shown = Clock::now();
-            next_check = iteration + (check_every_ > 0 ? check_every_ : 1 + iteration / 20);
+            next_check = iteration + (check_every_ > 0 ? check_every_ : iteration < 2 ? 1 : 4 + iteration / 20);
         }
     }
 
@@ -153,6 +167,7 @@ private:
 
     bool symmetric_, jacobi_;
     std::string form_;
+    int memory_;  // 0: no acceleration
     Ordering ordering_ = Ordering::Spaced;
     std::int64_t check_every_, stall_window_;
     SweepRule rule_;
@@ -160,6 +175,7 @@ private:
     Model model_;
     sdk::NaturalResidual residual_;
     SweepState state_;
+    Extrapolation extrapolation_;
     Vector lambda_, next_, u_;
 };
 

@@ -1,37 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A square matrix with a fixed pattern and changing values, factored: dense where it is small, else by SuiteSparse.
+// A square matrix with a fixed pattern and changing values, factored: dense where it is small, else by sparse fronts.
 #pragma once
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <memory>
+#include <vector>
 
-#include "cholesky.hpp"
 #include "delassus/sdk/problem_view.hpp"
+#include "delassus/sdk/sparse_factor.hpp"
 
 namespace delassus::ssn {
 
 using sdk::SparseColumns;
 using sdk::Vector;
 
-/// Symmetric positive definite by Cholesky (Eigen's LLᵀ, or CHOLMOD), unsymmetric by LU (Eigen's, or UMFPACK). One
-/// symbolic analysis serves all values. Quiet. Not copyable.
+/// Symmetric positive definite by Cholesky, unsymmetric of symmetric pattern by LU. One symbolic analysis serves all
+/// values. The sparse LU exchanges no pivots: callers refine its solutions.
 class Factor {
 public:
-    Factor() = default;
-    ~Factor();
-    Factor(const Factor&) = delete;
-    Factor& operator=(const Factor&) = delete;
-
     /// Forgets everything; the pattern may be another.
-    void reset();
+    void reset() { lower_.resize(0, 0); }
 
-    /// A: square, both triangles stored, of one pattern since reset(); it must stay until the last solve.
-    /// False if A is singular to working precision, or not definite. Throws sdk::NumericalFailure if memory runs out.
+    /// A: square, both triangles stored, of one pattern since reset(). False if A is singular to working precision, or
+    /// not definite.
     [[nodiscard]] bool factorize(const SparseColumns& A, bool symmetric);
 
     /// v ← A⁻¹ v.
-    void solve(Vector& v);
+    void solve(Vector& v) const;
 
     [[nodiscard]] std::int64_t analyses() const { return analyses_; }
 
@@ -39,19 +34,16 @@ public:
     static constexpr Eigen::Index largest_dense = 100;
 
 private:
-    bool factorize_unsymmetric();
-    void free_numeric();
+    void analyze(const SparseColumns& A);
 
-    const SparseColumns* A_ = nullptr;
-    bool symmetric_ = true;
+    bool is_dense_ = true, symmetric_ = true;
     Eigen::MatrixXd dense_;
     Eigen::LLT<Eigen::MatrixXd> llt_;
     Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-    std::unique_ptr<delassus_cholmod::Cholesky> cholesky_;
-    void* symbolic_ = nullptr;  // UMFPACK's
-    void* numeric_ = nullptr;
-    double flops_ = 0.0;  // of UMFPACK's factorisation, an upper bound
-    Vector work_;
+    sdk::SparseFactor factor_;
+    SparseColumns lower_;                         // the lower triangle of A
+    std::vector<std::size_t> source_, mirrored_;  // where its values and those across the diagonal lie in A
+    std::vector<double> upper_;                   // the latter
     std::int64_t analyses_ = 0;
 };
 

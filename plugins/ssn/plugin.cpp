@@ -22,7 +22,7 @@ constexpr delassus::sdk::PluginInfo info{
     .name = "ssn",
     .version = "0.1.0",
     .description = "proximal semismooth Newton on the natural map, for both friction laws",
-    .licence = "BSD-3-Clause AND MPL-2.0 AND LGPL-2.1-or-later AND GPL-2.0-or-later",
+    .licence = "BSD-3-Clause AND MPL-2.0",
     .capabilities = DELASSUS_CAN_FREE | DELASSUS_CAN_NONNEGATIVE | DELASSUS_CAN_BOX | DELASSUS_CAN_FRICTION |
                     DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
                     DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |

@@ -9,7 +9,6 @@
 #include <limits>
 #include <random>
 
-#include "../../plugins/admm/anderson.hpp"
 #include "../../plugins/admm/contact_law.hpp"
 #include "delassus/errors.hpp"
 #include "delassus/problem_files.hpp"
@@ -299,30 +298,6 @@ TEST(Admm, AnalysesOnceHoweverOftenThePenaltyChanges) {
     EXPECT_EQ(report.status, Status::Solved);
     EXPECT_EQ(report.analyses, 1);
     EXPECT_GT(report.factorizations, 1);
-}
-
-// For a linear map of a space of 5 dimensions it ends after 6 points, whatever was pushed before it was cleared.
-TEST(AdmmAnderson, ForgetsAllThatWasPushed) {
-    constexpr int size = 5;
-    Eigen::MatrixXd A(size, size);
-    for (int i = 0; i < size; ++i)
-        for (int j = 0; j < size; ++j) A(i, j) = 0.3 * std::sin(1.0 + 3.0 * i + 7.0 * j + i * j);
-    const sdk::Vector c = sdk::Vector::LinSpaced(size, -1.0, 2.0);
-    const sdk::Vector wanted = (Eigen::MatrixXd::Identity(size, size) - A).lu().solve(c);
-    for (int pushed = 0; pushed < 14; ++pushed) {
-        admm::Anderson anderson;
-        anderson.reset(size, 10);
-        for (int k = 0; k < pushed; ++k)
-            anderson.push(100.0 * sdk::Vector::Unit(size, k % size), k * sdk::Vector::Ones(size));
-        anderson.clear();
-        sdk::Vector y = sdk::Vector::Zero(size);
-        for (int k = 0; k <= size; ++k) {
-            const sdk::Vector F = A * y + c;
-            anderson.push(F - y, F);
-            if (!anderson.extrapolate(y)) y = F;
-        }
-        EXPECT_LT((y - wanted).norm(), 1e-6) << pushed;
-    }
 }
 
 TEST(Admm, StopsAtOnceFromTheSolution) {

@@ -513,6 +513,24 @@ TEST(Pgs, StopsWhereItIsTold) {
     EXPECT_EQ(solve(impossible, {{"stall_window", "1000"}}, settings).report.status, Status::Stalled);
 }
 
+TEST(Pgs, AccelerationSavesSweeps) {
+    for (const Law law : {Law::Associated, Law::Coulomb})
+        for (const bool on_velocities : {true, false}) {
+            SpherePileParameters parameters;
+            parameters.contacts = 300;
+            parameters.speed = 0.5;
+            Problem problem = generate_sphere_pile(parameters);
+            problem.law = law;
+            const std::string form = on_velocities ? "velocities" : "operator";
+            const auto plain = solve(problem, {{"form", form}, {"acceleration", "none"}}, to(1e-9));
+            const auto extrapolated = solve(problem, {{"form", form}, {"acceleration", "anderson"}}, to(1e-9));
+            ASSERT_EQ(plain.report.status, Status::Solved);
+            ASSERT_EQ(extrapolated.report.status, Status::Solved);
+            EXPECT_LT(extrapolated.report.iterations, 0.6 * static_cast<double>(plain.report.iterations));
+            EXPECT_LE(extrapolated.report.error.natural, 1e-9);
+        }
+}
+
 TEST(Pgs, SolvesInEveryOrder) {
     for (const char* ordering : {"given", "spaced", "coloured"})
         for (const Law law : {Law::Associated, Law::Coulomb}) {

@@ -11,6 +11,7 @@
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/position_projection.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 

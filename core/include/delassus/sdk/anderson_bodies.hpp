@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "anderson.hpp"
+// The functions of sdk/anderson.hpp (sdk/compiled_once.hpp).
+#pragma once
 
 #include <algorithm>
 
-namespace delassus::admm {
+#include "delassus/sdk/anderson.hpp"
+#include "delassus/sdk/compiled_once.hpp"
 
-namespace {
+namespace delassus::sdk {
 
-/// Added to the diagonal of the normalised normal equations: directions below its root are rounding.
-constexpr double regularization = 1e-10;
-
-}  // namespace
-
-void Anderson::reset(Eigen::Index size, int memory) {
+DELASSUS_SDK_FUNCTION void Anderson::reset(Eigen::Index size, int memory) {
     memory_ = memory;
     df_.resize(size, memory);
     dF_.resize(size, memory);
@@ -22,7 +19,7 @@ void Anderson::reset(Eigen::Index size, int memory) {
     clear();
 }
 
-void Anderson::push(const sdk::Vector& f, const sdk::Vector& F) {
+DELASSUS_SDK_FUNCTION void Anderson::push(const Vector& f, const Vector& F) {
     if (has_point_) {
         const double length = (f - f_).norm();
         if (length > 0.0) {
@@ -39,7 +36,9 @@ void Anderson::push(const sdk::Vector& f, const sdk::Vector& F) {
     has_point_ = true;
 }
 
-bool Anderson::extrapolate(sdk::Vector& next) {
+DELASSUS_SDK_FUNCTION bool Anderson::extrapolate(Vector& next) {
+    // Added to the diagonal of the normalised normal equations: directions below its root are rounding.
+    constexpr double regularization = 1e-10;
     if (count_ == 0) return false;
     matrix_ = gram_.topLeftCorner(count_, count_);
     matrix_.diagonal().array() += regularization;
@@ -52,4 +51,4 @@ bool Anderson::extrapolate(sdk::Vector& next) {
     return true;
 }
 
-}  // namespace delassus::admm
+}  // namespace delassus::sdk

@@ -3,11 +3,10 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <cstdint>
 
 #include "delassus/sdk/problem_view.hpp"
 
-namespace delassus::admm {
+namespace delassus::sdk {
 
 /// With f(y) = F(y) − y, the next point is F(y) − ΔF γ, where γ minimises ‖f − Δf γ‖ over the latest `memory`
 /// differences of f and F: for a linear F this is GMRES in another guise (Anderson 1965; Walker and Ni 2011, "type II";
@@ -21,10 +20,10 @@ public:
     void clear() { count_ = 0, position_ = 0, has_point_ = false; }
 
     /// Takes a point's f and F (y itself is F − f).
-    void push(const sdk::Vector& f, const sdk::Vector& F);
+    void push(const Vector& f, const Vector& F);
 
     /// next ← the accelerated point from the latest push; false if there is no difference yet, or none that helps.
-    [[nodiscard]] bool extrapolate(sdk::Vector& next);
+    [[nodiscard]] bool extrapolate(Vector& next);
 
 private:
     int memory_ = 0, count_ = 0, position_ = 0;
@@ -33,8 +32,12 @@ private:
     Eigen::MatrixXd gram_;     // memory × memory: df_ᵀ df_
     Eigen::MatrixXd matrix_;   // its part in use, regularised
     Eigen::LDLT<Eigen::MatrixXd> factor_;
-    sdk::Vector f_, F_;  // of the latest point
-    sdk::Vector gamma_;
+    Vector f_, F_;  // of the latest point
+    Vector gamma_;
 };
 
-}  // namespace delassus::admm
+}  // namespace delassus::sdk
+
+#ifndef DELASSUS_SDK_COMPILED
+#include "delassus/sdk/anderson_bodies.hpp"
+#endif

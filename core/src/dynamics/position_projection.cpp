@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// On the level of velocities constraints drift by O(h³) a step, and a contact that closed penetrates by up to
+// (1 − θ) h |u⁻|. The least motion x in the norm of H that undoes it solves
+//
+//     H x − Dᵀ ν = 0,      C + C_q x = 0,      g + D_n x ≥ g_least  ⊥  ν ≥ 0
+//
+// at the end of the step, without friction: the part on positions of Brüls, Acary and Cardona (CMAME 281, 2014), of
+// which Gear, Gupta and Leimkuhler's is the one without contacts. H contains the stiffness, so that elastic bodies move
+// as a whole. What is solved for is the speed x/h. g_least bounds how fast a penetration is undone that the step began
+// with. The energy that it gives is −f·x.
+#include "dynamics/position_projection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/linear_problem.hpp"
+#include "dynamics/velocity_contacts.hpp"
+
+namespace delassus {
+
+PositionProjection::PositionProjection(DynamicalSystem& system)
+    : system_(system),
+      blocks_(system.constraint_blocks()),
+      n_(system.n()),
+      m_(system.m()),
+      resolution_(system.gap_resolution()),
+      constraint_(static_cast<std::size_t>(m_)) {}
+
+/// The problem; whether there is anything to undo.
+bool PositionProjection::assemble(const State& end, double h, const VelocityContacts& contacts) {
+    double off = 0.0, least = 0.0;
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) off = std::max(off, std::abs(C));
+    rows_.clear();
+    if (contacts.any()) {
+        rows_.measure_speeds_at(nullptr);
+        system_.collect_unilateral(end, h, rows_);
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            const double gap = rows_.rows()[row].gap;
+            if (block.along_normal() && gap < 0.0) least = std::max(least, contacts.least_gap(block.key) - gap);
+            row += static_cast<std::size_t>(block.cone.rows);
+        }
+    }
+    if (off <= resolution_ && least <= resolution_) return false;
+    const auto m = static_cast<std::size_t>(m_);
+    std::int32_t count = 0;
+    problem_.b.assign(constraint_.begin(), constraint_.end());
+    problem_.cones.clear();
+    for (const std::int32_t rows : blocks_) problem_.cones.push_back(Cone::free(rows));
+    // Gaps wider than this are out of reach of what moves by about `off` and `least`.
+    const double reach = 10.0 * std::max(off, least) + resolution_;
+    const auto for_each_near = [&](const auto& visit) {
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            if (block.along_normal() && rows_.rows()[row].gap < reach) visit(block, row);
+            row += static_cast<std::size_t>(block.cone.rows);
+        }
+    };
+    for_each_near([&](const auto&, std::size_t) { ++count; });
+    D_.begin(m_ + count, n_);
+    if (m_ > 0) system_.add_constraint_jacobian(end, 0, D_);
+    for_each_near([&](const auto& block, std::size_t row) {
+        const auto target = static_cast<std::int32_t>(problem_.b.size());
+        for (auto e = rows_.row_start()[row]; e < rows_.row_start()[row + 1]; ++e)
+            D_.add(target, rows_.column()[static_cast<std::size_t>(e)], rows_.value()[static_cast<std::size_t>(e)]);
+        problem_.b.push_back(rows_.rows()[row].gap - contacts.least_gap(block.key));
+        problem_.cones.push_back(Cone::nonnegative(1));
+    });
+    for (std::size_t i = 0; i < problem_.b.size(); ++i) problem_.b[i] /= h;
+    D_.finish_into(problem_.D);
+    return problem_.b.size() > m || off > resolution_;
+}
+
+void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
+                                 const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
+                                 std::string_view method) {
+    if (!assemble(end, h, contacts)) return;
+    problem_.name = "position";
+    problem_.law = Law::Associated;
+    problem_.H = H;
+    problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.lambda.assign(problem_.b.size(), 0.0);
+    if (!solver.solve(problem_, solution_, true)) {
+        report.solved = false;
+        report.message = solver.effort().unsolved;
+    }
+    ++report.newton_iterations;
+    delta_ = solution_.x;
+    for (double& entry : delta_) entry *= h;
+    const auto pushed = [](double impulse) { return impulse > 0.0; };
+    if (std::any_of(solution_.lambda.begin() + m_, solution_.lambda.end(), pushed)) {
+        force_.assign(static_cast<std::size_t>(n_), 0.0);
+        system_.add_force(end, 1.0, force_.data());
+        double work = 0.0;
+        for (std::size_t i = 0; i < force_.size(); ++i) work -= force_[i] * delta_[i];
+        report.recovered += std::max(work, 0.0);
+    }
+    system_.increment(end.q.data(), delta_.data(), end.q.data());
+    require_finite(begin, end, h, method);
+    require_nearer(begin, end, h, method);
+}
+
+// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below 10⁻⁶, or
+// 10⁴ times the resolution, may be the tolerance of the solver.
+void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
+    double off = 0.0, left = 0.0;
+    for (std::size_t i = 0; i < constraint_.size(); ++i) off = std::max(off, std::abs(constraint_[i]));
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) left = std::max(left, std::abs(C));
+    if (left <= 0.5 * off || left <= std::max(1e4 * resolution_, 1e-6)) return;
+    throw StepFailure(fmt::format(
+        "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
+        "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",
+        method, begin.t, h, off, left));
+}
+
+}  // namespace delassus

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Positions moved back onto constraints and gaps, for timesteppers on the level of velocities (internal).
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/timestepper.hpp"
+
+namespace delassus {
+
+class VelocityContacts;
+
+/// Moves positions at the end of a step onto the constraints: C = 0, and no gap below what the step may leave.
+class DELASSUS_API PositionProjection {
+public:
+    /// system outlives it.
+    explicit PositionProjection(DynamicalSystem& system);
+
+    /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
+    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite or does not
+    /// bring the constraints nearer to 0.
+    void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
+                 StepSolver& solver, StepReport& report, std::string_view method);
+
+private:
+    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+    void require_nearer(const State& begin, const State& end, double h, std::string_view method);
+
+    DynamicalSystem& system_;
+    std::vector<std::int32_t> blocks_;
+    std::int32_t n_, m_;
+    double resolution_;
+    UnilateralRows rows_;
+    MatrixAssembler D_;
+    Problem problem_;
+    Solution solution_;
+    std::vector<double> constraint_, delta_, force_;
+};
+
+}  // namespace delassus

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Anderson acceleration of the sweeps.
+//
+// A sweep is a map λ ← F(λ), piecewise smooth and, while no contact changes between open, sticking and sliding, nearly
+// linear, with modes that take 10³ to 10⁵ sweeps. Anderson's method replaces many of these. Where contacts change it
+// may go astray, and the length of a sweep's step does not tell: slow modes have short steps however far they are off.
+// The objective of the associated law does,
+//
+//     φ(λ) = ½λᵀNλ + rᵀλ + sᵀλ,      s = 0,
+//
+// which every sweep lowers (README.md). So an extrapolated point has to prove itself: a few sweeps later φ must be
+// below that of the point before the extrapolation, or the sweeps go on from there. Under the Coulomb law s is De
+// Saxcé's term μ‖u_t‖ in the normal rows, held as it was at that point: the solution minimises φ with its own s.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "delassus/sdk/anderson.hpp"
+#include "model.hpp"
+
+namespace delassus::pgs {
+
+class Extrapolation {
+public:
+    /// memory: differences kept; 0: never extrapolates. The model has its right-hand side.
+    void reset(const Model& model, const sdk::DelassusOperator& N, int memory) {
+        memory_ = memory;
+        if (memory == 0) return;
+        metric_ = model.metric(N);
+        anderson_.reset(metric_.size(), memory);
+        pending_ = tried_ = false;
+        sweeps_ = 0;
+    }
+
+    /// Before a sweep: the state moves to the extrapolated point, if there is one.
+    void before(const Model& model, SweepState& state) {
+        if (memory_ == 0) return;
+        if (pending_) move(model, next_, state);
+        pending_ = false;
+        if (sweeps_ % period == period - 1) begin_ = model.swept(state);
+    }
+
+    /// After it: the state is that of the sweep, or the one before the extrapolation.
+    void after(Model& model, bool coulomb, SweepState& state) {
+        if (memory_ == 0 || ++sweeps_ % period != 0) return;
+        end_ = model.swept(state).cwiseProduct(metric_);
+        step_ = end_ - begin_.cwiseProduct(metric_);
+        const double length = step_.norm();
+        if (tried_ && !has_proved_itself(model.objective(state, sliding_), length)) {
+            move(model, plain_, state);
+            anderson_.clear();
+            tried_ = false;
+            return;
+        }
+        model.sliding_terms(state, coulomb, sliding_);
+        objective_ = model.objective(state, sliding_);
+        length_ = length;
+        plain_ = end_;
+        anderson_.push(step_, end_);
+        pending_ = tried_ = anderson_.extrapolate(next_);
+    }
+
+private:
+    static constexpr int period = 5;  // sweeps from one extrapolation to the next
+
+    /// Where rounding hides the change of φ, the length of the step decides.
+    [[nodiscard]] bool has_proved_itself(double objective, double length) const {
+        const double rounding = 100.0 * std::numeric_limits<double>::epsilon() * std::abs(objective_);
+        return objective < objective_ - rounding || (objective <= objective_ + rounding && length <= length_);
+    }
+
+    /// λ ← one that is weighed by the metric.
+    void move(const Model& model, const sdk::Vector& weighed, SweepState& state) const {
+        model.swept(state) = weighed.cwiseQuotient(metric_);
+        model.renew(state);
+    }
+
+    int memory_ = 0;
+    std::int64_t sweeps_ = 0;
+    bool pending_ = false;  // next_ awaits its sweep
+    bool tried_ = false;    // the sweeps come from an extrapolated point
+    sdk::Anderson anderson_;
+    // All m and in the order of the sweep. f and F are weighed by the metric √N_ii, so that rows of different units and
+    // masses compare.
+    sdk::Vector metric_, begin_, end_, step_, next_;
+    // The latest point that was not rejected: λ (weighed), De Saxcé's terms, φ, ‖f‖.
+    sdk::Vector plain_, sliding_;
+    double objective_ = 0.0, length_ = 0.0;
+};
+
+}  // namespace delassus::pgs
