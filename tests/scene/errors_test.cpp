@@ -105,19 +105,34 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 6: \"friction\" is -1; it must not be negative"},
         Case{"SpringOfABallJoint",
              head + bodies + "joints:\n  - {name: j, kind: spherical, second: ball, spring: {stiffness: 1}}\n",
-             "s.yaml, line 6: the joint \"j\" has no single angle for a spring or friction: spherical and universal "
+             "s.yaml, line 6: the joint \"j\" has no single angle for a spring, friction or start: spherical and "
+             "universal "
              "joints take damping alone"},
         Case{"DampingOfAFixedJoint", head + bodies + "joints:\n  - {name: j, kind: fixed, second: ball, damping: 1}\n",
-             "s.yaml, line 6: the joint \"j\" has no angle for a spring, damping or friction: revolute and cylindrical "
+             "s.yaml, line 6: the joint \"j\" has no angle for a spring, damping, friction or start: revolute and "
+             "cylindrical "
              "joints have, and spherical and universal ones take damping"},
         Case{"DampingOfACylindricalJoint",
              head + bodies + "joints:\n  - {name: j, kind: cylindrical, second: ball, damping: 1}\n",
-             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring and friction in "
+             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring, friction and "
+             "start in "
              "\"slide: {…}\" and \"turn: {…}\""},
         Case{"SlideOfARevoluteJoint",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, slide: {damping: 1}}\n",
              "s.yaml, line 6: \"slide\" and \"turn\" are for cylindrical joints; the joint \"j\" takes \"damping\", "
-             "\"spring\" and \"friction\" themselves"},
+             "\"spring\", \"friction\" and \"start\" themselves"},
+        Case{"StartBeyondTheLimits",
+             head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, upper: 1, start: 1.2}\n",
+             "s.yaml, line 6: the start of the joint \"j\" lies beyond its limits"},
+        Case{"StartOfMoreThanHalfATurn",
+             head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, start: 4}\n",
+             "s.yaml, line 6: the start of the joint \"j\" must lie in [-pi, pi] rad: whole turns do not change where "
+             "bodies are"},
+        Case{"StartOfASphericalJoint",
+             head + bodies + "joints:\n  - {name: j, kind: spherical, second: ball, start: 1}\n",
+             "s.yaml, line 6: the joint \"j\" has no single angle for a spring, friction or start: spherical and "
+             "universal "
+             "joints take damping alone"},
         Case{"JointSpringWithoutStiffness",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, spring: {rest: 1}}\n",
              "s.yaml, line 6: \"spring\" lacks the key \"stiffness\""},

@@ -107,13 +107,17 @@ enum class JointKind {
     Gear           ///< 1 row: the relative rotations of two revolute joints keep a ratio
 };
 
-/// What acts in a coordinate of a joint beside its reactions: a linear spring and damper, and dry friction that holds
-/// the coordinate still as long as a force within its bound can. Coordinates are 0 at t = 0. All ≥ 0 but `rest`.
-struct CoordinateForces {
+/// A coordinate of a joint, 0 where the bodies are given: what acts in it beside reactions (a linear spring and damper,
+/// and dry friction that holds it still as long as a force within its bound can; all ≥ 0 but `rest`), and how it
+/// starts.
+struct JointCoordinate {
     double damping = 0.0;    ///< N s/m along an axis, N m s/rad about one
     double stiffness = 0.0;  ///< N/m or N m/rad
     double rest = 0.0;       ///< the coordinate at which the spring is at rest, m or rad; turns are counted
     double friction = 0.0;   ///< N or N m
+    /// Where MultibodySystem::assemble() puts it and how fast it moves then: m and m/s, or rad in [−π, π] and rad/s.
+    /// Without a value it is as the bodies are given.
+    std::optional<double> start = std::nullopt, start_rate = std::nullopt;
 };
 
 /// A joint holds from the initial configuration on: its frames are given once, in the world frame at t = 0.
@@ -129,9 +133,9 @@ struct JointParameters {
     double gear_ratio = 1.0;  ///< angle of the second = ratio · angle of the first; a fraction with terms below 1000
     /// Limits of the coordinate of a revolute (rad, in (−π, π)) or prismatic (m) joint; not a number: none.
     double lower, upper;
-    CoordinateForces slide;  ///< along the axis; Prismatic and Cylindrical
-    CoordinateForces turn;   ///< about the axis; Revolute and Cylindrical; Spherical and Universal: damping alone, of
-                             ///< the relative angular velocity
+    JointCoordinate slide;  ///< along the axis; Prismatic and Cylindrical
+    JointCoordinate turn;   ///< about the axis; Revolute and Cylindrical; Spherical and Universal: damping alone, of
+                            ///< the relative angular velocity
     DELASSUS_API JointParameters();
 };
 
@@ -379,12 +383,14 @@ public:
     [[nodiscard]] std::array<std::int32_t, 2> joint_rows(std::int32_t index) const;
 
     // ---- Assembly, and rows that others imply ----
-    /// Makes the start consistent, after finish(): leaves out rows of joints that others imply in every configuration
-    /// (docs/mechanics.md), moves joined bodies by the least change (in the metric of the mass) to where C(q, 0) = 0,
-    /// and changes velocities by the least to where C_q v + C_t = 0. A start that is consistent up to rounding keeps
-    /// its bits. initial_state() then is the result, and C, its derivatives, constraint_blocks() and λ speak of the
-    /// rows that are kept. Later calls keep the first rows again and change nothing else. Throws InputError, and names
-    /// a joint, if there is no such position or velocity.
+    /// Makes the start consistent, after finish(): puts joints to their `start` and `start_rate`, which moves all that
+    /// the joint carries, seen from the ground or from the first body of a free mechanism; leaves out rows of joints
+    /// that others imply in every configuration (docs/mechanics.md), moves joined bodies by the least change (in the
+    /// metric of the mass) to where C(q, 0) = 0, and changes velocities by the least to where C_q v + C_t = 0. A start
+    /// that is consistent up to rounding keeps its bits. initial_state() then is the result, and C, its derivatives,
+    /// constraint_blocks() and λ speak of the rows that are kept. Later calls keep the first rows again and change
+    /// nothing else. Throws InputError, and names a joint, if there is no such position or velocity, or if a joint with
+    /// a start closes a loop: then others decide where it is.
     const Assembly& assemble();
     /// Rows of all joints and motors, kept or not.
     [[nodiscard]] std::int32_t constraint_rows() const;

@@ -45,8 +45,9 @@ void Turn::hessian(const Placements& at, double, const RowColumns& columns, RowM
 
 namespace {
 
-bool given(const CoordinateForces& forces) {
-    return forces.damping != 0.0 || forces.stiffness != 0.0 || forces.rest != 0.0 || forces.friction != 0.0;
+bool given(const JointCoordinate& forces) {
+    return forces.damping != 0.0 || forces.stiffness != 0.0 || forces.rest != 0.0 || forces.friction != 0.0 ||
+           forces.start || forces.start_rate;
 }
 
 }  // namespace
@@ -57,17 +58,28 @@ void mechanics::check_joint_forces(const JointParameters& joint) {
         refuse_unless(finite_and_not_negative({forces->damping, forces->stiffness, forces->friction}) &&
                           std::isfinite(forces->rest),
                       "damping, stiffness and friction of the joint", joint.name, "must be finite and not negative");
+    for (const auto* coordinate : {&joint.slide, &joint.turn})
+        refuse_unless(
+            std::isfinite(coordinate->start.value_or(0.0)) && std::isfinite(coordinate->start_rate.value_or(0.0)),
+            "the start of the joint", joint.name, "is not finite");
+    refuse_unless(std::abs(joint.turn.start.value_or(0.0)) <= M_PI, "the start of the joint", joint.name,
+                  "must lie in [-pi, pi] rad: whole turns do not change where bodies are");
+    const double start = (kind == JointKind::Prismatic ? joint.slide : joint.turn).start.value_or(0.0);
+    refuse_unless(!(start < joint.lower) && !(start > joint.upper), "the start of the joint", joint.name,
+                  "lies beyond its limits");
     const bool slides = kind == JointKind::Prismatic || kind == JointKind::Cylindrical;
     const bool turns = kind == JointKind::Revolute || kind == JointKind::Cylindrical;
     const bool turns_freely = kind == JointKind::Spherical || kind == JointKind::Universal;
     refuse_unless(slides || !given(joint.slide), "the joint", joint.name,
-                  "has no slide for a spring, damping or friction: prismatic and cylindrical joints have");
+                  "has no slide for a spring, damping, friction or start: prismatic and cylindrical joints have");
     refuse_unless(turns || turns_freely || !given(joint.turn), "the joint", joint.name,
-                  "has no angle for a spring, damping or friction: revolute and cylindrical joints have, and spherical "
-                  "and universal ones take damping");
-    refuse_unless(turns || (joint.turn.stiffness == 0.0 && joint.turn.rest == 0.0 && joint.turn.friction == 0.0),
-                  "the joint", joint.name,
-                  "has no single angle for a spring or friction: spherical and universal joints take damping alone");
+                  "has no angle for a spring, damping, friction or start: revolute and cylindrical joints have, and "
+                  "spherical and universal ones take damping");
+    refuse_unless(
+        turns || (joint.turn.stiffness == 0.0 && joint.turn.rest == 0.0 && joint.turn.friction == 0.0 &&
+                  !joint.turn.start && !joint.turn.start_rate),
+        "the joint", joint.name,
+        "has no single angle for a spring, friction or start: spherical and universal joints take damping alone");
 }
 
 const double* MultibodySystem::Implementation::count_turns_of(std::int32_t joint) {
@@ -99,7 +111,7 @@ void MultibodySystem::Implementation::add_joint_forces(std::int32_t index) {
         return;
     }
     for (const bool turns : {false, true}) {
-        const CoordinateForces& forces = turns ? joint.turn : joint.slide;
+        const JointCoordinate& forces = turns ? joint.turn : joint.slide;
         add_coordinate_spring(index, turns, forces.stiffness, forces.damping, forces.rest, nullptr, true);
         if (forces.friction > 0.0) frictions.push_back({index, turns, mechanics::box_of(forces.friction)});
     }

@@ -155,4 +155,8 @@ private:
     std::vector<Composite> composite_;
 };
 
+/// The given state with the joints of the system at their `start` and `start_rate`; itself where there are none. Throws
+/// InputError for a joint that no tree holds, and for systems with nodes.
+[[nodiscard]] State with_joint_starts(const MultibodySystem& system, const State& given);
+
 }  // namespace delassus::mechanics

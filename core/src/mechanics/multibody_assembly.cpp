@@ -7,6 +7,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/timestepper.hpp"
+#include "mechanics/kinematic_tree.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -99,7 +100,7 @@ const Assembly& MultibodySystem::assemble() {
         keep_rows(self.first_kept_rows);
         return *self.assembly;
     }
-    const State given = initial_state();
+    const State given = mechanics::with_joint_starts(*this, initial_state());
     State state = given;
     Assembly done;
     for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {

@@ -21,7 +21,7 @@ JointKind joint_kind(const Source& source, const YAML::Node& node) {
 
 }  // namespace
 
-SystemReader::Handlers SystemReader::coordinate_handlers(CoordinateForces& forces) {
+SystemReader::Handlers SystemReader::coordinate_handlers(JointCoordinate& forces) {
     return {{"damping", [&](const YAML::Node& n) { forces.damping = nonnegative_number(source_, n, "damping"); }},
             {"spring",
              [&](const YAML::Node& n) {
@@ -35,17 +35,20 @@ SystemReader::Handlers SystemReader::coordinate_handlers(CoordinateForces& force
                            {"rest", [&](const YAML::Node& v) { forces.rest = finite_number(source_, v, "rest"); }}});
                  if (!stiffness) source_.refuse(n, "\"spring\" lacks the key \"stiffness\"");
              }},
-            {"friction", [&](const YAML::Node& n) { forces.friction = nonnegative_number(source_, n, "friction"); }}};
+            {"friction", [&](const YAML::Node& n) { forces.friction = nonnegative_number(source_, n, "friction"); }},
+            {"start", [&](const YAML::Node& n) { forces.start = finite_number(source_, n, "start"); }},
+            {"start_rate", [&](const YAML::Node& n) { forces.start_rate = finite_number(source_, n, "start_rate"); }}};
 }
 
-// A joint with one coordinate has damping, spring and friction of its own; a cylindrical one has them in two maps.
+// A joint with one coordinate has damping, spring, friction and start of its own; a cylindrical one has them in two
+// maps.
 void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
     JointParameters joint;
     joint.point = joint.second_point = copy.offset;
     bool kind = false, second = false, gear_first = false, gear_second = false;
-    CoordinateForces own;
+    JointCoordinate own;
     YAML::Node own_place(YAML::NodeType::Undefined), parts(YAML::NodeType::Undefined);
-    const auto part = [&](CoordinateForces& forces, std::string_view key) {
+    const auto part = [&](JointCoordinate& forces, std::string_view key) {
         return std::pair<std::string_view, Handler>{key, [&, key](const YAML::Node& n) {
                                                         read_map(source_, n, fmt::format("\"{}\"", key),
                                                                  coordinate_handlers(forces));
@@ -100,14 +103,14 @@ void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
     if (joint.kind == JointKind::Cylindrical) {
         if (own_place.IsDefined())
             source_.refuse(own_place,
-                           fmt::format("the cylindrical joint \"{}\" has two coordinates: give damping, spring "
-                                       "and friction in \"slide: {{…}}\" and \"turn: {{…}}\"",
+                           fmt::format("the cylindrical joint \"{}\" has two coordinates: give damping, spring, "
+                                       "friction and start in \"slide: {{…}}\" and \"turn: {{…}}\"",
                                        joint.name));
     } else {
         if (parts.IsDefined())
             source_.refuse(parts,
                            fmt::format("\"slide\" and \"turn\" are for cylindrical joints; the joint \"{}\" takes "
-                                       "\"damping\", \"spring\" and \"friction\" themselves",
+                                       "\"damping\", \"spring\", \"friction\" and \"start\" themselves",
                                        joint.name));
         (joint.kind == JointKind::Prismatic ? joint.slide : joint.turn) = own;
     }

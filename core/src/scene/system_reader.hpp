@@ -47,7 +47,7 @@ private:
     void read_joint(const YAML::Node& item, const Copy& copy);
     using Handlers = std::vector<std::pair<std::string_view, Handler>>;
     /// The keys `damping`, `spring` and `friction`.
-    Handlers coordinate_handlers(CoordinateForces& forces);
+    Handlers coordinate_handlers(JointCoordinate& forces);
     void read_motor(const YAML::Node& item, const Copy& copy);
     void read_actuator(const YAML::Node& item, const Copy& copy);
     void read_spring(const YAML::Node& item, const Copy& copy);

@@ -180,11 +180,9 @@ private:
     void joint_forces() {
         std::vector<std::string> springs, frictions;
         for (const auto& joint : system_.joints) {
-            const auto any = [&](double CoordinateForces::*of) {
-                return joint.slide.*of > 0.0 || joint.turn.*of > 0.0;
-            };
-            if (any(&CoordinateForces::stiffness) || any(&CoordinateForces::damping)) springs.push_back(joint.name);
-            if (any(&CoordinateForces::friction)) frictions.push_back(joint.name);
+            const auto any = [&](double JointCoordinate::*of) { return joint.slide.*of > 0.0 || joint.turn.*of > 0.0; };
+            if (any(&JointCoordinate::stiffness) || any(&JointCoordinate::damping)) springs.push_back(joint.name);
+            if (any(&JointCoordinate::friction)) frictions.push_back(joint.name);
         }
         if (!springs.empty())
             keep(counted(springs.size(), "joint with a spring or damping", "joints with springs or damping"),
