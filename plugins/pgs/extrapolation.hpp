@@ -47,14 +47,15 @@ public:
         end_ = model.swept(state).cwiseProduct(metric_);
         step_ = end_ - begin_.cwiseProduct(metric_);
         const double length = step_.norm();
-        if (tried_ && !has_proved_itself(model.objective(state, sliding_), length)) {
+        const double without_sliding = model.objective(state);
+        if (tried_ && !has_proved_itself(without_sliding + model.swept(state).dot(sliding_), length)) {
             move(model, plain_, state);
             anderson_.clear();
             tried_ = false;
             return;
         }
         model.sliding_terms(state, coulomb, sliding_);
-        objective_ = model.objective(state, sliding_);
+        objective_ = without_sliding + model.swept(state).dot(sliding_);
         length_ = length;
         plain_ = end_;
         anderson_.push(step_, end_);

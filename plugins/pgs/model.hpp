@@ -187,21 +187,18 @@ public:
             terms[group.first] = local_.block[k].mu * velocities_.segment(group.first + 1, group.rows - 1).norm();
         }
     }
-    /// ½λᵀNλ + (r + terms)ᵀλ, up to a constant; on velocities ½ λᵀNλ + rᵀλ = ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖².
-    [[nodiscard]] double objective(SweepState& state, const sdk::Vector& terms) {
+    /// ½λᵀNλ + rᵀλ, up to a constant; on velocities that is ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖².
+    [[nodiscard]] double objective(SweepState& state) {
         const auto lambda = swept(state);
-        if (on_velocities_) return 0.5 * state.z.head(states_).squaredNorm() + lambda.dot(offset_ + terms);
+        if (on_velocities_) return 0.5 * state.z.head(states_).squaredNorm() + lambda.dot(offset_);
         rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), 0, blocks_.size());
-        return lambda.dot(0.5 * (velocities_ + offset_) + terms);
+        return 0.5 * lambda.dot(velocities_ + offset_);
     }
     /// √N_ii in the order of the sweep, 1 where it is zero: ‖√N_ii δ_i‖ is free of units.
     [[nodiscard]] sdk::Vector metric(const sdk::DelassusOperator& N) const {
-        sdk::Vector result(static_cast<Eigen::Index>(row_.size()));
-        for (std::size_t i = 0; i < row_.size(); ++i) {
-            const double diagonal = N.diagonal()[row_[i]];
-            result[static_cast<Eigen::Index>(i)] = diagonal > 0.0 ? std::sqrt(diagonal) : 1.0;
-        }
-        return result;
+        sdk::Vector result;
+        to_sweep(N.diagonal(), result);
+        return result.unaryExpr([](double diagonal) { return diagonal > 0.0 ? std::sqrt(diagonal) : 1.0; });
     }
 
     [[nodiscard]] bool on_velocities() const { return on_velocities_; }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "factor.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace delassus::ssn {

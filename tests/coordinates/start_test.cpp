@@ -78,6 +78,15 @@ TEST(JointStart, PlacesSlidesAndCylinders) {
     EXPECT_LT((begun.velocity("b") - Vector3d(-1.0, 0.0, -1.0)).norm(), 1e-14);
 }
 
+// Stops that the scene's own configuration does not meet are for the run; only a start must lie between them.
+TEST(JointStart, IsNotAskedForByStops) {
+    const std::string joint =
+        "joints:\n  - {name: i, kind: revolute, second: a, axis: [0, 1, 0], lower: 0.1, upper: 0.5";
+    EXPECT_NO_THROW(Begun(bodies + joint + "}\n"));
+    EXPECT_NO_THROW(Begun(bodies + joint + ", start: 0.3}\n"));
+    EXPECT_THROW(Begun(bodies + joint + ", start: 0.6}\n"), InputError);
+}
+
 // What is not given stays, and is carried along.
 TEST(JointStart, MovesWhatTheJointCarriesAlone) {
     const std::string joints =

@@ -64,8 +64,8 @@ void mechanics::check_joint_forces(const JointParameters& joint) {
             "the start of the joint", joint.name, "is not finite");
     refuse_unless(std::abs(joint.turn.start.value_or(0.0)) <= M_PI, "the start of the joint", joint.name,
                   "must lie in [-pi, pi] rad: whole turns do not change where bodies are");
-    const double start = (kind == JointKind::Prismatic ? joint.slide : joint.turn).start.value_or(0.0);
-    refuse_unless(!(start < joint.lower) && !(start > joint.upper), "the start of the joint", joint.name,
+    const auto& start = (kind == JointKind::Prismatic ? joint.slide : joint.turn).start;
+    refuse_unless(!start || (!(*start < joint.lower) && !(*start > joint.upper)), "the start of the joint", joint.name,
                   "lies beyond its limits");
     const bool slides = kind == JointKind::Prismatic || kind == JointKind::Cylindrical;
     const bool turns = kind == JointKind::Revolute || kind == JointKind::Cylindrical;
