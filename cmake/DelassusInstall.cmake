@@ -7,7 +7,7 @@ include(CMakePackageConfigHelpers)
 get_property(modules GLOBAL PROPERTY DELASSUS_LOADED_MODULES)
 get_property(plugins GLOBAL PROPERTY DELASSUS_PLUGINS_BUILT)
 add_custom_target(product)
-add_dependencies(product delassus_command delassus_pages ${modules} ${plugins})
+add_dependencies(product delassus_command delassus_documents delassus_pages ${modules} ${plugins})
 
 install(TARGETS delassus_command EXPORT delassusSdkTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 # The suites of `delassus bench`, with what they name; they are found beside libdelassus, in the build tree too.

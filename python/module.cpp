@@ -6,6 +6,7 @@
 #include "errors.hpp"
 #include "problems.hpp"
 #include "scenes.hpp"
+#include "solver_classes.hpp"
 #include "solvers.hpp"
 
 PYBIND11_MODULE(_delassus, module) {
@@ -14,5 +15,6 @@ PYBIND11_MODULE(_delassus, module) {
     delassus::python::bind_errors(module);
     delassus::python::bind_problems(module);
     delassus::python::bind_solvers(module);
+    delassus::python::bind_solver_classes(module);
     delassus::python::bind_scenes(module);
 }

@@ -176,6 +176,7 @@ inline void bind_problems(py::module_& module) {
              }),
              "folders"_a = std::vector<std::string>{})
         .def("plugins", &plugins)
+        .def("_add", [](Registry& registry, std::shared_ptr<Plugin> plugin) { registry.add(std::move(plugin)); })
         .def("unbuilt", [](const Registry& registry) {
             std::map<std::string, std::string> reasons;
             for (const auto& plugin : registry.unbuilt()) reasons.emplace(plugin.name, plugin.reason);

@@ -24,20 +24,29 @@ import numpy as np
 import scipy.sparse
 
 from . import _delassus
-from ._delassus import Cone, Error, InputError, PluginError, Result, StepFailure, StepRecord, Unsupported
+from ._delassus import Cone, Error, InputError, PluginError, Result, SolveRequest, StepFailure, StepRecord, \
+    Unsupported
+from ._derivative import Derivative
 from ._yaml import yaml_of
 
 __version__: str = _delassus.version
-__all__ = ["Cone", "Error", "InputError", "PluginError", "Problem", "Result", "Scene", "Simulation", "Solver",
-           "StepFailure", "StepRecord", "Trajectory", "Unsupported", "plugins", "read", "simulate", "solve", "unbuilt"]
+__all__ = ["Cone", "Derivative", "Error", "InputError", "PluginError", "Problem", "Result", "Scene", "Simulation", "Solver",
+           "SolveRequest", "StepFailure", "StepRecord", "Trajectory", "Unsupported", "derivative", "plugins", "read", "register",
+           "simulate", "solve", "unbuilt"]
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
 Path = Union[str, "os.PathLike[str]"]
 
 
+_own_plugins: list = []  # of register()
+
+
 @functools.lru_cache(maxsize=None)
 def _registry(folders: Tuple[str, ...] = ()) -> _delassus.Registry:
-    return _delassus.Registry(list(folders))
+    registry = _delassus.Registry(list(folders))
+    for plugin in _own_plugins:
+        registry._add(plugin)
+    return registry
 
 
 def _folders(plugin_path: Sequence[Path]) -> Tuple[str, ...]:
@@ -231,6 +240,67 @@ def solve(problem: Problem, solver: Union[str, Solver] = "auto", tolerance: floa
         solver = Solver(solver, plugin_path=plugin_path, **options)
     return solver.solve(problem, tolerance=tolerance, law=law, max_iterations=max_iterations, time_limit=time_limit,
                         start=start, curve=curve)
+
+
+def derivative(problem: Problem, result: Result) -> Derivative:
+    """The derivative of a solution by the data of its problem, for directions (jvp) and for gradients (vjp).
+
+    result : of solving this very problem, well below the accuracy that is wanted of the derivative
+    Raises InputError where the solution was not found, or where H is singular along what the constraints leave free.
+    """
+    if not result.solved:
+        raise InputError(f"the problem was not solved ({result.status}), so that its solution has no derivative")
+    if result.x.shape != (problem.n,) or result.lam.shape != (problem.m,):
+        raise InputError(f"the result has n = {len(result.x)} and m = {len(result.lam)}; "
+                         f"the problem has n = {problem.n} and m = {problem.m}")
+    return Derivative(problem, result)
+
+
+#: What register() takes a class to be capable of, unless it says otherwise.
+_CAPABILITIES = ("free", "nonnegative", "box", "friction", "associated", "coulomb", "h_diagonal", "h_blocks",
+                 "h_definite", "reduced", "compliance", "redundant", "warm_start")
+
+
+def _problem_of(H, D, a, b, cones, E, law) -> Problem:
+    problem = Problem.__new__(Problem)
+    _delassus.Problem.__init__(problem, H, D, a, b, cones, E, law, "")
+    return problem
+
+
+def register(solver: type) -> type:
+    """Make a class a solver that can be chosen by its name: in solve, Solver, scenes and simulate. A decorator, too.
+
+    The class needs
+
+    solve(self, problem, request) : returns (x, lam) or (x, lam, status). problem is a Problem, request has tolerance,
+        max_iterations, time_limit, start ((x, lam) or None) and show(iteration, lam, x=None). status is 'solved'
+        (the default, unless show() said to end), 'iteration_limit', 'time_limit', 'stalled', 'infeasible' or
+        'numerical_failure'. Delassus measures the answer: a wrong 'solved' is reported as 'false_claim'.
+
+    and may have
+
+    analyze(self, problem), factorize(self, problem) : called before solve when the pattern or the values of H, D and E
+        are new
+    refusal(self, problem) : a sentence why it cannot take the problem, or None
+    name, description, version, licence : texts; without them the class's own name in lower case, the first line of its
+        docstring, '0' and 'unknown'
+    options : a dict of option names and defaults (bool, int, float or str), which come as keywords of __init__
+    capabilities : names as in plugins(); without it all cones, both laws, and definite or reduced problems
+
+    'auto' does not choose it. Raises InputError where the class is not as above or its name is taken, and PluginError
+    for an impossible name.
+    """
+    if not isinstance(solver, type) or not callable(getattr(solver, "solve", None)):
+        raise InputError("register() takes a class with a method solve(self, problem, request)")
+    text = (solver.__doc__ or "").strip().split("\n")[0]
+    plugin = _delassus._plugin_of(
+        solver, getattr(solver, "name", solver.__name__.lower()), getattr(solver, "version", "0"),
+        getattr(solver, "description", text), getattr(solver, "licence", "unknown"),
+        list(getattr(solver, "options", {}).items()), list(getattr(solver, "capabilities", _CAPABILITIES)))
+    _registry()._add(plugin)
+    _own_plugins.append(plugin)
+    _registry.cache_clear()
+    return solver
 
 
 def read(path: Path) -> Problem:

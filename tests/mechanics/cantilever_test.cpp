@@ -3,14 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SparseCholesky>
 #include <array>
 #include <cmath>
 #include <string>
 
 #include "delassus/multibody.hpp"
 #include "delassus/timestepper.hpp"
-#include "support/system_derivatives.hpp"
+#include "support/statics.hpp"
 
 namespace delassus::cantilever_test {
 namespace {
@@ -19,13 +18,15 @@ constexpr double length = 1.0, depth = 0.1, young = 1e9, density = 1000.0;
 constexpr double inertia = depth * depth * depth * depth / 12.0, area = depth * depth;
 
 /// Clamped at x = 0; Poisson's ratio zero, so that the clamp is no more than the beam theory's.
-void make_cantilever(MultibodySystem& system, int across, ElementModel model, double gravity) {
+void make_cantilever(MultibodySystem& system, int across, ElementModel model, double gravity,
+                     ElementOrder order = ElementOrder::Linear) {
     system.set_gravity({0.0, 0.0, -gravity});
     ElasticBlock block;
     block.edges = {length, depth, depth};
     block.cells = {10 * across, across, across};
     block.material = {young, 0.0, density, 0.0};
     block.model = model;
+    block.order = order;
     block.fixed_faces[0] = true;
     system.add_elastic_block(block);
     system.finish();
@@ -75,17 +76,9 @@ TEST(Cantilever, BendsAsABeamUnderItsWeight) {
 Eigen::VectorXd bending_frequencies(const MultibodySystem& system, int freedoms, int count) {
     const State state = system.initial_state();
     const auto n = system.n();
-    const auto sparse = [&](auto&& add) {
-        MatrixAssembler assembler;
-        assembler.begin(n, n);
-        add(assembler);
-        const SparseMatrix& matrix = assembler.finish();
-        return Eigen::SparseMatrix<double>(Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
-            n, n, matrix.entries(), matrix.row_start.data(), matrix.column.data(), matrix.value.data()));
-    };
-    const auto K = sparse([&](auto& H) { system.add_stiffness(state, 1.0, Tangent::Exact, H); });
-    const auto M = sparse([&](auto& H) { system.add_mass(state, 1.0, H); });
-    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(K);
+    const tests::Sparse K = tests::stiffness_of(system, state);
+    const tests::Sparse M = tests::sparse_matrix(n, [&](auto& H) { system.add_mass(state, 1.0, H); });
+    const Eigen::SimplicialLDLT<tests::Sparse> factor(K);
     Eigen::MatrixXd X = Eigen::MatrixXd::Random(n, count + 10);
     Eigen::VectorXd values;
     for (int iteration = 0; iteration < 30; ++iteration) {
@@ -107,9 +100,9 @@ Eigen::VectorXd bending_frequencies(const MultibodySystem& system, int freedoms,
     return result;
 }
 
-Eigen::VectorXd of_tetrahedra(int across) {
+Eigen::VectorXd of_tetrahedra(int across, ElementOrder order) {
     MultibodySystem system;
-    make_cantilever(system, across, ElementModel::Corotational, 0.0);
+    make_cantilever(system, across, ElementModel::Corotational, 0.0, order);
     return bending_frequencies(system, 3, 6);
 }
 
@@ -132,7 +125,9 @@ TEST(Cantilever, SwingsWithTheFrequenciesOfABeam) {
     // come in pairs.
     const double unit = std::sqrt(young * inertia / (density * area * std::pow(length, 4)));
     const Eigen::VectorXd beam = (4.0 * of_beams(40) - of_beams(20)) / 3.0;
-    const Eigen::VectorXd values = (4.0 * of_tetrahedra(4) - of_tetrahedra(2)) / 3.0;
+    const Eigen::VectorXd values =
+        (4.0 * of_tetrahedra(4, ElementOrder::Linear) - of_tetrahedra(2, ElementOrder::Linear)) / 3.0;
+    const Eigen::VectorXd quadratic = of_tetrahedra(1, ElementOrder::Quadratic);
     Eigen::Index k = 0;
     for (const double beta : {1.8751, 4.6941, 7.8548})
         for (int plane = 0; plane < 2; ++plane, ++k) {
@@ -142,6 +137,8 @@ TEST(Cantilever, SwingsWithTheFrequenciesOfABeam) {
             EXPECT_LT(beam[k] / slender, 1.0);
             EXPECT_NEAR(beam[k] / slender, 1.0, 0.0025 * beta * beta) << "shear matters as (β depth)²";
             EXPECT_NEAR(values[k] / beam[k], 1.0, 0.05) << k;
+            RecordProperty("quadratic_" + std::to_string(k), std::to_string(quadratic[k] / beam[k]));
+            EXPECT_NEAR(quadratic[k] / beam[k], 1.0, 0.02) << k << ": one cell over the depth";
         }
 }
 

@@ -27,6 +27,7 @@ TEST(ElasticBlock, SlidesWithTheFrictionOfItsWeight) {
         block.corner = {0.0, 0.0, radius};
         block.edges = {0.4, 0.2, 0.2};
         block.cells = {4, 2, 2};
+        block.order = ElementOrder::Linear;
         block.material = {young, 0.3, density, 1e3 / young};
         block.velocity = {speed, 0.0, 0.0};
         block.contact_radius = radius;
@@ -90,6 +91,7 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
     block.corner = {0.0, 0.0, 0.02};
     block.edges = {0.4, 0.2, 0.2};
     block.cells = {4, 2, 2};
+    block.order = ElementOrder::Linear;
     block.material = {1e5, 0.3, 1000.0, 0.0};
     block.velocity = {0.5, 0.2, -1.0};
     block.contact_radius = 0.01;

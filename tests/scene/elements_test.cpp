@@ -25,7 +25,7 @@ std::string refusal(const std::string& yaml) {
 }
 
 TEST(ElasticScene, BlockHasItsNodesItsSurfaceAndItsMass) {
-    const Scene scene = parse_scene(head + block + ", density: 500, fixed_faces: [x_min]}\n", "s.yaml");
+    const Scene scene = parse_scene(head + block + ", order: 1, density: 500, fixed_faces: [x_min]}\n", "s.yaml");
     const auto& system = *scene.systems[0].system;
     EXPECT_EQ(system.node_count(), 5 * 3 * 3);
     EXPECT_EQ(system.n(), 3 * 4 * 3 * 3) << "the nodes of one face are fixed";
@@ -67,7 +67,7 @@ TEST(ElasticScene, BlockSlidesAgainstFriction) {
     const double before = simulation.record().momentum[0];
     while (!simulation.finished()) simulation.step();
     EXPECT_EQ(simulation.totals().unsolved_steps, 0);
-    EXPECT_EQ(simulation.totals().most_contacts, 15);
+    EXPECT_EQ(simulation.totals().most_contacts, 45) << "9 × 5 nodes of the lower face";
     // μ g t of each kilogram's momentum, while the block settles on the ground.
     EXPECT_NEAR(before - simulation.record().momentum[0], 0.3 * 9.81 * 0.1 * 16.0, 0.02 * 16.0);
 }
@@ -141,6 +141,89 @@ TEST(ElasticScene, CableHangsByItsTension) {
     EXPECT_EQ(simulation.totals().plugin_solves, 0) << "no rows, no solver";
 }
 
+/// Where the nodes at x = 1 come to rest, less z of the bar's axis: the mean.
+double sag(const std::string& load, const std::string& keys = "") {
+    const Running run(
+        parse_scene("step: 0.01\nend: 0.01\nstart: equilibrium\ngravity: [0, 0, 0]\nelastic_blocks:\n"
+                    "  - {name: bar, edges: [1, 0.1, 0.1], cells: [10, 1, 1], young: 1.0e+9, "
+                    "poisson: 0, fixed_faces: [x_min]" +
+                        keys + "}\nloads:\n  - {name: tip, " + load + "}\n",
+                    "s.yaml"));
+    double sum = 0.0;
+    int count = 0;
+    for (std::int32_t node = 0; node < run.system().node_count(); ++node) {
+        const Vector3 x = run.system().node_position(run.simulation.state(), node);
+        if (x[0] < 0.99) continue;
+        sum += x[2] - 0.05;
+        ++count;
+    }
+    return -sum / count;
+}
+
+TEST(ElasticScene, ALoadOnAFaceBendsTheBar) {
+    const double force = 10.0, inertia = 1e-4 / 12.0;
+    const double expected = force / (3.0 * 1e9 * inertia) + force / (5.0 / 6.0 * 0.5e9 * 0.01);
+    const double whole = sag("elastic: bar, face: x_max, force: [0, 0, -10]");
+    EXPECT_NEAR(whole / expected, 1.0, 0.01);
+    EXPECT_NEAR(sag("elastic: bar, box: {lower: [0.99, -1, -1], upper: [2, 1, 1]}, force: [0, 0, -10]"), whole, 1e-12);
+    // Linear elements of this size bend half as far at best.
+    EXPECT_LT(sag("elastic: bar, face: x_max, force: [0, 0, -10]", ", order: 1"), 0.7 * expected);
+}
+
+TEST(ElasticScene, AFaceCarriesAForceBySharesOfItsSides) {
+    for (const char* order : {"1", "2"}) {
+        const Scene scene = parse_scene(head + block + ", order: " + order + "}\n", "s.yaml");
+        const auto& system = *scene.systems[0].system;
+        const auto shares = system.spread_over_sides(0, system.node_count(), {{0.399, -1, -1}, {1, 1, 1}});
+        double sum = 0.0, y = 0.0, yy = 0.0;
+        for (const auto& [node, share] : shares) {
+            const Vector3 x = system.node_position(system.initial_state(), node);
+            EXPECT_NEAR(x[0], 0.4, 1e-12);
+            sum += share;
+            y += share * x[1];
+            yy += share * x[1] * x[1];
+        }
+        EXPECT_NEAR(sum, 1.0, 1e-14);
+        EXPECT_NEAR(y, 0.1, 1e-14);
+        // ∫ y² over an edge of 0.2, exact where displacements are quadratic.
+        if (order[0] == '2') {
+            EXPECT_NEAR(yy, 0.04 / 3.0, 1e-14);
+        }
+    }
+}
+
+TEST(ElasticScene, ALoadOnANodeAcceleratesIt) {
+    Running run(
+        parse_scene("step: 0.001\nend: 0.1\ngravity: [0, 0, 0]\nnodes: [{name: p, mass: 2}]\n"
+                    "loads: [{name: push, node: p, force: [3, 0, {linear: {rate: 20}}]}]\n",
+                    "s.yaml"));
+    run.finish();
+    EXPECT_NEAR(run.simulation.state().v[0], 3.0 / 2.0 * 0.1, 1e-12);
+    EXPECT_NEAR(run.simulation.state().v[2], 20.0 / 2.0 * 0.005, 6e-4) << "an order-1 method";
+}
+
+TEST(ElasticScene, WrongLoadsAreToldInOneSentence) {
+    const auto load = [](const std::string& keys) {
+        return refusal(head + "bodies: [{name: c, density: 1, shapes: [{sphere: {radius: 1}}]}]\n" + block +
+                       "}\nloads:\n  - {name: f, " + keys + "}\n");
+    };
+    EXPECT_EQ(load("elastic: b, face: x_max, force: [1, 0, 0]"), "taken");
+    EXPECT_EQ(load("force: [1, 0, 0]"), "s.yaml, line 7: load \"f\" needs one of \"body\", \"node\" and \"elastic\"");
+    EXPECT_EQ(load("body: c, elastic: b"),
+              "s.yaml, line 7: load \"f\" needs one of \"body\", \"node\" and \"elastic\"");
+    EXPECT_EQ(
+        load("elastic: bb, face: x_max"),
+        "s.yaml, line 7: \"elastic\" names \"bb\", but there is no such elastic block or mesh; did you mean \"b\"?");
+    EXPECT_EQ(load("elastic: b"), "s.yaml, line 7: the load on \"b\" needs one of \"face\" and \"box\"");
+    EXPECT_EQ(load("elastic: b, face: x_mox"), "s.yaml, line 7: there is no face \"x_mox\"; did you mean \"x_max\"?");
+    EXPECT_EQ(load("elastic: b, box: {lower: [5, 5, 5], upper: [6, 6, 6]}"),
+              "s.yaml, line 7: no side of an element lies in the box");
+    EXPECT_EQ(load("elastic: b, face: x_max, torque: [1, 0, 0]"),
+              "s.yaml, line 7: load \"f\" acts on nodes, which take no \"torque\"");
+    EXPECT_EQ(load("body: c, face: x_max"), "s.yaml, line 7: \"face\" and \"box\" of load \"f\" need \"elastic\"");
+    EXPECT_EQ(load("node: q"), "s.yaml, line 7: \"node\" names \"q\", but there is no such node; there are none");
+}
+
 TEST(ElasticScene, WrongOnesAreToldInOneSentence) {
     EXPECT_EQ(refusal(head + block + ", yong: 1}\n"),
               "s.yaml, line 4: an elastic block has no key \"yong\"; did you mean \"young\"?");
@@ -148,6 +231,7 @@ TEST(ElasticScene, WrongOnesAreToldInOneSentence) {
               "s.yaml, line 4: there is no face \"x_mn\"; did you mean \"x_min\"?");
     EXPECT_EQ(refusal(head + block + ", model: corotationl}\n"),
               "s.yaml, line 4: there is no element model \"corotationl\"; did you mean \"corotational\"?");
+    EXPECT_EQ(refusal(head + block + ", order: 3}\n"), "s.yaml, line 4: \"order\" is 3; elements have order 1 or 2");
     EXPECT_EQ(refusal(head + block + ", contact: {radius: 0.1}}\n"),
               "s.yaml, line 4: \"contact\" lacks the key \"material\"");
     EXPECT_EQ(refusal(head + "elastic_blocks:\n  - {name: b, edges: [1, 1, 1]}\n"),
@@ -157,7 +241,7 @@ TEST(ElasticScene, WrongOnesAreToldInOneSentence) {
     EXPECT_EQ(refusal(head + block + ", poisson: 0.5}\n"),
               "s.yaml, line 4: Poisson's ratio is 0.5; it must lie between -1 and 0.5");
     EXPECT_EQ(refusal(head + "nodes: [{name: a, mass: 1}]\ncables: [{name: c, nodes: [a, b]}]\n"),
-              "s.yaml, line 4: \"nodes\" names \"b\", but there is no such node");
+              "s.yaml, line 4: \"nodes\" names \"b\", but there is no such node; did you mean \"a\"?");
 }
 
 }  // namespace

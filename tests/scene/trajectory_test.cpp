@@ -124,7 +124,7 @@ nodes:
   - {name: hook, fixed: true, position: [4, 0, 1]}
   - {name: bead, mass: 1, position: [4, 0, 0.5], velocity: [0, 1, 0]}
 elastic_blocks:
-  - {name: block, corner: [2, 0, 0], edges: [0.2, 0.2, 0.2], cells: [1, 1, 1], fixed_faces: [x_min]}
+  - {name: block, corner: [2, 0, 0], edges: [0.2, 0.2, 0.2], cells: [1, 1, 1], order: 1, fixed_faces: [x_min]}
 cables:
   - {name: string, nodes: [hook, bead]}
 joints:

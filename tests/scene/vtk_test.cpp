@@ -34,7 +34,7 @@ nodes:
   - {name: hook, fixed: true, position: [4, 0, 1]}
   - {name: bead, mass: 1, position: [4, 0, 0.5], velocity: [0, 2, 0]}
 elastic_blocks:
-  - {name: block, edges: [0.2, 0.2, 0.2], cells: [1, 1, 1]}
+  - {name: block, edges: [0.2, 0.2, 0.2], cells: [1, 1, 1], order: 1}
 cables:
   - {name: string, nodes: [hook, bead]}
 )",

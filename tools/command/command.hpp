@@ -31,6 +31,7 @@ void add_plugins(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
 void add_inspect(CLI::App& program, Action& action);
 void add_generate(CLI::App& program, Action& action);
+void add_documents(CLI::App& program, Action& action);
 void add_worker(CLI::App& program, Action& action);
 
 /// "key=value" to its two halves; throws InputError.

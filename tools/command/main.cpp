@@ -71,6 +71,7 @@ int parse_and_run(int argc, char** argv) {
     add_inspect(program, action);
     add_convert(program, action);
     add_generate(program, action);
+    add_documents(program, action);
     add_worker(program, action);
     int exit_code = exit_bad_input;
     try {

@@ -183,9 +183,17 @@ struct BushingParameters {
 };
 
 /// A force and a torque on a body, given in time.
+/// A node and its part of a force.
+struct NodeShare {
+    std::int32_t node = -1;
+    double share = 1.0;
+};
+
+/// A force on a body, or on nodes; a torque on a body.
 struct LoadParameters {
     std::string name;
     BodyIndex body = world_body;
+    std::vector<NodeShare> nodes;  ///< in place of a body; the force is constant in the world frame then
     std::array<Motion, 3> force;   ///< at the point, world frame, N
     std::array<Motion, 3> torque;  ///< world frame, Nm
     Vector3 point{};               ///< world frame at t = 0; moves with the body
@@ -198,6 +206,7 @@ struct ElasticMaterial {
     double poisson = 0.3;       ///< in (−1, ½)
     double density = 1000.0;    ///< kg/m³, > 0
     double damping_time = 0.0;  ///< τ of Kelvin–Voigt damping, s: viscosity = τ × elasticity
+    double damping_rate = 0.0;  ///< α, 1/s: −α m v at the nodes of solids. With τ, Rayleigh's damping α M + τ K
 };
 
 enum class ElementModel {
@@ -205,7 +214,11 @@ enum class ElementModel {
     StVenantKirchhoff  ///< Green's strain with Hooke's law; weak under strong compression
 };
 
+/// Of the displacements in an element. Elements of order 1 are far too stiff in bending until they are small.
+enum class ElementOrder { Linear = 1, Quadratic = 2 };
+
 /// A block of bricks, each of six tetrahedra around a diagonal (Kuhn's division, which fits from brick to brick).
+/// Linear tetrahedra of a brick share their mean change of volume.
 struct ElasticBlock {
     std::string name;
     Vector3 corner{};                            ///< of the least coordinates, m
@@ -213,6 +226,7 @@ struct ElasticBlock {
     std::array<std::int32_t, 3> cells{1, 1, 1};  ///< bricks along x, y, z
     ElasticMaterial material;
     ElementModel model = ElementModel::Corotational;
+    ElementOrder order = ElementOrder::Quadratic;
     std::array<bool, 6> fixed_faces{};  ///< x_min, x_max, y_min, y_max, z_min, z_max: their nodes do not move
     Vector3 velocity{};                 ///< m/s
     double contact_radius = 0.0;  ///< m; nodes of the surface touch bodies as spheres of this radius; 0: not at all
@@ -231,6 +245,7 @@ struct ElasticMeshParameters {
     Pose pose;  ///< of the mesh's frame
     ElasticMaterial material;
     ElementModel model = ElementModel::Corotational;
+    ElementOrder order = ElementOrder::Quadratic;
     std::vector<AlignedBox> fixed_boxes;  ///< world frame at t = 0: the nodes in them do not move
     Vector3 velocity{};                   ///< m/s
     double contact_radius = 0.0;          ///< as in ElasticBlock
@@ -322,12 +337,23 @@ public:
     void add_spring(const SpringParameters& spring);
     void add_bushing(const BushingParameters& bushing);
     void add_load(const LoadParameters& load);
-    /// A tetrahedron of four nodes, its mass shared among them. Throws InputError if it is inverted.
+    /// A tetrahedron with linear displacements between four nodes, its mass shared among them. Throws InputError if it
+    /// is inverted.
     void add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
                          ElementModel model = ElementModel::Corotational);
-    /// Returns the number of its first node, at the corner; nodes are numbered with z fastest and x slowest.
+    /// One with quadratic displacements: its corners, then the nodes in the middles of the edges between the corners
+    /// 0 and 1, 0 and 2, 0 and 3, 1 and 2, 1 and 3, 2 and 3. Of the mass 1/36 goes to a corner and 4/27 to a middle.
+    void add_quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes, const ElasticMaterial& material,
+                                   ElementModel model = ElementModel::Corotational);
+    /// Six linear tetrahedra that share their mean change of volume. The corner at (x, y, z), each 0 or 1, has the
+    /// place 4 x + 2 y + z.
+    void add_brick(const std::array<std::int32_t, 8>& nodes, const ElasticMaterial& material,
+                   ElementModel model = ElementModel::Corotational);
+    /// Returns the number of its first node, at the corner. Nodes are numbered with z fastest and x slowest; with
+    /// quadratic elements there are two along each edge of a brick.
     std::int32_t add_elastic_block(const ElasticBlock& block);
-    /// Returns the number of its first node; nodes are numbered as the vertices of the mesh.
+    /// Returns the number of its first node; nodes are numbered as the vertices of the mesh. Those in the middles of
+    /// edges follow.
     std::int32_t add_elastic_mesh(const ElasticMeshParameters& body);
     void add_cable(const CableParameters& cable);
     void add_beam(const BeamParameters& beam);
@@ -363,6 +389,11 @@ public:
     [[nodiscard]] Vector3 node_position(const State& state, std::int32_t node) const;
     /// Triangles of nodes that bound the tetrahedra, counter-clockwise from outside.
     [[nodiscard]] std::vector<std::array<std::int32_t, 3>> element_surface() const;
+    /// What a force of one unit, spread evenly over the outer sides of elements whose corners lie in the box at t = 0,
+    /// gives to each node: the integrals of the shape functions. Sides between nodes first … first + count − 1 only.
+    /// Throws InputError if there are none.
+    [[nodiscard]] std::vector<NodeShare> spread_over_sides(std::int32_t first, std::int32_t count,
+                                                           const AlignedBox& box) const;
     /// Nodes that no tetrahedron holds, ascending.
     [[nodiscard]] std::vector<std::int32_t> loose_nodes() const;
     /// The two nodes of each cable.

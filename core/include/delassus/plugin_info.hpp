@@ -55,7 +55,7 @@ struct PluginInfo {
     std::uint32_t flags = 0;         ///< DELASSUS_FLAG_*
     std::uint64_t capabilities = 0;  ///< DELASSUS_CAN_*
     std::vector<OptionInfo> options;
-    std::filesystem::path library;  ///< absolute path of the shared library
+    std::filesystem::path library;  ///< absolute path of the shared library; empty: the program's own
 
     /// The needs that this plugin does not meet.
     [[nodiscard]] std::uint64_t missing(std::uint64_t needs) const { return needs & ~capabilities; }

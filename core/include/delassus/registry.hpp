@@ -19,6 +19,10 @@ public:
     /// Loads the shared library at this path (made absolute) and checks its handshake. Throws PluginError.
     [[nodiscard]] DELASSUS_API static std::shared_ptr<const Plugin> load(const std::filesystem::path& library);
 
+    /// A solver that the program itself brings. What the descriptor points at lasts as long as the process. Throws
+    /// PluginError if its handshake fails.
+    [[nodiscard]] DELASSUS_API static std::shared_ptr<const Plugin> of(const delassus_plugin_descriptor& descriptor);
+
     [[nodiscard]] const PluginInfo& info() const { return info_; }
     /// A copy; fields that the plugin's version of the border does not have are zero.
     [[nodiscard]] const delassus_plugin_descriptor& descriptor() const { return descriptor_; }
@@ -52,6 +56,10 @@ class Registry {
 public:
     DELASSUS_API explicit Registry(std::vector<std::filesystem::path> folders = {});
 
+    /// A solver that the program itself brings can be chosen by its name from now on. Throws InputError if there is a
+    /// plugin of that name.
+    DELASSUS_API void add(std::shared_ptr<const Plugin> plugin);
+
     /// By name, in alphabetical order.
     [[nodiscard]] const std::vector<PluginInfo>& plugins() const { return plugins_; }
     [[nodiscard]] const std::vector<RejectedPlugin>& rejected() const { return rejected_; }
@@ -72,6 +80,7 @@ private:
 
     std::vector<std::filesystem::path> folders_;
     std::vector<PluginInfo> plugins_;
+    std::vector<std::shared_ptr<const Plugin>> own_;  // those of add()
     std::vector<RejectedPlugin> rejected_;
     std::vector<UnbuiltPlugin> unbuilt_;
 };

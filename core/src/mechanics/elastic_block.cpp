@@ -21,39 +21,38 @@ void check(const ElasticBlock& block) {
         if (block.cells[i] < 1)
             throw InputError(fmt::format("the elastic block \"{}\" has {} cells along an edge; it needs at least one",
                                          block.name, block.cells[i]));
-        nodes *= block.cells[i] + 1.0;
+        nodes *= static_cast<double>(block.order) * block.cells[i] + 1.0;
     }
     if (3.0 * nodes > std::numeric_limits<std::int32_t>::max())
         throw InputError(
             fmt::format("the elastic block \"{}\" has {:.3g} nodes, which is too many", block.name, nodes));
 }
 
-// The six orders of the axes: a path from (0,0,0) to (1,1,1) along them is a tetrahedron; the odd ones turn it over.
-constexpr std::array<std::array<std::size_t, 3>, 6> orders = {
-    {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
-
 }  // namespace
 
 std::int32_t MultibodySystem::add_elastic_block(const ElasticBlock& block) {
     check(block);
     const auto first = node_count();
-    const auto& cells = block.cells;
+    // Nodes along an edge of a brick, less one.
+    const bool quadratic = block.order == ElementOrder::Quadratic;
+    const std::int32_t parts = quadratic ? 2 : 1;
     using Place = std::array<std::int32_t, 3>;
+    const Place steps = {parts * block.cells[0], parts * block.cells[1], parts * block.cells[2]};
     const auto number = [&](const Place& at) {
-        return first + (at[0] * (cells[1] + 1) + at[1]) * (cells[2] + 1) + at[2];
+        return first + (at[0] * (steps[1] + 1) + at[1]) * (steps[2] + 1) + at[2];
     };
     const auto for_each = [](const Place& end, auto&& visit) {
         for (std::int32_t i = 0; i < end[0]; ++i)
             for (std::int32_t j = 0; j < end[1]; ++j)
                 for (std::int32_t k = 0; k < end[2]; ++k) visit(Place{i, j, k});
     };
-    for_each({cells[0] + 1, cells[1] + 1, cells[2] + 1}, [&](const Place& at) {
+    for_each({steps[0] + 1, steps[1] + 1, steps[2] + 1}, [&](const Place& at) {
         NodeParameters node;
         node.velocity = block.velocity;
         bool surface = false;
         for (std::size_t i = 0; i < 3; ++i) {
-            node.position[i] = block.corner[i] + block.edges[i] * at[i] / cells[i];
-            const bool low = at[i] == 0, high = at[i] == cells[i];
+            node.position[i] = block.corner[i] + block.edges[i] * at[i] / steps[i];
+            const bool low = at[i] == 0, high = at[i] == steps[i];
             surface = surface || low || high;
             node.fixed = node.fixed || (low && block.fixed_faces[2 * i]) || (high && block.fixed_faces[2 * i + 1]);
         }
@@ -62,16 +61,25 @@ std::int32_t MultibodySystem::add_elastic_block(const ElasticBlock& block) {
         if (surface && block.contact_radius > 0.0)
             add_node_contact(added, block.contact_radius, block.contact_material);
     });
-    for_each(cells, [&](const Place& brick) {
-        for (std::size_t order = 0; order < orders.size(); ++order) {
-            Place at = brick;
-            std::array<std::int32_t, 4> nodes{number(at)};
-            for (std::size_t step = 0; step < 3; ++step) {
-                ++at[orders[order][step]];
-                nodes[step + 1] = number(at);
+    for_each(block.cells, [&](const Place& cell) {
+        std::array<Place, 8> corners;
+        for (std::int32_t c = 0; c < 8; ++c)
+            corners[static_cast<std::size_t>(c)] = {parts * (cell[0] + c / 4), parts * (cell[1] + c / 2 % 2),
+                                                    parts * (cell[2] + c % 2)};
+        if (!quadratic) {
+            std::array<std::int32_t, 8> nodes{};
+            for (std::size_t c = 0; c < 8; ++c) nodes[c] = number(corners[c]);
+            return add_brick(nodes, block.material, block.model);
+        }
+        for (const auto& tetrahedron : mechanics::brick_tetrahedra) {
+            std::array<std::int32_t, 10> nodes{};
+            for (std::size_t k = 0; k < 4; ++k) nodes[k] = number(corners[tetrahedron[k]]);
+            for (std::size_t e = 0; e < 6; ++e) {
+                const Place& from = corners[tetrahedron[mechanics::tetrahedron_edges[e][0]]];
+                const Place& to = corners[tetrahedron[mechanics::tetrahedron_edges[e][1]]];
+                nodes[4 + e] = number({(from[0] + to[0]) / 2, (from[1] + to[1]) / 2, (from[2] + to[2]) / 2});
             }
-            if (order >= 3) std::swap(nodes[1], nodes[2]);
-            add_tetrahedron(nodes, block.material, block.model);
+            add_quadratic_tetrahedron(nodes, block.material, block.model);
         }
     });
     return first;

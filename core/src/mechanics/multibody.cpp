@@ -231,6 +231,14 @@ void MultibodySystem::add_bushing(const BushingParameters& bushing) {
 void MultibodySystem::add_load(const LoadParameters& load) {
     auto& self = *implementation_;
     self.must_not_be_finished();
+    if (!load.nodes.empty()) {
+        for (const auto& [node, share] : load.nodes) self.check_node(node, fmt::format("the load \"{}\"", load.name));
+        const bool turns = load.torque[0].value || load.torque[1].value || load.torque[2].value;
+        refuse_unless(load.body == world_body && !load.follower && !turns, "the load", load.name,
+                      "acts on nodes, which take a force in the world frame and nothing else");
+        self.loads.push_back({load});
+        return;
+    }
     self.check_body(load.body, load.name);
     refuse_unless(load.body != world_body, "the load", load.name, "acts on no body");
     const auto at = self.initial_placements();
@@ -406,8 +414,8 @@ Vector3 MultibodySystem::node_position(const State& state, std::int32_t node) co
 }
 std::vector<std::int32_t> MultibodySystem::loose_nodes() const {
     std::vector<bool> held(implementation_->nodes.size());
-    for (const auto& element : implementation_->tetrahedra)
-        for (const auto node : element.nodes()) held[static_cast<std::size_t>(node)] = true;
+    for (const auto& side : implementation_->element_sides)
+        side.for_each_node([&](std::int32_t node) { held[static_cast<std::size_t>(node)] = true; });
     std::vector<std::int32_t> loose;
     for (std::int32_t node = 0; node < node_count(); ++node)
         if (!held[static_cast<std::size_t>(node)]) loose.push_back(node);

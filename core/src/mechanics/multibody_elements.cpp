@@ -21,6 +21,9 @@ void mechanics::check_material(const ElasticMaterial& material) {
         throw InputError(fmt::format("Poisson's ratio is {}; it must lie between -1 and 0.5", material.poisson));
     if (!(material.damping_time >= 0.0))
         throw InputError(fmt::format("the damping time is {} s; it must not be negative", material.damping_time));
+    if (!(material.damping_rate >= 0.0 && std::isfinite(material.damping_rate)))
+        throw InputError(
+            fmt::format("the damping rate is {} 1/s; it must be finite and not negative", material.damping_rate));
 }
 
 void MultibodySystem::Implementation::check_node(std::int32_t node, std::string_view what) const {
@@ -28,29 +31,60 @@ void MultibodySystem::Implementation::check_node(std::int32_t node, std::string_
         throw InputError(fmt::format("{} names the node {}; there are {}", what, node, nodes.size()));
 }
 
+template <int Nodes>
+std::array<Vector3d, Nodes> MultibodySystem::Implementation::positions_of(const std::array<std::int32_t, Nodes>& named,
+                                                                          std::string_view what) const {
+    std::array<Vector3d, Nodes> positions;
+    for (std::size_t k = 0; k < Nodes; ++k) {
+        check_node(named[k], what);
+        positions[k] = vector(nodes[static_cast<std::size_t>(named[k])].parameters.position);
+    }
+    return positions;
+}
+
+template <class Element>
+void MultibodySystem::Implementation::share_mass(const Element& element) {
+    for (std::size_t k = 0; k < element.nodes().size(); ++k)
+        nodes[static_cast<std::size_t>(element.nodes()[k])].parameters.mass += element.mass(k);
+}
+
 void MultibodySystem::add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
                                       ElementModel model) {
     auto& self = *implementation_;
     self.must_not_be_finished();
     mechanics::check_material(material);
-    std::array<Vector3d, 4> positions;
-    for (std::size_t k = 0; k < 4; ++k) {
-        self.check_node(nodes[k], "a tetrahedron");
-        positions[k] = vector(self.nodes[static_cast<std::size_t>(nodes[k])].parameters.position);
-    }
-    self.tetrahedra.emplace_back(nodes, positions, material, model);
-    for (const auto node : nodes)
-        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.25 * self.tetrahedra.back().mass();
+    const auto shape = mechanics::linear_tetrahedron(nodes, self.positions_of<4>(nodes, "a tetrahedron"));
+    self.share_mass(self.linear_tetrahedra.emplace_back(nodes, shape, material, model));
+    mechanics::append_sides(nodes, self.element_sides);
+}
+
+void MultibodySystem::add_quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes,
+                                                const ElasticMaterial& material, ElementModel model) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    mechanics::check_material(material);
+    const auto shape = mechanics::quadratic_tetrahedron(nodes, self.positions_of<10>(nodes, "a tetrahedron"));
+    self.share_mass(self.quadratic_tetrahedra.emplace_back(nodes, shape, material, model));
+    mechanics::append_sides(nodes, self.element_sides);
+}
+
+void MultibodySystem::add_brick(const std::array<std::int32_t, 8>& nodes, const ElasticMaterial& material,
+                                ElementModel model) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    mechanics::check_material(material);
+    const auto shape = mechanics::brick(nodes, self.positions_of<8>(nodes, "a brick"));
+    self.share_mass(self.bricks.emplace_back(nodes, shape, material, model));
+    for (const auto& corners : mechanics::brick_tetrahedra)
+        mechanics::append_sides(
+            std::array<std::int32_t, 4>{nodes[corners[0]], nodes[corners[1]], nodes[corners[2]], nodes[corners[3]]},
+            self.element_sides);
 }
 
 void MultibodySystem::add_cable(const CableParameters& cable) {
     auto& self = *implementation_;
     self.must_not_be_finished();
-    std::array<Vector3d, 2> positions;
-    for (std::size_t k = 0; k < 2; ++k) {
-        self.check_node(cable.nodes[k], fmt::format("the cable \"{}\"", cable.name));
-        positions[k] = vector(self.nodes[static_cast<std::size_t>(cable.nodes[k])].parameters.position);
-    }
+    const auto positions = self.positions_of<2>(cable.nodes, fmt::format("the cable \"{}\"", cable.name));
     const double distance = (positions[1] - positions[0]).norm();
     refuse_unless(distance > 0.0, "the nodes of the cable", cable.name, "coincide");
     refuse_unless(!(cable.rest_length <= 0.0), "the rest length of the cable", cable.name, "must be positive");
@@ -58,8 +92,7 @@ void MultibodySystem::add_cable(const CableParameters& cable) {
                       std::isfinite(cable.young * cable.area * cable.density * cable.damping_time),
                   "the modulus, area, density and damping of the cable", cable.name, "must be positive and finite");
     self.cables.emplace_back(cable.nodes, positions, cable);
-    for (const auto node : cable.nodes)
-        self.nodes[static_cast<std::size_t>(node)].parameters.mass += 0.5 * self.cables.back().mass();
+    self.share_mass(self.cables.back());
 }
 
 void MultibodySystem::add_beam(const BeamParameters& beam) {

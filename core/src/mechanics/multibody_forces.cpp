@@ -159,9 +159,13 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
                     factor * forces.template segment<freedoms>(freedoms * static_cast<Eigen::Index>(a));
     });
     for (const auto& load : self.loads) {
+        const Vector3d force = self.load_factor * at_time(load.parameters.force, state.t);
+        for (const auto& [node, share] : load.parameters.nodes)
+            if (const auto column = node_column(node); column >= 0)
+                Eigen::Map<Vector3d>(result + column) += factor * share * force;
+        if (!load.parameters.nodes.empty()) continue;
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
-        const Vector3d force = self.load_factor * at_time(load.parameters.force, state.t);
         const Vector3d torque = self.load_factor * at_time(load.parameters.torque, state.t);
         if (load.parameters.follower) {
             Eigen::Map<Vector3d>(result + place.column) += factor * (place.A * force);
@@ -211,6 +215,7 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         add_element<Element::freedoms>(K, at, factor, tangent, H);
     });
     for (const auto& load : self.loads) {
+        if (!load.parameters.nodes.empty()) continue;
         const auto& place = self.at[load.parameters.body];
         if (place.column < 0) continue;
         if (load.parameters.follower) {
@@ -252,7 +257,7 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
 bool MultibodySystem::has_stiffness() const {
     const auto& self = *implementation_;
     return !self.springs.empty() || !self.turn_springs.empty() || !self.turn_dampers.empty() || !self.loads.empty() ||
-           !self.tetrahedra.empty() || !self.cables.empty() || !self.beams.empty();
+           !self.element_sides.empty() || !self.cables.empty() || !self.beams.empty();
 }
 
 }  // namespace delassus

@@ -5,9 +5,10 @@
 #include <set>
 
 #include "mechanics/beam.hpp"
-#include "mechanics/elements.hpp"
+#include "mechanics/cable.hpp"
 #include "mechanics/linkage.hpp"
 #include "mechanics/model.hpp"
+#include "mechanics/solid_element.hpp"
 
 namespace delassus {
 
@@ -27,7 +28,10 @@ struct MultibodySystem::Implementation {
     };
     std::vector<CountedAngle> counted;
     std::vector<mechanics::Load> loads;
-    std::vector<mechanics::Tetrahedron> tetrahedra;
+    std::vector<mechanics::LinearTetrahedron> linear_tetrahedra;
+    std::vector<mechanics::QuadraticTetrahedron> quadratic_tetrahedra;
+    std::vector<mechanics::Brick> bricks;
+    std::vector<mechanics::ElementSide> element_sides;  // of all these
     std::vector<mechanics::Cable> cables;
     std::vector<mechanics::Beam> beams;
     std::vector<mechanics::BoundedMotor> bounded_motors;
@@ -74,6 +78,12 @@ struct MultibodySystem::Implementation {
     void must_not_be_finished() const;
     void check_body(BodyIndex body, const std::string& name) const;
     void check_node(std::int32_t node, std::string_view what) const;
+    /// Throws InputError if there is no such node. what: names the element.
+    template <int Nodes>
+    [[nodiscard]] std::array<mechanics::Vector3d, Nodes> positions_of(const std::array<std::int32_t, Nodes>& named,
+                                                                      std::string_view what) const;
+    template <class Element>
+    void share_mass(const Element& element);
 
     /// Placements of all bodies so far at t = 0, without columns.
     [[nodiscard]] mechanics::Placements initial_placements() const;
@@ -107,7 +117,9 @@ struct MultibodySystem::Implementation {
                 visit(element, corners);
             }
         };
-        each(tetrahedra);
+        each(linear_tetrahedra);
+        each(quadratic_tetrahedra);
+        each(bricks);
         each(cables);
         for (const auto& beam : beams) visit(beam, mechanics::Beam::Ends{at[beam.bodies()[0]], at[beam.bodies()[1]]});
     }

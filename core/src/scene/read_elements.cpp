@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Elastic parts of a scene: blocks and meshes of tetrahedra, cables between nodes.
 #include <array>
+#include <limits>
 #include <optional>
 
 #include "scene/system_reader.hpp"
@@ -23,6 +24,13 @@ ElementModel element_model(const Source& source, const YAML::Node& node) {
     if (name == names[0]) return ElementModel::Corotational;
     if (name == names[1]) return ElementModel::StVenantKirchhoff;
     source.refuse(node, fmt::format("there is no element model \"{}\"{}", name, nearest_name_hint(name, names)));
+}
+
+ElementOrder element_order(const Source& source, const YAML::Node& node) {
+    const auto order = value<int>(source, node, "order", "a whole number");
+    if (order != 1 && order != 2)
+        source.refuse(node, fmt::format("\"order\" is {}; elements have order 1 or 2", order));
+    return static_cast<ElementOrder>(order);
 }
 
 }  // namespace
@@ -52,7 +60,9 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::elastic_handlers
             number(body.material.poisson, "poisson", finite_number),
             number(body.material.density, "density", positive_number),
             number(body.material.damping_time, "damping_time", nonnegative_number),
+            number(body.material.damping_rate, "damping_rate", nonnegative_number),
             {"model", [this, &body](const YAML::Node& n) { body.model = element_model(source_, n); }},
+            {"order", [this, &body](const YAML::Node& n) { body.order = element_order(source_, n); }},
             {"velocity", [this, &body](const YAML::Node& n) { body.velocity = vector3(source_, n, "velocity"); }},
             {"contact", read_contact},
             {"repeat", [](const YAML::Node&) {}}};
@@ -88,9 +98,44 @@ void SystemReader::read_elastic_block(const YAML::Node& item, const Copy& copy) 
         source_.refuse(item,
                        fmt::format("elastic block \"{}\" lacks the key \"{}\"", block.name, edges ? "cells" : "edges"));
     const auto first = at(item, [&] { return result_.system->add_elastic_block(block); });
-    take_name(item, blocks_, "elastic block", block.name, first);
+    take_name(item, blocks_, "elastic block", block.name, static_cast<std::int32_t>(elastic_.size()));
+    AlignedBox box{block.corner, block.corner};
+    for (std::size_t i = 0; i < 3; ++i) box.upper[i] += block.edges[i];
+    elastic_.push_back({first, result_.system->node_count() - first, box});
     if (block.contact_radius > 0.0) result_.node_contact_material.push_back(block.contact_material);
     result_.elastic_blocks.push_back(block);
+}
+
+AlignedBox SystemReader::read_box(const YAML::Node& node, std::string_view what) {
+    std::optional<Vector3> lower, upper;
+    read_map(source_, node, what,
+             {{"lower", [&](const YAML::Node& n) { lower = vector3(source_, n, "lower"); }},
+              {"upper", [&](const YAML::Node& n) { upper = vector3(source_, n, "upper"); }}});
+    if (!lower || !upper) source_.refuse(node, fmt::format("{} lacks the key \"{}\"", what, lower ? "upper" : "lower"));
+    return {*lower, *upper};
+}
+
+std::vector<NodeShare> SystemReader::sides_named(const YAML::Node& item, const SideKeys& keys, const Copy& copy) {
+    const Elastic& body = elastic_[static_cast<std::size_t>(elastic_named(keys.elastic, "elastic", copy))];
+    const std::string name = scalar(source_, keys.elastic, "elastic");
+    if (keys.face.IsDefined() == keys.box.IsDefined())
+        source_.refuse(item, fmt::format("the load on \"{}\" needs one of \"face\" and \"box\"", name));
+    AlignedBox box;
+    if (keys.box.IsDefined()) {
+        box = read_box(keys.box, "\"box\"");
+    } else {
+        if (!body.box) source_.refuse(keys.face, fmt::format("\"{}\" is a mesh and has no faces; use \"box\"", name));
+        box = *body.box;
+        const std::size_t number = face(source_, keys.face), axis = number / 2;
+        const double slack = 1e-6 * (box.upper[axis] - box.lower[axis]);
+        // The other coordinates are free, so that rounding of the nodes' positions does not matter.
+        const double place = number % 2 == 0 ? box.lower[axis] : box.upper[axis];
+        constexpr double any = std::numeric_limits<double>::infinity();
+        box = {{-any, -any, -any}, {any, any, any}};
+        box.lower[axis] = place - slack;
+        box.upper[axis] = place + slack;
+    }
+    return at(item, [&] { return result_.system->spread_over_sides(body.first, body.nodes, box); });
 }
 
 void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
@@ -99,16 +144,6 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
     std::string file;
     double scale = 1.0;
     int refinements = 0;
-    const auto read_box = [this](const YAML::Node& node) {
-        std::optional<Vector3> lower, upper;
-        read_map(source_, node, "a box of \"fixed_boxes\"",
-                 {{"lower", [&](const YAML::Node& n) { lower = vector3(source_, n, "lower"); }},
-                  {"upper", [&](const YAML::Node& n) { upper = vector3(source_, n, "upper"); }}});
-        if (!lower || !upper)
-            source_.refuse(node,
-                           fmt::format("a box of \"fixed_boxes\" lacks the key \"{}\"", lower ? "upper" : "lower"));
-        return AlignedBox{*lower, *upper};
-    };
     auto handlers = elastic_handlers(body);
     handlers.insert(
         handlers.end(),
@@ -121,7 +156,7 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
          {"orientation", [&](const YAML::Node& n) { body.pose.orientation = orientation(source_, n); }},
          {"fixed_boxes", [&](const YAML::Node& n) {
               for (const YAML::Node& one : elements(source_, n, "fixed_boxes"))
-                  body.fixed_boxes.push_back(read_box(one));
+                  body.fixed_boxes.push_back(read_box(one, "a box of \"fixed_boxes\""));
           }}});
     read_map(source_, item, "an elastic mesh", handlers);
     if (file.empty()) source_.refuse(item, fmt::format("elastic mesh \"{}\" lacks the key \"file\"", body.name));
@@ -131,20 +166,14 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
         body.mesh = read_tetrahedral_mesh(source_.folder() / file, scale, refinements);
         return result_.system->add_elastic_mesh(body);
     });
-    take_name(item, blocks_, "elastic mesh", body.name, first);
+    take_name(item, blocks_, "elastic mesh", body.name, static_cast<std::int32_t>(elastic_.size()));
+    elastic_.push_back({first, result_.system->node_count() - first, {}});
     if (body.contact_radius > 0.0) result_.node_contact_material.push_back(body.contact_material);
 }
 
 void SystemReader::read_cable(const YAML::Node& item, const Copy& copy) {
     CableParameters cable;
     bool nodes = false;
-    const auto node_named = [&](const YAML::Node& node) {
-        const std::string name = name_in(source_, node, "nodes", copy);
-        const auto found = nodes_.find(name);
-        if (found == nodes_.end())
-            source_.refuse(node, fmt::format("\"nodes\" names \"{}\", but there is no such node", name));
-        return found->second;
-    };
     read_map(
         source_, item, "a cable",
         {{"name", [&](const YAML::Node& n) { cable.name = name_in(source_, n, "name", copy); }},
@@ -152,7 +181,7 @@ void SystemReader::read_cable(const YAML::Node& item, const Copy& copy) {
           [&](const YAML::Node& n) {
               const auto ends = elements(source_, n, "nodes");
               if (ends.size() != 2) source_.refuse(n, "\"nodes\" must be the names of two nodes");
-              cable.nodes = {node_named(ends[0]), node_named(ends[1])};
+              cable.nodes = {node_named(ends[0], "nodes", copy), node_named(ends[1], "nodes", copy)};
               nodes = true;
           }},
          {"young", [&](const YAML::Node& n) { cable.young = positive_number(source_, n, "young"); }},

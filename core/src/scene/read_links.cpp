@@ -279,6 +279,12 @@ std::array<Motion, 3> SystemReader::three_motions(const YAML::Node& node, std::s
 void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
     LoadParameters load;
     bool body = false, point = false;
+    YAML::Node node{YAML::NodeType::Undefined};
+    SideKeys sides;
+    std::string of_bodies;  // the first key that only a load on a body has
+    const auto note = [&](const char* key) {
+        if (of_bodies.empty()) of_bodies = key;
+    };
     read_map(source_, item, "a load",
              {{"name", [&](const YAML::Node& n) { load.name = name_in(source_, n, "name", copy); }},
               {"body",
@@ -287,15 +293,41 @@ void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
                    body = true;
                }},
               {"force", [&](const YAML::Node& n) { load.force = three_motions(n, "force"); }},
-              {"torque", [&](const YAML::Node& n) { load.torque = three_motions(n, "torque"); }},
+              {"node", [&](const YAML::Node& n) { node.reset(n); }},
+              {"elastic", [&](const YAML::Node& n) { sides.elastic.reset(n); }},
+              {"face", [&](const YAML::Node& n) { sides.face.reset(n); }},
+              {"box", [&](const YAML::Node& n) { sides.box.reset(n); }},
+              {"torque",
+               [&](const YAML::Node& n) {
+                   load.torque = three_motions(n, "torque");
+                   note("torque");
+               }},
               {"point",
                [&](const YAML::Node& n) {
                    load.point = point_in(source_, n, "point", copy);
                    point = true;
+                   note("point");
                }},
-              {"follower", [&](const YAML::Node& n) { load.follower = truth(source_, n, "follower"); }},
+              {"follower",
+               [&](const YAML::Node& n) {
+                   load.follower = truth(source_, n, "follower");
+                   note("follower");
+               }},
               {"repeat", [](const YAML::Node&) {}}});
-    if (!body) source_.refuse(item, fmt::format("load \"{}\" lacks the key \"body\"", load.name));
+    if (int{body} + int{node.IsDefined()} + int{sides.elastic.IsDefined()} != 1)
+        source_.refuse(item, fmt::format("load \"{}\" needs one of \"body\", \"node\" and \"elastic\"", load.name));
+    if (!sides.elastic.IsDefined() && (sides.face.IsDefined() || sides.box.IsDefined()))
+        source_.refuse(item, fmt::format("\"face\" and \"box\" of load \"{}\" need \"elastic\"", load.name));
+    if (!body) {
+        if (!of_bodies.empty())
+            source_.refuse(item, fmt::format("load \"{}\" acts on nodes, which take no \"{}\"", load.name, of_bodies));
+        load.nodes = node.IsDefined() ? std::vector<NodeShare>{{node_named(node, "node", copy), 1.0}}
+                                      : sides_named(item, sides, copy);
+        take_name(item, others_, "load", load.name, 0);
+        at(item, [&] { result_.system->add_load(load); });
+        result_.loads.push_back(load);
+        return;
+    }
     if (!point) load.point = position(load.body);
     take_name(item, others_, "load", load.name, 0);
     if (!moves(load.body)) {

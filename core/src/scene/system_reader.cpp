@@ -239,6 +239,24 @@ std::int32_t SystemReader::material_named(const YAML::Node& node, std::string_vi
     return found->second;
 }
 
+std::int32_t SystemReader::node_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
+    const std::string name = name_in(source_, node, key, copy);
+    const auto found = nodes_.find(name);
+    if (found == nodes_.end())
+        source_.refuse(node,
+                       fmt::format("\"{}\" names \"{}\", but there is no such node{}", key, name, hint(name, nodes_)));
+    return found->second;
+}
+
+std::int32_t SystemReader::elastic_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
+    const std::string name = name_in(source_, node, key, copy);
+    const auto found = blocks_.find(name);
+    if (found == blocks_.end())
+        source_.refuse(node, fmt::format("\"{}\" names \"{}\", but there is no such elastic block or mesh{}", key, name,
+                                         hint(name, blocks_)));
+    return found->second;
+}
+
 BodyIndex SystemReader::body_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
     const std::string name = name_in(source_, node, key, copy);
     if (name == "world") return world_body;

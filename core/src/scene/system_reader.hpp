@@ -75,6 +75,15 @@ private:
     ContactMaterial read_contact_material(const YAML::Node& node, std::string_view name,
                                           std::vector<std::pair<std::string_view, Handler>> more = {});
 
+    std::int32_t node_named(const YAML::Node& node, std::string_view key, const Copy& copy);
+    /// Its place in elastic_.
+    std::int32_t elastic_named(const YAML::Node& node, std::string_view key, const Copy& copy);
+    AlignedBox read_box(const YAML::Node& node, std::string_view what);
+    /// The keys `elastic`, `face` and `box` of a load.
+    struct SideKeys {
+        YAML::Node elastic{YAML::NodeType::Undefined}, face{YAML::NodeType::Undefined}, box{YAML::NodeType::Undefined};
+    };
+    std::vector<NodeShare> sides_named(const YAML::Node& item, const SideKeys& keys, const Copy& copy);
     std::int32_t material_named(const YAML::Node& node, std::string_view key);
     /// Also "world".
     BodyIndex body_named(const YAML::Node& node, std::string_view key, const Copy& copy);
@@ -105,6 +114,12 @@ private:
     const Source& source_;
     SceneSystem& result_;
     std::map<std::string, YAML::Node, std::less<>> lists_;
+    /// Of each elastic block or mesh, by the number in blocks_.
+    struct Elastic {
+        std::int32_t first = 0, nodes = 0;
+        std::optional<AlignedBox> box;  ///< of a block
+    };
+    std::vector<Elastic> elastic_;
     Numbers bodies_, nodes_, blocks_, joints_, materials_, others_;
     std::optional<Vector3> gravity_;
     std::optional<double> envelope_, step_, end_;

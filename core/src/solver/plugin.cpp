@@ -157,4 +157,15 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
     return plugin;
 }
 
+std::shared_ptr<const Plugin> Plugin::of(const delassus_plugin_descriptor& descriptor) {
+    std::shared_ptr<Plugin> plugin(new Plugin);
+    try {
+        plugin->descriptor_ = shake_hands(&descriptor);
+        plugin->info_ = read_descriptor(plugin->descriptor_);
+    } catch (const Error& error) {
+        throw PluginError(fmt::format("the plugin {}: {}", text_of(descriptor.name), error.what()));
+    }
+    return plugin;
+}
+
 }  // namespace delassus

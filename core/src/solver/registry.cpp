@@ -93,6 +93,16 @@ void Registry::scan(const fs::path& folder) {
         rejected_.push_back({library, "it has no sidecar; `delassus plugins describe FILE --sidecar` writes one"});
 }
 
+void Registry::add(std::shared_ptr<const Plugin> plugin) {
+    const std::string& name = plugin->info().name;
+    const auto place = std::lower_bound(plugins_.begin(), plugins_.end(), name,
+                                        [](const PluginInfo& info, const std::string& key) { return info.name < key; });
+    if (name == auto_name || (place != plugins_.end() && place->name == name))
+        throw InputError(fmt::format("there is a solver \"{}\" already", name));
+    plugins_.insert(place, plugin->info());
+    own_.push_back(std::move(plugin));
+}
+
 const PluginInfo& Registry::find(const std::string& name) const {
     for (const auto& plugin : plugins_)
         if (plugin.name == name) return plugin;
@@ -109,6 +119,8 @@ const PluginInfo& Registry::find(const std::string& name) const {
 
 std::shared_ptr<const Plugin> Registry::load(const std::string& name_or_path) const {
     if (is_library_path(name_or_path)) return Plugin::load(name_or_path);
+    for (const auto& plugin : own_)
+        if (plugin->info().name == name_or_path) return plugin;
     const PluginInfo& listed = find(name_or_path);
     auto plugin = Plugin::load(listed.library);
     if (sidecar_text(plugin->info()) != sidecar_text(listed))

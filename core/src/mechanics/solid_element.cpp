@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mechanics/solid_element.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "delassus/error.hpp"
+
+namespace delassus::mechanics {
+
+namespace {
+
+constexpr std::array<std::array<std::size_t, 3>, 4> tetrahedron_sides = {{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
+
+struct Corners {
+    double volume = 0.0;
+    Eigen::Matrix<double, 3, 4> gradient;  // of the barycentric coordinates
+};
+
+template <class Nodes, class Positions>
+Corners corners_of(const Nodes& nodes, const Positions& positions) {
+    Matrix3d edges;
+    for (int i = 0; i < 3; ++i) edges.col(i) = positions[static_cast<std::size_t>(i) + 1] - positions[0];
+    Corners result;
+    result.volume = edges.determinant() / 6.0;
+    const double longest = edges.colwise().norm().maxCoeff();
+    if (!(result.volume > 1e-12 * longest * longest * longest))
+        throw InputError(
+            fmt::format("the tetrahedron of nodes {}, {}, {}, {} has the volume {:.3g} m³; its nodes must be "
+                        "ordered so that it is positive",
+                        nodes[0], nodes[1], nodes[2], nodes[3], result.volume));
+    const Matrix3d inverse = edges.inverse();
+    result.gradient.rightCols<3>() = inverse.transpose();
+    result.gradient.col(0) = -result.gradient.rightCols<3>().rowwise().sum();
+    return result;
+}
+
+Matrix3d symmetric_part(const Matrix3d& A) {
+    return 0.5 * (A + A.transpose());
+}
+
+}  // namespace
+
+void append_sides(const std::array<std::int32_t, 4>& nodes, std::vector<ElementSide>& sides) {
+    for (const auto& [i, j, k] : tetrahedron_sides) sides.push_back({{nodes[i], nodes[j], nodes[k]}});
+}
+
+void append_sides(const std::array<std::int32_t, 10>& nodes, std::vector<ElementSide>& sides) {
+    const auto middle = [&](std::size_t i, std::size_t j) {
+        const std::array ends{std::min(i, j), std::max(i, j)};
+        const auto edge = std::find(tetrahedron_edges.begin(), tetrahedron_edges.end(), ends);
+        return nodes[4 + static_cast<std::size_t>(edge - tetrahedron_edges.begin())];
+    };
+    for (const auto& [i, j, k] : tetrahedron_sides)
+        sides.push_back({{nodes[i], nodes[j], nodes[k]}, {middle(i, j), middle(j, k), middle(k, i)}});
+}
+
+std::vector<ElementSide> outer_sides(std::span<const ElementSide> sides) {
+    std::vector<std::pair<std::array<std::int32_t, 3>, std::size_t>> sorted;  // corners, ascending, and the side
+    for (std::size_t k = 0; k < sides.size(); ++k) {
+        sorted.emplace_back(sides[k].corners, k);
+        std::sort(sorted.back().first.begin(), sorted.back().first.end());
+    }
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<ElementSide> result;
+    for (std::size_t k = 0; k < sorted.size();) {
+        std::size_t end = k + 1;
+        while (end < sorted.size() && sorted[end].first == sorted[k].first) ++end;
+        if (end == k + 1) result.push_back(sides[sorted[k].second]);
+        k = end;
+    }
+    return result;
+}
+
+SolidShape<4, 1> linear_tetrahedron(const std::array<std::int32_t, 4>& nodes,
+                                    const std::array<Vector3d, 4>& positions) {
+    const Corners corners = corners_of(nodes, positions);
+    return {{corners.volume}, {corners.gradient}, {0.25, 0.25, 0.25, 0.25}};
+}
+
+// With the barycentric coordinates L_i, N_i = L_i (2 L_i − 1) at the corners and N_ij = 4 L_i L_j in the middles. The
+// four points, with L = (a, b, b, b) and so on, integrate polynomials of degree two exactly, as the energy of small
+// strains is (Hammer and Stroud 1956). The masses are in proportion to the diagonal of the consistent mass matrix
+// (Hinton, Rock and Zienkiewicz 1976): equal shares of the total would be negative at the corners.
+SolidShape<10, 4> quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes,
+                                        const std::array<Vector3d, 10>& positions) {
+    const Corners corners = corners_of(nodes, positions);
+    for (std::size_t e = 0; e < 6; ++e) {
+        const Vector3d &from = positions[tetrahedron_edges[e][0]], &to = positions[tetrahedron_edges[e][1]];
+        if (!((positions[4 + e] - 0.5 * (from + to)).norm() <= 1e-6 * (to - from).norm()))
+            throw InputError(fmt::format("the node {} is not in the middle between the nodes {} and {}", nodes[4 + e],
+                                         nodes[tetrahedron_edges[e][0]], nodes[tetrahedron_edges[e][1]]));
+    }
+    const double b = (5.0 - std::sqrt(5.0)) / 20.0, a = 1.0 - 3.0 * b;
+    SolidShape<10, 4> shape;
+    for (std::size_t p = 0; p < 4; ++p) {
+        std::array<double, 4> L{b, b, b, b};
+        L[p] = a;
+        shape.volume[p] = 0.25 * corners.volume;
+        for (std::size_t i = 0; i < 4; ++i)
+            shape.gradient[p].col(static_cast<Eigen::Index>(i)) =
+                (4.0 * L[i] - 1.0) * corners.gradient.col(static_cast<Eigen::Index>(i));
+        for (std::size_t e = 0; e < 6; ++e) {
+            const auto i = tetrahedron_edges[e][0], j = tetrahedron_edges[e][1];
+            shape.gradient[p].col(static_cast<Eigen::Index>(4 + e)) =
+                4.0 * (L[i] * corners.gradient.col(static_cast<Eigen::Index>(j)) +
+                       L[j] * corners.gradient.col(static_cast<Eigen::Index>(i)));
+        }
+    }
+    for (std::size_t k = 0; k < 10; ++k) shape.share[k] = k < 4 ? 1.0 / 36.0 : 4.0 / 27.0;
+    return shape;
+}
+
+SolidShape<8, 6> brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vector3d, 8>& positions) {
+    SolidShape<8, 6> shape;
+    double volume = 0.0;
+    for (std::size_t p = 0; p < 6; ++p) {
+        std::array<std::int32_t, 4> named{};
+        std::array<Vector3d, 4> at;
+        for (std::size_t k = 0; k < 4; ++k) {
+            named[k] = nodes[brick_tetrahedra[p][k]];
+            at[k] = positions[brick_tetrahedra[p][k]];
+        }
+        const Corners corners = corners_of(named, at);
+        shape.volume[p] = corners.volume;
+        volume += corners.volume;
+        shape.gradient[p].setZero();
+        for (std::size_t k = 0; k < 4; ++k) {
+            shape.gradient[p].col(static_cast<Eigen::Index>(brick_tetrahedra[p][k])) =
+                corners.gradient.col(static_cast<Eigen::Index>(k));
+            shape.share[brick_tetrahedra[p][k]] += 0.25 * corners.volume;
+        }
+    }
+    for (double& share : shape.share) share /= volume;
+    return shape;
+}
+
+// With the deformation gradient F = Σ x_a ⊗ g_a (g_a = ∇N_a), the first Piola–Kirchhoff stress P and the volume V_p
+// that a point stands for, node a feels f_a = −Σ V_p P g_a, and moving node b by dx changes P by dP[dx ⊗ g_b].
+//
+// St. Venant–Kirchhoff: E = ½(FᵀF − I), θ = tr(E), energy density μ‖E‖² + ½ λ θ², so that
+//     P = F (2μ E + λ θ I),     dP = dF (2μ E + λ θ I) + 2μ F dE + λ dθ F,     dE = sym(Fᵀ dF), dθ = F : dF.
+//
+// Corotational linear: F = R U (polar decomposition), θ = tr(U − I), energy density μ‖F − R‖² + ½ λ θ², so that
+//     P = 2μ (F − R) + λ θ R,     dP = 2μ dF + (λ θ − 2μ) dR + λ dθ R,     dθ = R : dF,
+// where dR = R [ω]× and Y = Rᵀ dF gives [ω]× U + U [ω]× = Y − Yᵀ, that is (tr(U) I − U) ω = axial vector of Y − Yᵀ.
+// K is the derivative of the forces exactly, not the usual R K₀ Rᵀ.
+//
+// In an element θ is the mean Σ V_p θ_p/V: nothing else changes above, and with B the one of F and R that θ's
+// derivative names, dθ = sᵀdx/V with s_a = Σ V_p B g_a. So the last term of dP gives the rank-one matrix (λ/V) s sᵀ.
+//
+// Damping, for both: a stress F (2μτ Ė + λτ tr(Ė) I) with Ė = sym(Fᵀ Ḟ), which rigid motion does not feel; tr(Ė) is
+// the mean of F : Ḟ likewise. Damping by the mass adds −α m_a v_a.
+template <int Nodes, int Points>
+struct SolidElement<Nodes, Points>::Point {
+    Matrix3d F, rate;
+    Matrix3d R = Matrix3d::Identity();
+    Matrix3d turning = Matrix3d::Zero();  // (tr(U) I − U)⁻¹
+    double theta = 0.0;
+};
+
+template <int Nodes, int Points>
+struct SolidElement<Nodes, Points>::Strain {
+    std::array<Point, Points> points;
+    double theta = 0.0, rate = 0.0;  // the means of θ and of tr(Ė)
+};
+
+template <int Nodes, int Points>
+SolidElement<Nodes, Points>::SolidElement(const std::array<std::int32_t, Nodes>& nodes,
+                                          const SolidShape<Nodes, Points>& shape, const ElasticMaterial& material,
+                                          ElementModel model)
+    : nodes_(nodes),
+      model_(model),
+      lambda_(material.young * material.poisson / ((1.0 + material.poisson) * (1.0 - 2.0 * material.poisson))),
+      mu_(0.5 * material.young / (1.0 + material.poisson)),
+      density_(material.density),
+      damping_(material.damping_time),
+      damping_rate_(material.damping_rate),
+      shape_(shape) {
+    for (const double volume : shape.volume) volume_ += volume;
+}
+
+template <int Nodes, int Points>
+typename SolidElement<Nodes, Points>::Strain SolidElement<Nodes, Points>::strain(const Placements& at) const {
+    Eigen::Matrix<double, 3, Nodes> x, v;
+    for (std::size_t a = 0; a < Nodes; ++a) {
+        x.col(static_cast<Eigen::Index>(a)) = at[a].x;
+        v.col(static_cast<Eigen::Index>(a)) = at[a].v;
+    }
+    Strain result;
+    for (std::size_t p = 0; p < Points; ++p) {
+        Point& point = result.points[p];
+        point.F = x * shape_.gradient[p].transpose();
+        point.rate = v * shape_.gradient[p].transpose();
+        if (model_ == ElementModel::Corotational) {
+            const Eigen::JacobiSVD<Matrix3d> svd(point.F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+            Matrix3d W = svd.matrixU();
+            Vector3d values = svd.singularValues();
+            if (W.determinant() * svd.matrixV().determinant() < 0.0) {  // an inverted element: the nearest rotation
+                W.col(2) *= -1.0;
+                values[2] *= -1.0;
+            }
+            point.R = W * svd.matrixV().transpose();
+            const Matrix3d U = svd.matrixV() * values.asDiagonal() * svd.matrixV().transpose();
+            const Matrix3d sum = U.trace() * Matrix3d::Identity() - U;
+            if (std::abs(sum.determinant()) > 1e-12) point.turning = sum.inverse();
+            point.theta = U.trace() - 3.0;
+        } else {
+            point.theta = 0.5 * (point.F.squaredNorm() - 3.0);
+        }
+        result.theta += shape_.volume[p] / volume_ * point.theta;
+        result.rate += shape_.volume[p] / volume_ * point.F.cwiseProduct(point.rate).sum();
+    }
+    return result;
+}
+
+template <int Nodes, int Points>
+double SolidElement<Nodes, Points>::energy(const Placements& at) const {
+    const Strain now = strain(at);
+    double result = 0.5 * lambda_ * volume_ * now.theta * now.theta;
+    for (std::size_t p = 0; p < Points; ++p) {
+        const Point& point = now.points[p];
+        const double square = model_ == ElementModel::Corotational
+                                  ? (point.F - point.R).squaredNorm()
+                                  : 0.25 * (point.F.transpose() * point.F - Matrix3d::Identity()).squaredNorm();
+        result += shape_.volume[p] * mu_ * square;
+    }
+    return result;
+}
+
+template <int Nodes, int Points>
+void SolidElement<Nodes, Points>::force(const Placements& at, Forces& result) const {
+    const Strain now = strain(at);
+    Eigen::Matrix<double, 3, Nodes> f = Eigen::Matrix<double, 3, Nodes>::Zero();
+    for (std::size_t p = 0; p < Points; ++p) {
+        const Point& point = now.points[p];
+        Matrix3d P;
+        if (model_ == ElementModel::Corotational) {
+            P = 2.0 * mu_ * (point.F - point.R) + lambda_ * now.theta * point.R;
+        } else {
+            P = mu_ * point.F * (point.F.transpose() * point.F - Matrix3d::Identity()) + lambda_ * now.theta * point.F;
+        }
+        if (damping_ > 0.0)
+            P += damping_ * (2.0 * mu_ * point.F * symmetric_part(point.F.transpose() * point.rate) +
+                             lambda_ * now.rate * point.F);
+        f -= shape_.volume[p] * P * shape_.gradient[p];
+    }
+    if (damping_rate_ > 0.0)
+        for (std::size_t a = 0; a < Nodes; ++a)
+            f.col(static_cast<Eigen::Index>(a)) -= damping_rate_ * mass(a) * at[a].v;
+    result = Eigen::Map<const Forces>(f.data());
+}
+
+template <int Nodes, int Points>
+void SolidElement<Nodes, Points>::stiffness(const Placements& at, Matrix& result) const {
+    using Columns = Eigen::Matrix<double, 3, Nodes>;
+    const Strain now = strain(at);
+    Columns s = Columns::Zero(), swelling = Columns::Zero(), swelling_rate = Columns::Zero();
+    result.setZero();
+    for (std::size_t p = 0; p < Points; ++p) {
+        const Point& point = now.points[p];
+        const Columns& g = shape_.gradient[p];
+        const double volume = shape_.volume[p];
+        const bool corotational = model_ == ElementModel::Corotational;
+        s += volume * (corotational ? point.R : point.F) * g;
+        Matrix3d S = Matrix3d::Zero();
+        if (!corotational)
+            S = mu_ * (point.F.transpose() * point.F - Matrix3d::Identity()) +
+                lambda_ * now.theta * Matrix3d::Identity();
+        if (damping_ > 0.0) {
+            S += damping_ * (2.0 * mu_ * symmetric_part(point.F.transpose() * point.rate) +
+                             lambda_ * now.rate * Matrix3d::Identity());
+            swelling += volume * point.F * g;
+            swelling_rate += volume * point.rate * g;
+        }
+        for (Eigen::Index b = 0; b < Nodes; ++b)
+            for (int j = 0; j < 3; ++j) {
+                const Matrix3d dF = Vector3d::Unit(j) * g.col(b).transpose();
+                Matrix3d dP = dF * S;
+                if (corotational) {
+                    const Matrix3d Y = point.R.transpose() * dF;
+                    const Vector3d axial(Y(2, 1) - Y(1, 2), Y(0, 2) - Y(2, 0), Y(1, 0) - Y(0, 1));
+                    dP += 2.0 * mu_ * dF +
+                          (lambda_ * now.theta - 2.0 * mu_) * point.R * skew(Vector3d(point.turning * axial));
+                } else {
+                    dP += 2.0 * mu_ * point.F * symmetric_part(point.F.transpose() * dF);
+                }
+                if (damping_ > 0.0) dP += 2.0 * mu_ * damping_ * point.F * symmetric_part(dF.transpose() * point.rate);
+                const Columns change = volume * dP * g;
+                result.col(3 * b + j) += Eigen::Map<const Forces>(change.data());
+            }
+    }
+    const Eigen::Map<const Forces> along(s.data());
+    result += lambda_ / volume_ * along * along.transpose();
+    if (damping_ > 0.0)
+        result += damping_ * lambda_ / volume_ * Eigen::Map<const Forces>(swelling.data()) *
+                  Eigen::Map<const Forces>(swelling_rate.data()).transpose();
+}
+
+template <int Nodes, int Points>
+void SolidElement<Nodes, Points>::damping(const Placements& at, Matrix& result) const {
+    using Columns = Eigen::Matrix<double, 3, Nodes>;
+    const Strain now = strain(at);
+    Columns swelling = Columns::Zero();
+    result.setZero();
+    for (std::size_t p = 0; p < Points; ++p) {
+        const Matrix3d& F = now.points[p].F;
+        const Columns& g = shape_.gradient[p];
+        swelling += shape_.volume[p] * F * g;
+        for (Eigen::Index b = 0; b < Nodes; ++b)
+            for (int j = 0; j < 3; ++j) {
+                const Matrix3d dF = Vector3d::Unit(j) * g.col(b).transpose();
+                const Columns change =
+                    2.0 * mu_ * damping_ * shape_.volume[p] * F * symmetric_part(F.transpose() * dF) * g;
+                result.col(3 * b + j) += Eigen::Map<const Forces>(change.data());
+            }
+    }
+    const Eigen::Map<const Forces> along(swelling.data());
+    result += damping_ * lambda_ / volume_ * along * along.transpose();
+    for (std::size_t a = 0; a < Nodes; ++a)
+        result.diagonal().template segment<3>(3 * static_cast<Eigen::Index>(a)).array() += damping_rate_ * mass(a);
+}
+
+template class SolidElement<4, 1>;
+template class SolidElement<10, 4>;
+template class SolidElement<8, 6>;
+
+}  // namespace delassus::mechanics

@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Solvers that are classes of Python: plugins whose operations call the methods of an object.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <deque>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "delassus/needs.hpp"
+#include "delassus/registry.hpp"
+#include "delassus/solver.hpp"
+#include "problems.hpp"
+
+namespace delassus::python {
+
+/// A class of Python and its plugin. It lasts as long as the process, as what Python still refers to does.
+struct SolverClass {
+    py::object type;
+    std::string name, version, description, licence;
+    struct Row {
+        std::string key, default_value;
+        delassus_option_type type = DELASSUS_OPTION_TEXT;
+    };
+    std::deque<Row> rows;
+    std::vector<delassus_option> options;
+    delassus_plugin_descriptor descriptor{};
+};
+
+/// The classes so far. The border's create() has no argument that names a class, so each class has a create() of its
+/// own.
+inline std::vector<SolverClass*>& solver_classes() {
+    static auto* const classes = new std::vector<SolverClass*>;
+    return *classes;
+}
+inline constexpr std::size_t most_solver_classes = 64;
+
+/// What Python sees of a request, and what it answers.
+class SolveRequest {
+public:
+    SolveRequest(const delassus_request& raw, const delassus_problem& problem, const double* x, const double* lambda)
+        : raw_(&raw), n_(problem.n), m_(problem.m) {
+        if (raw.warm_start)
+            start = py::make_tuple(array_of(std::vector<double>(x, x + n_)),
+                                   array_of(std::vector<double>(lambda, lambda + m_)));
+    }
+    void end() { raw_ = nullptr; }
+
+    [[nodiscard]] double tolerance() const { return raw().tolerance; }
+    [[nodiscard]] std::int64_t max_iterations() const { return raw().max_iterations; }
+    [[nodiscard]] double time_limit() const { return raw().time_limit; }
+    /// Shows an iterate; whether the solver is to go on.
+    bool show(std::int64_t iteration, const Reals& lambda, const std::optional<Reals>& x) {
+        const auto lambda_values = sized(lambda, m_, "lam");
+        const auto x_values = x ? sized(*x, n_, "x") : std::vector<double>();
+        iterations = iteration;
+        if (!raw().progress) return true;
+        std::int32_t answer = DELASSUS_CONTINUE;
+        {
+            const py::gil_scoped_release without_gil;
+            answer =
+                raw().progress(raw().progress_context, iteration, x ? x_values.data() : nullptr, lambda_values.data());
+        }
+        if (answer == DELASSUS_STOP_TIME) stopped = DELASSUS_TIME_LIMIT;
+        if (answer == DELASSUS_STOP_CANCEL) stopped = DELASSUS_CANCELLED;
+        return answer == DELASSUS_CONTINUE;
+    }
+    static std::vector<double> sized(const Reals& values, std::int32_t size, const char* name) {
+        auto result = vector_of(values, name);
+        if (result.size() != static_cast<std::size_t>(size))
+            throw InputError(fmt::format("{} has {} entries; it must have {}", name, result.size(), size));
+        return result;
+    }
+
+    std::int64_t iterations = 0;
+    py::object start = py::none();
+    std::optional<delassus_status> stopped;
+
+private:
+    [[nodiscard]] const delassus_request& raw() const {
+        if (!raw_) throw Error("this request belongs to a solve that has ended");
+        return *raw_;
+    }
+    const delassus_request* raw_;
+    std::int32_t n_, m_;
+};
+
+/// The problem as a delassus.Problem of its own: what a solver keeps of it stays whole.
+inline py::object copy_of(const delassus_problem& raw) {
+    const auto matrix = [](const delassus_matrix& from) -> py::object {
+        const auto rows = static_cast<std::size_t>(from.rows), entries = static_cast<std::size_t>(from.entries);
+        return py::make_tuple(array_of(std::vector<std::int32_t>(from.row_start, from.row_start + rows + 1)),
+                              array_of(std::vector<std::int32_t>(from.column, from.column + entries)),
+                              array_of(std::vector<double>(from.value, from.value + entries)),
+                              py::make_tuple(from.rows, from.columns));
+    };
+    py::list cones;
+    for (std::int32_t k = 0; k < raw.cone_count; ++k) {
+        const delassus_cone& from = *delassus_cone_at(&raw, k);
+        Cone cone = Cone::free(from.rows);
+        cone.kind = static_cast<ConeKind>(from.kind);
+        if (from.parameter_count > 0) std::copy_n(from.parameters, from.parameter_count, cone.parameters.begin());
+        if (from.lo) cone.lo.assign(from.lo, from.lo + from.rows);
+        if (from.hi) cone.hi.assign(from.hi, from.hi + from.rows);
+        cones.append(cone);
+    }
+    return py::module_::import("delassus")
+        .attr("_problem_of")(matrix(raw.H), matrix(raw.D), array_of(std::vector<double>(raw.a, raw.a + raw.n)),
+                             array_of(std::vector<double>(raw.b, raw.b + raw.m)), cones, matrix(raw.E),
+                             raw.law == DELASSUS_LAW_COULOMB ? "coulomb" : "associated");
+}
+
+/// An object of the class, behind the border's void*. All of it is used with the GIL.
+struct SolverObject {
+    py::object object;
+    std::string error;
+
+    /// What action returns; an exception becomes the error, and KeyboardInterrupt comes again when Python goes on.
+    template <class Action>
+    std::int32_t guarded(Action&& action) {
+        try {
+            return action();
+        } catch (py::error_already_set& failure) {
+            if (failure.matches(PyExc_KeyboardInterrupt)) {
+                PyErr_SetInterrupt();
+                return DELASSUS_CANCELLED;
+            }
+            error = failure.what();
+        } catch (const std::exception& failure) {
+            error = failure.what();
+        }
+        return DELASSUS_ERROR;
+    }
+
+    std::int32_t call(const char* method, const delassus_problem& raw) {
+        return guarded([&] {
+            if (py::hasattr(object, method)) object.attr(method)(copy_of(raw));
+            return DELASSUS_SOLVED;
+        });
+    }
+
+    std::int32_t solve(const delassus_problem& raw, const delassus_request& request, double* x, double* lambda,
+                       delassus_outcome& outcome) {
+        const auto shown = std::make_shared<SolveRequest>(request, raw, x, lambda);
+        const std::int32_t status = guarded([&] {
+            const py::object answer = object.attr("solve")(copy_of(raw), shown);
+            if (!py::isinstance<py::tuple>(answer) || py::len(answer) < 2 || py::len(answer) > 3)
+                throw InputError("solve() must return (x, lam) or (x, lam, status)");
+            const py::tuple parts(answer);
+            const auto new_x = SolveRequest::sized(parts[0].cast<Reals>(), raw.n, "x");
+            const auto new_lambda = SolveRequest::sized(parts[1].cast<Reals>(), raw.m, "lam");
+            std::copy(new_x.begin(), new_x.end(), x);
+            std::copy(new_lambda.begin(), new_lambda.end(), lambda);
+            if (parts.size() == 3) return static_cast<int>(status_named(parts[2].cast<std::string>()));
+            return static_cast<int>(shown->stopped.value_or(DELASSUS_SOLVED));
+        });
+        shown->end();
+        outcome.status = status;
+        outcome.iterations = shown->iterations;
+        outcome.analyses = outcome.factorizations = 0;
+        outcome.residual = std::numeric_limits<double>::quiet_NaN();
+        outcome.message = nullptr;
+        return status;
+    }
+
+    static delassus_status status_named(const std::string& name) {
+        constexpr std::array statuses = {DELASSUS_SOLVED,  DELASSUS_ITERATION_LIMIT, DELASSUS_TIME_LIMIT,
+                                         DELASSUS_STALLED, DELASSUS_INFEASIBLE,      DELASSUS_NUMERICAL_FAILURE};
+        std::vector<std::string_view> names;
+        for (const delassus_status status : statuses) {
+            names.push_back(name_of(static_cast<Status>(status)));
+            if (names.back() == name) return status;
+        }
+        throw InputError(
+            fmt::format("solve() returned the status \"{}\"; it must be one of {}", name, fmt::join(names, ", ")));
+    }
+};
+
+inline std::string& creation_error() {
+    thread_local std::string text;
+    return text;
+}
+
+inline std::int32_t create_object(std::size_t number, const delassus_option_value* values, std::int32_t count,
+                                  void** solver) {
+    const py::gil_scoped_acquire with_gil;
+    auto made = std::make_unique<SolverObject>();
+    const std::int32_t status = made->guarded([&] {
+        py::dict options;
+        for (std::int32_t k = 0; k < count; ++k) {
+            const delassus_option_value& value = values[k];
+            py::object object;
+            switch (value.type) {
+                case DELASSUS_OPTION_BOOLEAN:
+                    object = py::bool_(value.integer != 0);
+                    break;
+                case DELASSUS_OPTION_INTEGER:
+                    object = py::int_(value.integer);
+                    break;
+                case DELASSUS_OPTION_REAL:
+                    object = py::float_(value.real);
+                    break;
+                default:
+                    object = py::str(value.text);
+                    break;
+            }
+            options[value.key] = object;
+        }
+        made->object = solver_classes()[number]->type(**options);
+        return DELASSUS_SOLVED;
+    });
+    if (status == DELASSUS_SOLVED) {
+        *solver = made.release();
+    } else {
+        creation_error() = made->error;
+    }
+    return status;
+}
+
+template <std::size_t number>
+std::int32_t create_slot(const delassus_option_value* values, std::int32_t count, void** solver) {
+    return create_object(number, values, count, solver);
+}
+
+using CreateSlot = std::int32_t (*)(const delassus_option_value*, std::int32_t, void**);
+template <std::size_t... numbers>
+constexpr std::array<CreateSlot, sizeof...(numbers)> create_slots(std::index_sequence<numbers...>) {
+    return {&create_slot<numbers>...};
+}
+
+/// Makes a plugin of the class. options: (key, default) in order. capabilities: names as delassus.plugins() has them.
+inline std::shared_ptr<Plugin> plugin_of(const py::object& type, const std::string& name, const std::string& version,
+                                         const std::string& description, const std::string& licence,
+                                         const std::vector<std::pair<std::string, py::object>>& options,
+                                         const std::vector<std::string>& capabilities) {
+    static constexpr auto slots = create_slots(std::make_index_sequence<most_solver_classes>());
+    auto& classes = solver_classes();
+    if (classes.size() == slots.size())
+        throw InputError(fmt::format("{} classes are registered as solvers; there can be no more", slots.size()));
+    auto made = std::make_unique<SolverClass>();
+    made->type = type;
+    made->name = name;
+    made->version = version;
+    made->description = description;
+    made->licence = licence;
+    for (const auto& [key, value] : options) {
+        SolverClass::Row row{key, {}, DELASSUS_OPTION_TEXT};
+        if (py::isinstance<py::bool_>(value)) {
+            row.type = DELASSUS_OPTION_BOOLEAN;
+            row.default_value = value.cast<bool>() ? "true" : "false";
+        } else if (py::isinstance<py::int_>(value)) {
+            row.type = DELASSUS_OPTION_INTEGER;
+            row.default_value = py::str(value);
+        } else if (py::isinstance<py::float_>(value)) {
+            row.type = DELASSUS_OPTION_REAL;
+            row.default_value = py::repr(value).cast<std::string>();
+        } else if (py::isinstance<py::str>(value)) {
+            row.default_value = value.cast<std::string>();
+        } else {
+            throw InputError(
+                fmt::format("the option {} of {} must have a bool, a number or a text as default", key, name));
+        }
+        made->rows.push_back(std::move(row));
+    }
+    constexpr double any = std::numeric_limits<double>::infinity();
+    for (const auto& row : made->rows)
+        made->options.push_back({row.key.c_str(), row.type, 0, row.default_value.c_str(), -any, any, nullptr, "", ""});
+    delassus_plugin_descriptor& descriptor = made->descriptor;
+    descriptor.magic = DELASSUS_PLUGIN_MAGIC;
+    descriptor.abi_major = DELASSUS_ABI_MAJOR;
+    descriptor.abi_minor = DELASSUS_ABI_MINOR;
+    descriptor.struct_size = sizeof descriptor;
+    descriptor.flags = DELASSUS_FLAG_PEER;  // `auto` leaves it alone
+    descriptor.name = made->name.c_str();
+    descriptor.version = made->version.c_str();
+    descriptor.description = made->description.c_str();
+    descriptor.licence = made->licence.c_str();
+    descriptor.capabilities = capabilities_of(capabilities);
+    descriptor.options = made->options.data();
+    descriptor.option_count = static_cast<std::int32_t>(made->options.size());
+    descriptor.create = slots[classes.size()];
+    descriptor.destroy = [](void* solver) {
+        const py::gil_scoped_acquire with_gil;
+        delete static_cast<SolverObject*>(solver);
+    };
+    descriptor.analyze = [](void* solver, const delassus_problem* problem) {
+        const py::gil_scoped_acquire with_gil;
+        return static_cast<SolverObject*>(solver)->call("analyze", *problem);
+    };
+    descriptor.factorize = [](void* solver, const delassus_problem* problem) {
+        const py::gil_scoped_acquire with_gil;
+        return static_cast<SolverObject*>(solver)->call("factorize", *problem);
+    };
+    descriptor.solve = [](void* solver, const delassus_problem* problem, const delassus_request* request, double* x,
+                          double* lambda, delassus_outcome* outcome) {
+        const py::gil_scoped_acquire with_gil;
+        return static_cast<SolverObject*>(solver)->solve(*problem, *request, x, lambda, *outcome);
+    };
+    descriptor.last_error = [](void* solver) {
+        return solver ? static_cast<SolverObject*>(solver)->error.c_str() : creation_error().c_str();
+    };
+    descriptor.accepts = [](void* solver, const delassus_problem* problem, char* reason, std::int32_t capacity) {
+        const py::gil_scoped_acquire with_gil;
+        auto& self = *static_cast<SolverObject*>(solver);
+        std::string refusal;
+        const std::int32_t status = self.guarded([&] {
+            if (py::hasattr(self.object, "refusal")) {
+                const py::object answer = self.object.attr("refusal")(copy_of(*problem));
+                if (!answer.is_none()) refusal = answer.cast<std::string>();
+            }
+            return DELASSUS_SOLVED;
+        });
+        if (status != DELASSUS_SOLVED) refusal = self.error;
+        if (refusal.empty()) return 1;
+        const std::size_t length = std::min(refusal.size(), static_cast<std::size_t>(std::max(capacity, 1)) - 1);
+        std::memcpy(reason, refusal.data(), length);
+        reason[length] = '\0';
+        return 0;
+    };
+    auto plugin = std::const_pointer_cast<Plugin>(Plugin::of(descriptor));  // pybind11 knows no pointers to const
+    classes.push_back(made.release());
+    return plugin;
+}
+
+inline void bind_solver_classes(py::module_& module) {
+    using namespace py::literals;
+
+    py::class_<Plugin, std::shared_ptr<Plugin>>(module, "Plugin",
+                                                "A solver that is a class of Python, ready to register.");
+    py::class_<SolveRequest, std::shared_ptr<SolveRequest>>(
+        module, "SolveRequest", "What a solve asks of a solver that is a class of Python; used while it lasts.")
+        .def_property_readonly("tolerance", &SolveRequest::tolerance,
+                               "The natural error to reach (docs/errors.md), > 0.")
+        .def_property_readonly("max_iterations", &SolveRequest::max_iterations, "Of the solver's own kind.")
+        .def_property_readonly("time_limit", &SolveRequest::time_limit,
+                               "s, inf for none; show() enforces it, so this is for planning.")
+        .def_readonly("start", &SolveRequest::start, "(x, lam) to start from, or None.")
+        .def_readwrite("iterations", &SolveRequest::iterations, "Set it to the iterations done; show() does it too.")
+        .def("show", &SolveRequest::show, "iteration"_a, "lam"_a, "x"_a = py::none(),
+             "Show an iterate (lam: m; x: n, or None for H⁻¹(a + Dᵀ lam)): it is measured for curves, and Ctrl-C and "
+             "time limits come back through it. Returns False where the solver must end and return its best iterate. "
+             "The clock of the solve stands still meanwhile.");
+    module.def("_plugin_of", &plugin_of);
+}
+
+}  // namespace delassus::python
