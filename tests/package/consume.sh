@@ -39,6 +39,15 @@ done
 for timestepper in euler_explicit rk4 trapezoidal trapezoidal_linearized; do "$scratch/system/build/system" "$timestepper" free; done
 if "$scratch/system/build/system" euler_explicit; then echo "euler_explicit took a constraint" >&2; exit 1; fi
 
+if pkg-config --exists bullet; then
+    cp -r "$source/examples/engines" "$scratch"
+    cmake -S "$scratch/engines/bullet" -B "$scratch/engines/bullet/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
+    cmake --build "$scratch/engines/bullet/build"
+    for solver in auto pgs; do "$scratch/engines/bullet/build/sliding" "$solver"; done
+else
+    echo "skipped: Bullet was not found (libbullet-dev)"
+fi
+
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name delassus.pc)")
 export PKG_CONFIG_PATH
 g++ -std=c++20 $flags "$scratch/embed/embed.cpp" $(pkg-config --cflags --libs delassus) -Wl,-rpath,"$(pkg-config --variable=libdir delassus)" \

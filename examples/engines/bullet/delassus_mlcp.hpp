@@ -4,7 +4,9 @@
 
 #include <BulletDynamics/MLCPSolvers/btMLCPSolverInterface.h>
 
+#include <limits>
 #include <string>
+#include <vector>
 
 #include "delassus/problem.hpp"
 #include "delassus/registry.hpp"
@@ -13,7 +15,7 @@
 
 /// Bullet asks for A x = b + w, lo ≤ x ≤ hi, w complementary. A row of friction names the row of its normal force in
 /// limitDependency; Bullet's own solvers bound each such row by itself, μ x_n, which makes a pyramid. Here a normal row
-/// and the rows after it that name it become one cone of friction, ‖x_t‖ ≤ μ x_n, with μ = hi of these rows: choose two
+/// and the rows that name it become one cone of friction, ‖x_t‖ ≤ μ x_n, with μ = hi of these rows: choose two
 /// directions of friction (SOLVER_USE_2_FRICTION_DIRECTIONS). Any other row keeps its bounds.
 class DelassusMlcp : public btMLCPSolverInterface {
 public:
@@ -28,10 +30,11 @@ public:
     bool solveMLCP(const btMatrixXu& A, const btVectorXu& b, btVectorXu& x, const btVectorXu& lo, const btVectorXu& hi,
                    const btAlignedObjectArray<int>& limitDependency, int, bool) override {
         if (A.rows() == 0) return true;
-        const delassus::PreparedProblem problem = problem_of(A, b, lo, hi, limitDependency);
+        const std::vector<int> rows = order_of(limitDependency);
+        const delassus::PreparedProblem problem(problem_of(A, b, lo, hi, limitDependency));
         delassus::Solution solution;
         report_ = solver_.solve(problem, solution, settings_);
-        for (int i = 0; i < A.rows(); ++i) x[i] = static_cast<btScalar>(solution.lambda[static_cast<std::size_t>(i)]);
+        for (std::size_t k = 0; k < rows.size(); ++k) x[rows[k]] = static_cast<btScalar>(solution.lambda[k]);
         // Bullet falls back on its own sweeps where this is false.
         return report_.status == delassus::Status::Solved;
     }
@@ -39,31 +42,43 @@ public:
     /// Of the latest solve: status, time, errors as Delassus measures them.
     [[nodiscard]] const delassus::SolveReport& report() const { return report_; }
 
-    /// The problem that Bullet poses, with cones of friction: n = 0, E = A, b = −b.
+    /// Bullet's rows in the order of the problem: each normal row with those that name it.
+    static std::vector<int> order_of(const btAlignedObjectArray<int>& limitDependency) {
+        std::vector<int> rows;
+        for (int i = 0; i < limitDependency.size(); ++i) {
+            if (limitDependency[i] >= 0) continue;
+            rows.push_back(i);
+            for (int j = 0; j < limitDependency.size(); ++j)
+                if (limitDependency[j] == i) rows.push_back(j);
+        }
+        return rows;
+    }
+
+    /// The problem that Bullet poses, with cones of friction: n = 0, E = A, b = −b, rows as in order_of().
     static delassus::Problem problem_of(const btMatrixXu& A, const btVectorXu& b, const btVectorXu& lo,
                                         const btVectorXu& hi, const btAlignedObjectArray<int>& limitDependency) {
-        const int m = A.rows();
+        const std::vector<int> rows = order_of(limitDependency);
+        const auto m = static_cast<std::int32_t>(rows.size());
         delassus::Problem problem;
         problem.law = delassus::Law::Coulomb;
         std::vector<delassus::Triplet> entries;
-        for (int i = 0; i < m; ++i) {
+        for (std::int32_t k = 0; k < m; ++k) {
+            const int i = rows[static_cast<std::size_t>(k)];
             problem.b.push_back(-static_cast<double>(b[i]));
             // Bullet's matrix is symmetric up to rounding.
-            for (int j = 0; j < m; ++j)
-                if (A(i, j) != 0 || A(j, i) != 0)
-                    entries.push_back({i, j, 0.5 * (static_cast<double>(A(i, j)) + static_cast<double>(A(j, i)))});
-        }
-        problem.E = delassus::SparseMatrix::from_triplets(m, m, std::move(entries));
-        for (int i = 0; i < m;) {
-            int rows = 1;
-            while (i + rows < m && limitDependency[i + rows] == i) ++rows;
-            if (rows > 1) {
-                problem.cones.push_back(delassus::Cone::friction(static_cast<double>(hi[i + 1]), rows));
+            for (std::int32_t l = 0; l < m; ++l) {
+                const int j = rows[static_cast<std::size_t>(l)];
+                const double value = 0.5 * (static_cast<double>(A(i, j)) + static_cast<double>(A(j, i)));
+                if (value != 0.0) entries.push_back({k, l, value});
+            }
+            if (limitDependency[i] >= 0) {
+                ++problem.cones.back().rows;
+                problem.cones.back() = delassus::Cone::friction(static_cast<double>(hi[i]), problem.cones.back().rows);
             } else {
                 problem.cones.push_back(delassus::Cone::box({bound(lo[i])}, {bound(hi[i])}));
             }
-            i += rows;
         }
+        problem.E = delassus::SparseMatrix::from_triplets(m, m, std::move(entries));
         return problem;
     }
 
