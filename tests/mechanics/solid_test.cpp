@@ -314,8 +314,8 @@ TEST(SolidElements, ACantileverTurnsFarAsTheElastica) {
         beam.cells = {40, 1, 1};
         beam.build();
         const double force = factor / 12.0 / (beam.length * beam.length);
-        const State state =
-            equilibrium_under(beam.system, beam.system.initial_state(), beam.load({0.0, 0.0, -force}), factor > 5.0 ? 8 : 2);
+        const State state = equilibrium_under(beam.system, beam.system.initial_state(), beam.load({0.0, 0.0, -force}),
+                                              factor > 5.0 ? 8 : 2);
         const Vector3d end = beam.displacement(state) / beam.length;
         RecordProperty("factor_" + std::to_string(int(factor)),
                        std::to_string(-end.z()) + " " + std::to_string(-end.x()));

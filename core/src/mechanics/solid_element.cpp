@@ -7,6 +7,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "delassus/error.hpp"
 
@@ -18,7 +19,7 @@ constexpr std::array<std::array<std::size_t, 3>, 4> tetrahedron_sides = {{{0, 2,
 
 struct Corners {
     double volume = 0.0;
-    Eigen::Matrix<double, 3, 4> gradient;  // of the barycentric coordinates
+    NodeColumns gradient{3, 4};  // of the barycentric coordinates
 };
 
 template <class Nodes, class Positions>
@@ -76,18 +77,16 @@ std::vector<ElementSide> outer_sides(std::span<const ElementSide> sides) {
     return result;
 }
 
-SolidShape<4, 1> linear_tetrahedron(const std::array<std::int32_t, 4>& nodes,
-                                    const std::array<Vector3d, 4>& positions) {
+SolidShape linear_tetrahedron(const std::array<std::int32_t, 4>& nodes, const std::array<Vector3d, 4>& positions) {
     const Corners corners = corners_of(nodes, positions);
-    return {{corners.volume}, {corners.gradient}, {0.25, 0.25, 0.25, 0.25}};
+    return {{{corners.volume, corners.gradient}}, {0.25, 0.25, 0.25, 0.25}};
 }
 
 // With the barycentric coordinates L_i, N_i = L_i (2 L_i − 1) at the corners and N_ij = 4 L_i L_j in the middles. The
 // four points, with L = (a, b, b, b) and so on, integrate polynomials of degree two exactly, as the energy of small
 // strains is (Hammer and Stroud 1956). The masses are in proportion to the diagonal of the consistent mass matrix
 // (Hinton, Rock and Zienkiewicz 1976): equal shares of the total would be negative at the corners.
-SolidShape<10, 4> quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes,
-                                        const std::array<Vector3d, 10>& positions) {
+SolidShape quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes, const std::array<Vector3d, 10>& positions) {
     const Corners corners = corners_of(nodes, positions);
     for (std::size_t e = 0; e < 6; ++e) {
         const Vector3d &from = positions[tetrahedron_edges[e][0]], &to = positions[tetrahedron_edges[e][1]];
@@ -96,44 +95,44 @@ SolidShape<10, 4> quadratic_tetrahedron(const std::array<std::int32_t, 10>& node
                                          nodes[tetrahedron_edges[e][0]], nodes[tetrahedron_edges[e][1]]));
     }
     const double b = (5.0 - std::sqrt(5.0)) / 20.0, a = 1.0 - 3.0 * b;
-    SolidShape<10, 4> shape;
+    SolidShape shape;
     for (std::size_t p = 0; p < 4; ++p) {
         std::array<double, 4> L{b, b, b, b};
         L[p] = a;
-        shape.volume[p] = 0.25 * corners.volume;
+        SolidShape::Point point{0.25 * corners.volume, NodeColumns(3, 10)};
+        const auto of_corner = [&](std::size_t i) { return corners.gradient.col(static_cast<Eigen::Index>(i)); };
         for (std::size_t i = 0; i < 4; ++i)
-            shape.gradient[p].col(static_cast<Eigen::Index>(i)) =
-                (4.0 * L[i] - 1.0) * corners.gradient.col(static_cast<Eigen::Index>(i));
+            point.gradient.col(static_cast<Eigen::Index>(i)) = (4.0 * L[i] - 1.0) * of_corner(i);
         for (std::size_t e = 0; e < 6; ++e) {
-            const auto i = tetrahedron_edges[e][0], j = tetrahedron_edges[e][1];
-            shape.gradient[p].col(static_cast<Eigen::Index>(4 + e)) =
-                4.0 * (L[i] * corners.gradient.col(static_cast<Eigen::Index>(j)) +
-                       L[j] * corners.gradient.col(static_cast<Eigen::Index>(i)));
+            const auto [i, j] = tetrahedron_edges[e];
+            point.gradient.col(static_cast<Eigen::Index>(4 + e)) = 4.0 * (L[i] * of_corner(j) + L[j] * of_corner(i));
         }
+        shape.points.push_back(point);
     }
-    for (std::size_t k = 0; k < 10; ++k) shape.share[k] = k < 4 ? 1.0 / 36.0 : 4.0 / 27.0;
+    for (std::size_t k = 0; k < 10; ++k) shape.share.push_back(k < 4 ? 1.0 / 36.0 : 4.0 / 27.0);
     return shape;
 }
 
-SolidShape<8, 6> brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vector3d, 8>& positions) {
-    SolidShape<8, 6> shape;
+SolidShape brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vector3d, 8>& positions) {
+    SolidShape shape;
+    shape.share.assign(8, 0.0);
     double volume = 0.0;
-    for (std::size_t p = 0; p < 6; ++p) {
+    for (const auto& places : brick_tetrahedra) {
         std::array<std::int32_t, 4> named{};
         std::array<Vector3d, 4> at;
         for (std::size_t k = 0; k < 4; ++k) {
-            named[k] = nodes[brick_tetrahedra[p][k]];
-            at[k] = positions[brick_tetrahedra[p][k]];
+            named[k] = nodes[places[k]];
+            at[k] = positions[places[k]];
         }
         const Corners corners = corners_of(named, at);
-        shape.volume[p] = corners.volume;
         volume += corners.volume;
-        shape.gradient[p].setZero();
+        SolidShape::Point point{corners.volume, NodeColumns::Zero(3, 8)};
         for (std::size_t k = 0; k < 4; ++k) {
-            shape.gradient[p].col(static_cast<Eigen::Index>(brick_tetrahedra[p][k])) =
+            point.gradient.col(static_cast<Eigen::Index>(places[k])) =
                 corners.gradient.col(static_cast<Eigen::Index>(k));
-            shape.share[brick_tetrahedra[p][k]] += 0.25 * corners.volume;
+            shape.share[places[k]] += 0.25 * corners.volume;
         }
+        shape.points.push_back(point);
     }
     for (double& share : shape.share) share /= volume;
     return shape;
@@ -155,88 +154,73 @@ SolidShape<8, 6> brick(const std::array<std::int32_t, 8>& nodes, const std::arra
 //
 // Damping, for both: a stress F (2μτ Ė + λτ tr(Ė) I) with Ė = sym(Fᵀ Ḟ), which rigid motion does not feel; tr(Ė) is
 // the mean of F : Ḟ likewise. Damping by the mass adds −α m_a v_a.
-template <int Nodes, int Points>
-struct SolidElement<Nodes, Points>::Point {
+struct ElasticSolid::Point {
     Matrix3d F, rate;
     Matrix3d R = Matrix3d::Identity();
     Matrix3d turning = Matrix3d::Zero();  // (tr(U) I − U)⁻¹
     double theta = 0.0;
 };
 
-template <int Nodes, int Points>
-struct SolidElement<Nodes, Points>::Strain {
-    std::array<Point, Points> points;
+struct ElasticSolid::Strain {
+    std::array<Point, 6> points;     // as many as there are in the shape
     double theta = 0.0, rate = 0.0;  // the means of θ and of tr(Ė)
 };
 
-template <int Nodes, int Points>
-SolidElement<Nodes, Points>::SolidElement(const std::array<std::int32_t, Nodes>& nodes,
-                                          const SolidShape<Nodes, Points>& shape, const ElasticMaterial& material,
-                                          ElementModel model)
-    : nodes_(nodes),
-      model_(model),
+ElasticSolid::ElasticSolid(SolidShape shape, const ElasticMaterial& material, ElementModel model)
+    : model_(model),
       lambda_(material.young * material.poisson / ((1.0 + material.poisson) * (1.0 - 2.0 * material.poisson))),
       mu_(0.5 * material.young / (1.0 + material.poisson)),
       density_(material.density),
       damping_(material.damping_time),
       damping_rate_(material.damping_rate),
-      shape_(shape) {
-    for (const double volume : shape.volume) volume_ += volume;
+      shape_(std::move(shape)) {
+    for (const auto& point : shape_.points) volume_ += point.volume;
 }
 
-template <int Nodes, int Points>
-typename SolidElement<Nodes, Points>::Strain SolidElement<Nodes, Points>::strain(const Placements& at) const {
-    Eigen::Matrix<double, 3, Nodes> x, v;
-    for (std::size_t a = 0; a < Nodes; ++a) {
-        x.col(static_cast<Eigen::Index>(a)) = at[a].x;
-        v.col(static_cast<Eigen::Index>(a)) = at[a].v;
-    }
+ElasticSolid::Strain ElasticSolid::strain(const NodeColumns& x, const NodeColumns& v) const {
     Strain result;
-    for (std::size_t p = 0; p < Points; ++p) {
+    for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         Point& point = result.points[p];
-        point.F = x * shape_.gradient[p].transpose();
-        point.rate = v * shape_.gradient[p].transpose();
+        point.F.noalias() = x * shape_.points[p].gradient.transpose();
+        point.rate.noalias() = v * shape_.points[p].gradient.transpose();
         if (model_ == ElementModel::Corotational) {
             const Eigen::JacobiSVD<Matrix3d> svd(point.F, Eigen::ComputeFullU | Eigen::ComputeFullV);
             Matrix3d W = svd.matrixU();
-            Vector3d values = svd.singularValues();
-            if (W.determinant() * svd.matrixV().determinant() < 0.0) {  // an inverted element: the nearest rotation
-                W.col(2) *= -1.0;
-                values[2] *= -1.0;
-            }
-            point.R = W * svd.matrixV().transpose();
-            const Matrix3d U = svd.matrixV() * values.asDiagonal() * svd.matrixV().transpose();
+            const Matrix3d V = svd.matrixV();
+            // An inverted element: the nearest rotation.
+            if (W.determinant() * V.determinant() < 0.0) W.col(2) *= -1.0;
+            point.R = W * V.transpose();
+            const Matrix3d U = symmetric_part(point.R.transpose() * point.F);
             const Matrix3d sum = U.trace() * Matrix3d::Identity() - U;
             if (std::abs(sum.determinant()) > 1e-12) point.turning = sum.inverse();
             point.theta = U.trace() - 3.0;
         } else {
             point.theta = 0.5 * (point.F.squaredNorm() - 3.0);
         }
-        result.theta += shape_.volume[p] / volume_ * point.theta;
-        result.rate += shape_.volume[p] / volume_ * point.F.cwiseProduct(point.rate).sum();
+        result.theta += shape_.points[p].volume / volume_ * point.theta;
+        result.rate += shape_.points[p].volume / volume_ * point.F.cwiseProduct(point.rate).sum();
     }
     return result;
 }
 
-template <int Nodes, int Points>
-double SolidElement<Nodes, Points>::energy(const Placements& at) const {
-    const Strain now = strain(at);
+double ElasticSolid::energy(const NodeColumns& x) const {
+    const Strain now = strain(x, NodeColumns::Zero(3, x.cols()));
     double result = 0.5 * lambda_ * volume_ * now.theta * now.theta;
-    for (std::size_t p = 0; p < Points; ++p) {
+    for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         const Point& point = now.points[p];
         const double square = model_ == ElementModel::Corotational
                                   ? (point.F - point.R).squaredNorm()
                                   : 0.25 * (point.F.transpose() * point.F - Matrix3d::Identity()).squaredNorm();
-        result += shape_.volume[p] * mu_ * square;
+        result += shape_.points[p].volume * mu_ * square;
     }
     return result;
 }
 
-template <int Nodes, int Points>
-void SolidElement<Nodes, Points>::force(const Placements& at, Forces& result) const {
-    const Strain now = strain(at);
-    Eigen::Matrix<double, 3, Nodes> f = Eigen::Matrix<double, 3, Nodes>::Zero();
-    for (std::size_t p = 0; p < Points; ++p) {
+void ElasticSolid::force(const NodeColumns& x, const NodeColumns& v, double* result) const {
+    const Strain now = strain(x, v);
+    Eigen::Map<Eigen::Matrix<double, 3, Eigen::Dynamic>> f(result, 3, x.cols());
+    f.setZero();
+    for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         const Point& point = now.points[p];
         Matrix3d P;
         if (model_ == ElementModel::Corotational) {
@@ -247,25 +231,41 @@ void SolidElement<Nodes, Points>::force(const Placements& at, Forces& result) co
         if (damping_ > 0.0)
             P += damping_ * (2.0 * mu_ * point.F * symmetric_part(point.F.transpose() * point.rate) +
                              lambda_ * now.rate * point.F);
-        f -= shape_.volume[p] * P * shape_.gradient[p];
+        P *= -shape_.points[p].volume;
+        f.noalias() += P * shape_.points[p].gradient;
     }
     if (damping_rate_ > 0.0)
-        for (std::size_t a = 0; a < Nodes; ++a)
-            f.col(static_cast<Eigen::Index>(a)) -= damping_rate_ * mass(a) * at[a].v;
-    result = Eigen::Map<const Forces>(f.data());
+        for (Eigen::Index a = 0; a < x.cols(); ++a)
+            f.col(a) -= damping_rate_ * mass(static_cast<std::size_t>(a)) * v.col(a);
 }
 
-template <int Nodes, int Points>
-void SolidElement<Nodes, Points>::stiffness(const Placements& at, Matrix& result) const {
-    using Columns = Eigen::Matrix<double, 3, Nodes>;
-    const Strain now = strain(at);
-    Columns s = Columns::Zero(), swelling = Columns::Zero(), swelling_rate = Columns::Zero();
-    result.setZero();
-    for (std::size_t p = 0; p < Points; ++p) {
+namespace {
+
+using Square = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+
+/// column of K += change, three entries for each node.
+void add_column(const NodeColumns& change, Eigen::Index column, Square& K) {
+    for (Eigen::Index i = 0; i < change.size(); ++i) K(i, column) += change.data()[i];
+}
+
+/// K += factor left rightᵀ.
+void add_outer(double factor, const NodeColumns& left, const NodeColumns& right, Square& K) {
+    for (Eigen::Index i = 0; i < left.size(); ++i)
+        for (Eigen::Index j = 0; j < right.size(); ++j) K(i, j) += factor * left.data()[i] * right.data()[j];
+}
+
+}  // namespace
+
+void ElasticSolid::stiffness(const NodeColumns& x, const NodeColumns& v, double* result) const {
+    const Strain now = strain(x, v);
+    NodeColumns s = NodeColumns::Zero(3, x.cols()), swelling = s, swelling_rate = s, change(3, x.cols());
+    Square K(result, x.size(), x.size());
+    K.setZero();
+    const bool corotational = model_ == ElementModel::Corotational;
+    for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         const Point& point = now.points[p];
-        const Columns& g = shape_.gradient[p];
-        const double volume = shape_.volume[p];
-        const bool corotational = model_ == ElementModel::Corotational;
+        const NodeColumns& g = shape_.points[p].gradient;
+        const double volume = shape_.points[p].volume;
         s += volume * (corotational ? point.R : point.F) * g;
         Matrix3d S = Matrix3d::Zero();
         if (!corotational)
@@ -277,7 +277,7 @@ void SolidElement<Nodes, Points>::stiffness(const Placements& at, Matrix& result
             swelling += volume * point.F * g;
             swelling_rate += volume * point.rate * g;
         }
-        for (Eigen::Index b = 0; b < Nodes; ++b)
+        for (Eigen::Index b = 0; b < x.cols(); ++b)
             for (int j = 0; j < 3; ++j) {
                 const Matrix3d dF = Vector3d::Unit(j) * g.col(b).transpose();
                 Matrix3d dP = dF * S;
@@ -290,43 +290,32 @@ void SolidElement<Nodes, Points>::stiffness(const Placements& at, Matrix& result
                     dP += 2.0 * mu_ * point.F * symmetric_part(point.F.transpose() * dF);
                 }
                 if (damping_ > 0.0) dP += 2.0 * mu_ * damping_ * point.F * symmetric_part(dF.transpose() * point.rate);
-                const Columns change = volume * dP * g;
-                result.col(3 * b + j) += Eigen::Map<const Forces>(change.data());
+                dP *= volume;
+                change.noalias() = dP * g;
+                add_column(change, 3 * b + j, K);
             }
     }
-    const Eigen::Map<const Forces> along(s.data());
-    result += lambda_ / volume_ * along * along.transpose();
-    if (damping_ > 0.0)
-        result += damping_ * lambda_ / volume_ * Eigen::Map<const Forces>(swelling.data()) *
-                  Eigen::Map<const Forces>(swelling_rate.data()).transpose();
+    add_outer(lambda_ / volume_, s, s, K);
+    if (damping_ > 0.0) add_outer(damping_ * lambda_ / volume_, swelling, swelling_rate, K);
 }
 
-template <int Nodes, int Points>
-void SolidElement<Nodes, Points>::damping(const Placements& at, Matrix& result) const {
-    using Columns = Eigen::Matrix<double, 3, Nodes>;
-    const Strain now = strain(at);
-    Columns swelling = Columns::Zero();
-    result.setZero();
-    for (std::size_t p = 0; p < Points; ++p) {
-        const Matrix3d& F = now.points[p].F;
-        const Columns& g = shape_.gradient[p];
-        swelling += shape_.volume[p] * F * g;
-        for (Eigen::Index b = 0; b < Nodes; ++b)
+void ElasticSolid::damping(const NodeColumns& x, double* result) const {
+    NodeColumns swelling = NodeColumns::Zero(3, x.cols()), change(3, x.cols());
+    Square R(result, x.size(), x.size());
+    R.setZero();
+    for (const auto& [volume, g] : shape_.points) {
+        const Matrix3d F = x * g.transpose();
+        swelling += volume * F * g;
+        for (Eigen::Index b = 0; b < x.cols(); ++b)
             for (int j = 0; j < 3; ++j) {
                 const Matrix3d dF = Vector3d::Unit(j) * g.col(b).transpose();
-                const Columns change =
-                    2.0 * mu_ * damping_ * shape_.volume[p] * F * symmetric_part(F.transpose() * dF) * g;
-                result.col(3 * b + j) += Eigen::Map<const Forces>(change.data());
+                const Matrix3d dP = 2.0 * mu_ * damping_ * volume * F * symmetric_part(F.transpose() * dF);
+                change.noalias() = dP * g;
+                add_column(change, 3 * b + j, R);
             }
     }
-    const Eigen::Map<const Forces> along(swelling.data());
-    result += damping_ * lambda_ / volume_ * along * along.transpose();
-    for (std::size_t a = 0; a < Nodes; ++a)
-        result.diagonal().template segment<3>(3 * static_cast<Eigen::Index>(a)).array() += damping_rate_ * mass(a);
+    add_outer(damping_ * lambda_ / volume_, swelling, swelling, R);
+    for (Eigen::Index i = 0; i < x.size(); ++i) R(i, i) += damping_rate_ * mass(static_cast<std::size_t>(i / 3));
 }
-
-template class SolidElement<4, 1>;
-template class SolidElement<10, 4>;
-template class SolidElement<8, 6>;
 
 }  // namespace delassus::mechanics

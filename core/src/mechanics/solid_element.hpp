@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "delassus/multibody.hpp"
@@ -40,67 +41,96 @@ void append_sides(const std::array<std::int32_t, 10>& nodes, std::vector<Element
 /// Those that no two elements share.
 [[nodiscard]] std::vector<ElementSide> outer_sides(std::span<const ElementSide> sides);
 
+/// A column for each node.
+using NodeColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 10>;
+
 /// What an element knows of its shape functions N_a, all of it in the reference configuration.
-template <int Nodes, int Points>
 struct SolidShape {
-    std::array<double, Points> volume{};  ///< that each point stands for, m³
-    /// Column a: ∇N_a at the point, 1/m.
-    std::array<Eigen::Matrix<double, 3, Nodes>, Points> gradient;
-    std::array<double, Nodes> share{};  ///< of the mass that goes to each node; their sum is 1
+    struct Point {
+        double volume = 0.0;   ///< that it stands for, m³
+        NodeColumns gradient;  ///< ∇N_a there, 1/m
+    };
+    std::vector<Point> points;
+    std::vector<double> share;  ///< of the mass that goes to each node; their sum is 1
 };
 
 /// Throws InputError if the element has no volume or is inverted (negative det of its edges). nodes: for the message.
-[[nodiscard]] SolidShape<4, 1> linear_tetrahedron(const std::array<std::int32_t, 4>& nodes,
-                                                  const std::array<Vector3d, 4>& positions);
+[[nodiscard]] SolidShape linear_tetrahedron(const std::array<std::int32_t, 4>& nodes,
+                                            const std::array<Vector3d, 4>& positions);
 /// The corners, then the middles of the edges. Throws InputError also if one of these is not in the middle.
-[[nodiscard]] SolidShape<10, 4> quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes,
-                                                      const std::array<Vector3d, 10>& positions);
+[[nodiscard]] SolidShape quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes,
+                                               const std::array<Vector3d, 10>& positions);
 /// The corners as in brick_tetrahedra.
-[[nodiscard]] SolidShape<8, 6> brick(const std::array<std::int32_t, 8>& nodes,
-                                     const std::array<Vector3d, 8>& positions);
+[[nodiscard]] SolidShape brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vector3d, 8>& positions);
 
-/// An element of an elastic material with Rayleigh damping. Its change of volume counts as the mean over the
-/// element (Nagtegaal, Parks and Rice, Comput. Methods Appl. Mech. Engrg. 4, 1974), so that elements of several points
-/// do not lock where the material hardly changes its volume.
-template <int Nodes, int Points>
-class SolidElement {
+/// An elastic material with Rayleigh damping between nodes. Its change of volume counts as the mean over the element
+/// (Nagtegaal, Parks and Rice, Comput. Methods Appl. Mech. Engrg. 4, 1974), so that elements of several points do not
+/// lock where the material hardly changes its volume.
+class ElasticSolid {
 public:
-    SolidElement(const std::array<std::int32_t, Nodes>& nodes, const SolidShape<Nodes, Points>& shape,
-                 const ElasticMaterial& material, ElementModel model);
+    ElasticSolid(SolidShape shape, const ElasticMaterial& material, ElementModel model);
 
-    static constexpr int size = Nodes, freedoms = 3;
-    using Placements = std::array<NodePlacement, Nodes>;
-    [[nodiscard]] const std::array<std::int32_t, Nodes>& nodes() const { return nodes_; }
     /// What goes to the a-th node, kg.
     [[nodiscard]] double mass(std::size_t a) const { return density_ * volume_ * shape_.share[a]; }
-    [[nodiscard]] double energy(const Placements& at) const;
-
-    using Forces = Eigen::Matrix<double, 3 * Nodes, 1>;
-    using Matrix = Eigen::Matrix<double, 3 * Nodes, 3 * Nodes, Eigen::RowMajor>;
-    void force(const Placements& at, Forces& result) const;
-    /// −∂f/∂x and −∂f/∂v.
-    void stiffness(const Placements& at, Matrix& result) const;
-    void damping(const Placements& at, Matrix& result) const;
     [[nodiscard]] bool damped() const { return damping_ > 0.0 || damping_rate_ > 0.0; }
+
+    /// x, v: positions and velocities of the nodes. Results have three entries for each node, matrices are by rows.
+    [[nodiscard]] double energy(const NodeColumns& x) const;
+    void force(const NodeColumns& x, const NodeColumns& v, double* result) const;
+    /// −∂f/∂x and −∂f/∂v.
+    void stiffness(const NodeColumns& x, const NodeColumns& v, double* result) const;
+    void damping(const NodeColumns& x, double* result) const;
 
 private:
     struct Point;
     struct Strain;
-    [[nodiscard]] Strain strain(const Placements& at) const;
+    [[nodiscard]] Strain strain(const NodeColumns& x, const NodeColumns& v) const;
 
-    std::array<std::int32_t, Nodes> nodes_;
     ElementModel model_;
     double lambda_, mu_, density_, damping_, damping_rate_;
     double volume_ = 0.0;
-    SolidShape<Nodes, Points> shape_;
+    SolidShape shape_;
 };
 
-using LinearTetrahedron = SolidElement<4, 1>;
-using QuadraticTetrahedron = SolidElement<10, 4>;
-using Brick = SolidElement<8, 6>;
+/// An elastic solid between certain nodes.
+template <int Nodes>
+class SolidElement {
+public:
+    SolidElement(const std::array<std::int32_t, Nodes>& nodes, SolidShape shape, const ElasticMaterial& material,
+                 ElementModel model)
+        : nodes_(nodes), solid_(std::move(shape), material, model) {}
 
-extern template class SolidElement<4, 1>;
-extern template class SolidElement<10, 4>;
-extern template class SolidElement<8, 6>;
+    static constexpr int size = Nodes, freedoms = 3;
+    using Placements = std::array<NodePlacement, Nodes>;
+    using Forces = Eigen::Matrix<double, 3 * Nodes, 1>;
+    using Matrix = Eigen::Matrix<double, 3 * Nodes, 3 * Nodes, Eigen::RowMajor>;
+    [[nodiscard]] const std::array<std::int32_t, Nodes>& nodes() const { return nodes_; }
+    [[nodiscard]] double mass(std::size_t a) const { return solid_.mass(a); }
+    [[nodiscard]] bool damped() const { return solid_.damped(); }
+    [[nodiscard]] double energy(const Placements& at) const { return solid_.energy(columns(at, &NodePlacement::x)); }
+    void force(const Placements& at, Forces& result) const {
+        solid_.force(columns(at, &NodePlacement::x), columns(at, &NodePlacement::v), result.data());
+    }
+    void stiffness(const Placements& at, Matrix& result) const {
+        solid_.stiffness(columns(at, &NodePlacement::x), columns(at, &NodePlacement::v), result.data());
+    }
+    void damping(const Placements& at, Matrix& result) const {
+        solid_.damping(columns(at, &NodePlacement::x), result.data());
+    }
+
+private:
+    static NodeColumns columns(const Placements& at, Vector3d NodePlacement::*what) {
+        NodeColumns result(3, Nodes);
+        for (std::size_t a = 0; a < Nodes; ++a) result.col(static_cast<Eigen::Index>(a)) = at[a].*what;
+        return result;
+    }
+
+    std::array<std::int32_t, Nodes> nodes_;
+    ElasticSolid solid_;
+};
+
+using LinearTetrahedron = SolidElement<4>;
+using QuadraticTetrahedron = SolidElement<10>;
+using Brick = SolidElement<8>;
 
 }  // namespace delassus::mechanics
