@@ -46,7 +46,7 @@ std::string first_line(const std::string& text) {
     return text.substr(0, text.find('\n'));
 }
 
-std::string replaced(std::string text, const std::map<char, std::string>& by) {
+std::string replaced(const std::string& text, const std::map<char, std::string>& by) {
     std::string result;
     for (const char c : text) {
         const auto found = by.find(c);
