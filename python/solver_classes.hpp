@@ -334,8 +334,8 @@ inline std::shared_ptr<Plugin> plugin_of(const py::object& type, const std::stri
 inline void bind_solver_classes(py::module_& module) {
     using namespace py::literals;
 
-    py::class_<Plugin, std::shared_ptr<Plugin>>(module, "Plugin",
-                                                "A solver that is a class of Python, ready to register.");
+    const py::class_<Plugin, std::shared_ptr<Plugin>> plugin(module, "Plugin",
+                                                             "A solver that is a class of Python, ready to register.");
     py::class_<SolveRequest, std::shared_ptr<SolveRequest>>(
         module, "SolveRequest", "What a solve asks of a solver that is a class of Python; used while it lasts.")
         .def_property_readonly("tolerance", &SolveRequest::tolerance,

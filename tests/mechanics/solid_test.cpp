@@ -188,7 +188,7 @@ TEST(SolidElements, PassThePatchTest) {
             EXPECT_LE(largest_inside(places, force), 1e-14);
             const double lambda = 0.4 / (1.4 * 0.2), mu = 0.5 / 1.4;
             const Eigen::JacobiSVD<Eigen::Matrix3d> svd(F);
-            const Vector3d stretch = svd.singularValues();
+            const Vector3d& stretch = svd.singularValues();
             const Vector3d strain = model == ElementModel::Corotational
                                         ? Vector3d(stretch.array() - 1.0)
                                         : Vector3d(0.5 * (stretch.array().square() - 1.0));

@@ -186,7 +186,7 @@ ElasticSolid::Strain ElasticSolid::strain(const NodeColumns& x, const NodeColumn
         if (model_ == ElementModel::Corotational) {
             const Eigen::JacobiSVD<Matrix3d> svd(point.F, Eigen::ComputeFullU | Eigen::ComputeFullV);
             Matrix3d W = svd.matrixU();
-            const Matrix3d V = svd.matrixV();
+            const Matrix3d& V = svd.matrixV();
             // An inverted element: the nearest rotation.
             if (W.determinant() * V.determinant() < 0.0) W.col(2) *= -1.0;
             point.R = W * V.transpose();
