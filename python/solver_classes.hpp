@@ -6,10 +6,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
-#include <deque>
 #include <limits>
 #include <string>
 #include <utility>
@@ -27,11 +26,7 @@ namespace delassus::python {
 struct SolverClass {
     py::object type;
     std::string name, version, description, licence;
-    struct Row {
-        std::string key, default_value;
-        delassus_option_type type = DELASSUS_OPTION_TEXT;
-    };
-    std::deque<Row> rows;
+    std::vector<OptionInfo> rows;
     std::vector<delassus_option> options;
     delassus_plugin_descriptor descriptor{};
 };
@@ -253,7 +248,7 @@ inline std::shared_ptr<Plugin> plugin_of(const py::object& type, const std::stri
     made->description = description;
     made->licence = licence;
     for (const auto& [key, value] : options) {
-        SolverClass::Row row{key, {}, DELASSUS_OPTION_TEXT};
+        OptionInfo row{.key = key};
         if (py::isinstance<py::bool_>(value)) {
             row.type = DELASSUS_OPTION_BOOLEAN;
             row.default_value = value.cast<bool>() ? "true" : "false";

@@ -30,9 +30,9 @@ from ._derivative import Derivative
 from ._yaml import yaml_of
 
 __version__: str = _delassus.version
-__all__ = ["Cone", "Derivative", "Error", "InputError", "PluginError", "Problem", "Result", "Scene", "Simulation", "Solver",
-           "SolveRequest", "StepFailure", "StepRecord", "Trajectory", "Unsupported", "derivative", "plugins", "read", "register",
-           "simulate", "solve", "unbuilt"]
+__all__ = ["Cone", "Derivative", "Error", "InputError", "PluginError", "Problem", "Result", "Scene", "Simulation",
+           "SolveRequest", "Solver", "StepFailure", "StepRecord", "Trajectory", "Unsupported", "derivative", "plugins",
+           "read", "register", "simulate", "solve", "unbuilt"]
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
 Path = Union[str, "os.PathLike[str]"]

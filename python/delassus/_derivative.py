@@ -36,7 +36,7 @@ class Derivative:
         Blocks at which the solution is not differentiable: a contact that is about to open, close, stick or slide, a
         bound that is touched without a force. What is returned is a member of the generalised derivative then.
     unique : bool
-        False where reactions are not unique (redundant rows): dx and du are right, dlam is one of many, small one.
+        False where reactions are not unique (redundant rows): dx and du are right, dlam is a small one of many.
     """
 
     def __init__(self, problem, result):
@@ -50,7 +50,7 @@ class Derivative:
         local += self._E.diagonal()
         tolerance = max(1e-9, 10.0 * result.errors["natural"])
         self.degenerate: List[int] = []
-        self._blocks = []  # (first row, J, ρ C with J before it, ∂/∂μ)
+        self._blocks = []  # (rows, ∂Π/∂μ − ρ J ∂û/∂μ)
         jacobian, moved = [], []
         row = 0
         for number, cone in enumerate(problem.cones):

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/multibody.hpp"
+#include "mechanics/solid_element.hpp"
 #include "support/statics.hpp"
 
 namespace delassus::tests::solid_test {
@@ -77,14 +79,12 @@ struct Lattice {
                         system.add_brick(nodes, material, model);
                         continue;
                     }
-                    constexpr std::size_t paths[6][4] = {{0, 4, 6, 7}, {0, 2, 3, 7}, {0, 1, 5, 7},
-                                                         {0, 5, 4, 7}, {0, 3, 1, 7}, {0, 6, 2, 7}};
-                    constexpr std::size_t edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-                    for (const auto& path : paths) {
+                    for (const auto& path : mechanics::brick_tetrahedra) {
                         std::array<std::int32_t, 10> nodes;
                         for (std::size_t v = 0; v < 4; ++v) nodes[v] = of(corners[path[v]]);
                         for (std::size_t e = 0; e < 6; ++e) {
-                            const auto &a = corners[path[edges[e][0]]], &b = corners[path[edges[e][1]]];
+                            const auto [from, to] = mechanics::tetrahedron_edges[e];
+                            const auto &a = corners[path[from]], &b = corners[path[to]];
                             nodes[4 + e] = number((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2);
                         }
                         system.add_quadratic_tetrahedron(nodes, material, model);
@@ -225,6 +225,16 @@ TEST(SolidElements, QuadraticOnesBendAndTwistExactly) {
         }
 }
 
+/// A traction of resultant `force` on the sides of elements beyond x.
+VectorXd traction(const MultibodySystem& system, double x, const Vector3d& force) {
+    constexpr double any = std::numeric_limits<double>::infinity();
+    VectorXd load = VectorXd::Zero(system.n());
+    for (const auto& [node, share] :
+         system.spread_over_sides(0, system.node_count(), {{x, -any, -any}, {any, any, any}}))
+        load.segment<3>(system.node_column(node)) = share * force;
+    return load;
+}
+
 /// A cantilever along x of `length`, with a square section of edge 1; the load acts on its end as a uniform traction.
 struct Cantilever {
     double length = 10.0, poisson = 0.0;
@@ -244,23 +254,7 @@ struct Cantilever {
         lattice.fixed = [](const Vector3d& x) { return x.x() == 0.0; };
         places = lattice.build(system);
     }
-    /// Node loads of a traction of resultant `force`: by Simpson's rule along both edges of each cell of the end, or
-    /// the trapezoidal one, which the lattice's nodes integrate as the shape functions do on average.
-    [[nodiscard]] VectorXd load(const Vector3d& force) const {
-        const int parts = order == ElementOrder::Quadratic ? 2 : 1;
-        const auto weight = [&](double place, int along) {
-            const int number = static_cast<int>(std::lround(place * parts * along)), last = parts * along;
-            if (parts == 1) return (number == 0 || number == last ? 0.5 : 1.0) / along;
-            if (number % 2 == 1) return 4.0 / (6.0 * along);
-            return (number == 0 || number == last ? 1.0 : 2.0) / (6.0 * along);
-        };
-        VectorXd result = VectorXd::Zero(system.n());
-        for (std::size_t n = 0; n < places.size(); ++n)
-            if (places[n].x() == 1.0)
-                result.segment<3>(system.node_column(static_cast<std::int32_t>(n))) =
-                    weight(places[n].y(), cells[1]) * weight(places[n].z(), cells[2]) * force;
-        return result;
-    }
+    [[nodiscard]] VectorXd load(const Vector3d& force) const { return traction(system, 0.999 * length, force); }
     /// Of the end's middle.
     [[nodiscard]] Vector3d displacement(const State& state) const {
         Vector3d result = Vector3d::Zero();
@@ -360,16 +354,7 @@ TEST(SolidElements, CooksMembraneGoesUpAsPublished) {
     lattice.fixed = [](const Vector3d& x) { return x.x() == 0.0; };
     const auto places = lattice.build(system);
     const double force = 1e-6;
-    VectorXd load = VectorXd::Zero(system.n());
-    const auto simpson = [](double place, int along) {
-        const long number = std::lround(place * 2 * along), last = 2 * along;
-        if (number % 2 == 1) return 4.0 / (6.0 * along);
-        return (number == 0 || number == last ? 1.0 : 2.0) / (6.0 * along);
-    };
-    for (std::size_t n = 0; n < places.size(); ++n)
-        if (places[n].x() == 1.0)
-            load[system.node_column(static_cast<std::int32_t>(n)) + 1] =
-                force * simpson(places[n].y(), 12) * simpson(places[n].z(), 1);
+    const VectorXd load = traction(system, 47.9, {0.0, force, 0.0});
     EXPECT_NEAR(load.sum(), force, 1e-15);
     const State state = equilibrium_under(system, system.initial_state(), load);
     double up = 0.0;
@@ -386,7 +371,6 @@ TEST(SolidElements, CooksMembraneGoesUpAsPublished) {
 TEST(SolidElements, RefuseWhatIsNoTetrahedron) {
     MultibodySystem system;
     const std::vector<Vector3> corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    constexpr std::size_t edges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
     const auto add = [&](const Vector3& at) {
         NodeParameters node;
         node.position = at;
@@ -397,7 +381,9 @@ TEST(SolidElements, RefuseWhatIsNoTetrahedron) {
     for (std::size_t e = 0; e < 6; ++e) {
         Vector3 middle;
         for (std::size_t i = 0; i < 3; ++i)
-            middle[i] = 0.5 * (corners[edges[e][0]][i] + corners[edges[e][1]][i]) + (e == 5 && i == 0 ? 0.1 : 0.0);
+            middle[i] = 0.5 * (corners[mechanics::tetrahedron_edges[e][0]][i] +
+                               corners[mechanics::tetrahedron_edges[e][1]][i]) +
+                        (e == 5 && i == 0 ? 0.1 : 0.0);
         nodes[4 + e] = add(middle);
     }
     const auto refusal = [&] {

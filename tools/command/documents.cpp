@@ -3,9 +3,10 @@
 // which installs them, and for the completions, which ask for names.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <iterator>
 #include <map>
+#include <string_view>
+#include <utility>
 
 #include "command.hpp"
 #include "delassus/error.hpp"
@@ -59,11 +60,16 @@ std::string replaced(const std::string& text, const std::map<char, std::string>&
     return result;
 }
 
-/// What completes the value of an option: a command whose lines are the words, or words; empty: files.
-std::string words_of(const std::string& flag) {
-    if (flag == "--solver" || flag == "--solvers") return "$(delassus documents solvers 2>/dev/null)";
-    if (flag == "--integrator") return "$(delassus documents integrators 2>/dev/null)";
-    if (flag == "--law") return "associated coulomb";
+/// What completes the values of some options: words, or a command whose lines are the words. Others take files.
+constexpr std::pair<std::string_view, std::string_view> completed[] = {
+    {"--solver", "$(delassus documents solvers 2>/dev/null)"},
+    {"--solvers", "$(delassus documents solvers 2>/dev/null)"},
+    {"--integrator", "$(delassus documents integrators 2>/dev/null)"},
+    {"--law", "associated coulomb"}};
+
+std::string words_of(std::string_view flag) {
+    for (const auto& [option, words] : completed)
+        if (option == flag) return std::string(words);
     return "";
 }
 
@@ -136,8 +142,8 @@ void bash(Output& out, const CLI::App& program) {
     put(out, "    for ((i = 1; i < COMP_CWORD; ++i)); do\n        case ${{COMP_WORDS[i]}} in\n");
     put(out, "            {}) command=${{COMP_WORDS[i]}}; break ;;\n        esac\n    done\n", commands);
     put(out, "    case $previous in\n");
-    for (const char* flag : {"--solver", "--solvers", "--integrator", "--law"})
-        put(out, "        {}) COMPREPLY=($(compgen -W \"{}\" -- \"$current\")); return ;;\n", flag, words_of(flag));
+    for (const auto& [flag, values] : completed)
+        put(out, "        {}) COMPREPLY=($(compgen -W \"{}\" -- \"$current\")); return ;;\n", flag, values);
     put(out, "    esac\n    case $command in\n        \"\") words=\"{}\" ;;\n", all_words(program));
     for (const CLI::App* one : subcommands(program))
         put(out, "        {}) words=\"{}\" ;;\n", one->get_name(), all_words(*one));

@@ -182,14 +182,13 @@ struct BushingParameters {
     Vector3 turn_stiffness{}, turn_damping{};  ///< about x, y, z: Nm/rad, Nms/rad
 };
 
-/// A force and a torque on a body, given in time.
 /// A node and its part of a force.
 struct NodeShare {
     std::int32_t node = -1;
     double share = 1.0;
 };
 
-/// A force on a body, or on nodes; a torque on a body.
+/// A force on a body, or on nodes; a torque on a body. Given in time.
 struct LoadParameters {
     std::string name;
     BodyIndex body = world_body;

@@ -31,7 +31,7 @@ void MultibodySystem::Implementation::check_node(std::int32_t node, std::string_
         throw InputError(fmt::format("{} names the node {}; there are {}", what, node, nodes.size()));
 }
 
-template <int Nodes>
+template <std::size_t Nodes>
 std::array<Vector3d, Nodes> MultibodySystem::Implementation::positions_of(const std::array<std::int32_t, Nodes>& named,
                                                                           std::string_view what) const {
     std::array<Vector3d, Nodes> positions;
@@ -48,43 +48,42 @@ void MultibodySystem::Implementation::share_mass(const Element& element) {
         nodes[static_cast<std::size_t>(element.nodes()[k])].parameters.mass += element.mass(k);
 }
 
+template <class Element, class ShapeOf>
+void MultibodySystem::Implementation::add_solid(std::vector<Element>& elements, ShapeOf shape_of, std::string_view what,
+                                                const std::array<std::int32_t, Element::size>& named,
+                                                const ElasticMaterial& material, ElementModel model) {
+    must_not_be_finished();
+    mechanics::check_material(material);
+    share_mass(elements.emplace_back(named, shape_of(named, positions_of(named, what)), material, model));
+}
+
 void MultibodySystem::add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
                                       ElementModel model) {
     auto& self = *implementation_;
-    self.must_not_be_finished();
-    mechanics::check_material(material);
-    const auto shape = mechanics::linear_tetrahedron(nodes, self.positions_of<4>(nodes, "a tetrahedron"));
-    self.share_mass(self.linear_tetrahedra.emplace_back(nodes, shape, material, model));
+    self.add_solid(self.linear_tetrahedra, mechanics::linear_tetrahedron, "a tetrahedron", nodes, material, model);
     mechanics::append_sides(nodes, self.element_sides);
 }
 
 void MultibodySystem::add_quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes,
                                                 const ElasticMaterial& material, ElementModel model) {
     auto& self = *implementation_;
-    self.must_not_be_finished();
-    mechanics::check_material(material);
-    const auto shape = mechanics::quadratic_tetrahedron(nodes, self.positions_of<10>(nodes, "a tetrahedron"));
-    self.share_mass(self.quadratic_tetrahedra.emplace_back(nodes, shape, material, model));
+    self.add_solid(self.quadratic_tetrahedra, mechanics::quadratic_tetrahedron, "a tetrahedron", nodes, material,
+                   model);
     mechanics::append_sides(nodes, self.element_sides);
 }
 
 void MultibodySystem::add_brick(const std::array<std::int32_t, 8>& nodes, const ElasticMaterial& material,
                                 ElementModel model) {
     auto& self = *implementation_;
-    self.must_not_be_finished();
-    mechanics::check_material(material);
-    const auto shape = mechanics::brick(nodes, self.positions_of<8>(nodes, "a brick"));
-    self.share_mass(self.bricks.emplace_back(nodes, shape, material, model));
-    for (const auto& corners : mechanics::brick_tetrahedra)
-        mechanics::append_sides(
-            std::array<std::int32_t, 4>{nodes[corners[0]], nodes[corners[1]], nodes[corners[2]], nodes[corners[3]]},
-            self.element_sides);
+    self.add_solid(self.bricks, mechanics::brick, "a brick", nodes, material, model);
+    for (const auto& [i, j, k, l] : mechanics::brick_tetrahedra)
+        mechanics::append_sides(std::array{nodes[i], nodes[j], nodes[k], nodes[l]}, self.element_sides);
 }
 
 void MultibodySystem::add_cable(const CableParameters& cable) {
     auto& self = *implementation_;
     self.must_not_be_finished();
-    const auto positions = self.positions_of<2>(cable.nodes, fmt::format("the cable \"{}\"", cable.name));
+    const auto positions = self.positions_of(cable.nodes, fmt::format("the cable \"{}\"", cable.name));
     const double distance = (positions[1] - positions[0]).norm();
     refuse_unless(distance > 0.0, "the nodes of the cable", cable.name, "coincide");
     refuse_unless(!(cable.rest_length <= 0.0), "the rest length of the cable", cable.name, "must be positive");

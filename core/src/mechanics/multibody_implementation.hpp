@@ -79,11 +79,16 @@ struct MultibodySystem::Implementation {
     void check_body(BodyIndex body, const std::string& name) const;
     void check_node(std::int32_t node, std::string_view what) const;
     /// Throws InputError if there is no such node. what: names the element.
-    template <int Nodes>
+    template <std::size_t Nodes>
     [[nodiscard]] std::array<mechanics::Vector3d, Nodes> positions_of(const std::array<std::int32_t, Nodes>& named,
                                                                       std::string_view what) const;
     template <class Element>
     void share_mass(const Element& element);
+    /// shape_of(nodes, positions) is the element's shape.
+    template <class Element, class ShapeOf>
+    void add_solid(std::vector<Element>& elements, ShapeOf shape_of, std::string_view what,
+                   const std::array<std::int32_t, Element::size>& named, const ElasticMaterial& material,
+                   ElementModel model);
 
     /// Placements of all bodies so far at t = 0, without columns.
     [[nodiscard]] mechanics::Placements initial_placements() const;

@@ -300,9 +300,11 @@ void ElasticSolid::stiffness(const NodeColumns& x, const NodeColumns& v, double*
 }
 
 void ElasticSolid::damping(const NodeColumns& x, double* result) const {
-    NodeColumns swelling = NodeColumns::Zero(3, x.cols()), change(3, x.cols());
     Square R(result, x.size(), x.size());
     R.setZero();
+    for (Eigen::Index i = 0; i < x.size(); ++i) R(i, i) = damping_rate_ * mass(static_cast<std::size_t>(i / 3));
+    if (damping_ == 0.0) return;
+    NodeColumns swelling = NodeColumns::Zero(3, x.cols()), change(3, x.cols());
     for (const auto& [volume, g] : shape_.points) {
         const Matrix3d F = x * g.transpose();
         swelling += volume * F * g;
@@ -315,7 +317,6 @@ void ElasticSolid::damping(const NodeColumns& x, double* result) const {
             }
     }
     add_outer(damping_ * lambda_ / volume_, swelling, swelling, R);
-    for (Eigen::Index i = 0; i < x.size(); ++i) R(i, i) += damping_rate_ * mass(static_cast<std::size_t>(i / 3));
 }
 
 }  // namespace delassus::mechanics

@@ -125,11 +125,10 @@ std::vector<NodeShare> SystemReader::sides_named(const YAML::Node& item, const S
         box = read_box(keys.box, "\"box\"");
     } else {
         if (!body.box) source_.refuse(keys.face, fmt::format("\"{}\" is a mesh and has no faces; use \"box\"", name));
-        box = *body.box;
         const std::size_t number = face(source_, keys.face), axis = number / 2;
-        const double slack = 1e-6 * (box.upper[axis] - box.lower[axis]);
+        const double low = body.box->lower[axis], high = body.box->upper[axis];
+        const double place = number % 2 == 0 ? low : high, slack = 1e-6 * (high - low);
         // The other coordinates are free, so that rounding of the nodes' positions does not matter.
-        const double place = number % 2 == 0 ? box.lower[axis] : box.upper[axis];
         constexpr double any = std::numeric_limits<double>::infinity();
         box = {{-any, -any, -any}, {any, any, any}};
         box.lower[axis] = place - slack;

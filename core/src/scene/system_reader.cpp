@@ -230,50 +230,34 @@ void SystemReader::take_name(const YAML::Node& node, Numbers& numbers, std::stri
                                          kind == "body" ? std::string("bodies") : fmt::format("{}s", kind), name));
 }
 
-std::int32_t SystemReader::material_named(const YAML::Node& node, std::string_view key) {
-    const std::string name = scalar(source_, node, key);
-    const auto found = materials_.find(name);
-    if (found == materials_.end())
-        source_.refuse(
-            node, fmt::format("\"{}\" is \"{}\", but there is no such material{}", key, name, hint(name, materials_)));
+std::int32_t SystemReader::number_of(const YAML::Node& node, std::string_view key, std::string_view verb,
+                                     const std::string& name, std::string_view kind, const Numbers& numbers) {
+    const auto found = numbers.find(name);
+    if (found == numbers.end())
+        source_.refuse(node, fmt::format("\"{}\" {} \"{}\", but there is no such {}{}", key, verb, name, kind,
+                                         hint(name, numbers)));
     return found->second;
+}
+
+std::int32_t SystemReader::material_named(const YAML::Node& node, std::string_view key) {
+    return number_of(node, key, "is", scalar(source_, node, key), "material", materials_);
 }
 
 std::int32_t SystemReader::node_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
-    const std::string name = name_in(source_, node, key, copy);
-    const auto found = nodes_.find(name);
-    if (found == nodes_.end())
-        source_.refuse(node,
-                       fmt::format("\"{}\" names \"{}\", but there is no such node{}", key, name, hint(name, nodes_)));
-    return found->second;
+    return number_of(node, key, "names", name_in(source_, node, key, copy), "node", nodes_);
 }
 
 std::int32_t SystemReader::elastic_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
-    const std::string name = name_in(source_, node, key, copy);
-    const auto found = blocks_.find(name);
-    if (found == blocks_.end())
-        source_.refuse(node, fmt::format("\"{}\" names \"{}\", but there is no such elastic block or mesh{}", key, name,
-                                         hint(name, blocks_)));
-    return found->second;
+    return number_of(node, key, "names", name_in(source_, node, key, copy), "elastic block or mesh", blocks_);
 }
 
 BodyIndex SystemReader::body_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
     const std::string name = name_in(source_, node, key, copy);
-    if (name == "world") return world_body;
-    const auto found = bodies_.find(name);
-    if (found == bodies_.end())
-        source_.refuse(node,
-                       fmt::format("\"{}\" is \"{}\", but there is no such body{}", key, name, hint(name, bodies_)));
-    return found->second;
+    return name == "world" ? world_body : number_of(node, key, "is", name, "body", bodies_);
 }
 
 std::int32_t SystemReader::joint_named(const YAML::Node& node, std::string_view key, const Copy& copy) {
-    const std::string name = name_in(source_, node, key, copy);
-    const auto found = joints_.find(name);
-    if (found == joints_.end())
-        source_.refuse(node,
-                       fmt::format("\"{}\" is \"{}\", but there is no such joint{}", key, name, hint(name, joints_)));
-    return found->second;
+    return number_of(node, key, "is", name_in(source_, node, key, copy), "joint", joints_);
 }
 
 bool SystemReader::moves(BodyIndex body) const {

@@ -75,6 +75,9 @@ private:
     ContactMaterial read_contact_material(const YAML::Node& node, std::string_view name,
                                           std::vector<std::pair<std::string_view, Handler>> more = {});
 
+    /// Refuses a name that is not among the numbers: "key" verb "name", but there is no such kind.
+    std::int32_t number_of(const YAML::Node& node, std::string_view key, std::string_view verb, const std::string& name,
+                           std::string_view kind, const Numbers& numbers);
     std::int32_t node_named(const YAML::Node& node, std::string_view key, const Copy& copy);
     /// Its place in elastic_.
     std::int32_t elastic_named(const YAML::Node& node, std::string_view key, const Copy& copy);
