@@ -41,30 +41,36 @@ public:
         if (sweeps_ % period == period - 1) begin_ = model.swept(state);
     }
 
-    /// After it: the state is that of the sweep, or the one before the extrapolation.
-    void after(Model& model, bool coulomb, SweepState& state) {
+    [[nodiscard]] bool works() const { return memory_ > 0; }
+
+    /// Whether the sweep after before() is one whose end after() looks at.
+    [[nodiscard]] bool looks() const { return works() && sweeps_ % period == period - 1; }
+
+    /// After it: the state is that of the sweep, or the one before the extrapolation. The model looked at the state, if
+    /// looks().
+    void after(Model& model, SweepState& state) {
         if (memory_ == 0 || ++sweeps_ % period != 0) return;
         end_ = model.swept(state).cwiseProduct(metric_);
         step_ = end_ - begin_.cwiseProduct(metric_);
         const double length = step_.norm();
         const double without_sliding = model.objective(state);
-        if (tried_ && !has_proved_itself(without_sliding + model.swept(state).dot(sliding_), length)) {
+        if (tried_ && !has_proved_itself(without_sliding + model.work_against(sliding_, state), length)) {
             move(model, plain_, state);
             anderson_.clear();
             tried_ = false;
             return;
         }
-        model.sliding_terms(state, coulomb, sliding_);
-        objective_ = without_sliding + model.swept(state).dot(sliding_);
+        sliding_ = model.sliding_terms();
+        objective_ = without_sliding + model.work_against(sliding_, state);
         length_ = length;
         plain_ = end_;
         anderson_.push(step_, end_);
         pending_ = tried_ = anderson_.extrapolate(next_);
     }
 
-private:
-    static constexpr int period = 5;  // sweeps from one extrapolation to the next
+    static constexpr int period = 5;  ///< sweeps from one extrapolation to the next
 
+private:
     /// Where rounding hides the change of φ, the length of the step decides.
     [[nodiscard]] bool has_proved_itself(double objective, double length) const {
         const double rounding = 100.0 * std::numeric_limits<double>::epsilon() * std::abs(objective_);
@@ -85,8 +91,9 @@ private:
     // All m and in the order of the sweep. f and F are weighed by the metric √N_ii, so that rows of different units and
     // masses compare.
     sdk::Vector metric_, begin_, end_, step_, next_;
-    // The latest point that was not rejected: λ (weighed), De Saxcé's terms, φ, ‖f‖.
-    sdk::Vector plain_, sliding_;
+    // The latest point that was not rejected: λ (weighed), De Saxcé's terms by blocks, φ, ‖f‖.
+    sdk::Vector plain_;
+    std::vector<double> sliding_;
     double objective_ = 0.0, length_ = 0.0;
 };
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -69,21 +71,31 @@ public:
         std::vector<Block> blocks = blocks_of(problem.cones);
         std::vector<sdk::RowGroup> groups;
         for (const Block& block : blocks) groups.push_back(block.rows);
-        rows_ = on_velocities ? sdk::BlockRows(whitened_jacobian(problem, N), groups, nullptr, nullptr)
-                              : sdk::BlockRows(formed, groups, nullptr, nullptr);
-        order_ = SweepOrder::make(rows_, ordering, on_velocities);
-        blocks_.clear();
-        row_.clear();
-        for (const std::int32_t k : order_.block) {
-            blocks_.push_back(blocks[static_cast<std::size_t>(k)]);
-            for (std::int32_t i = 0; i < blocks_.back().rows.rows; ++i) row_.push_back(blocks_.back().rows.first + i);
+        const auto take = [&](const sdk::BlockRows::Matrix& matrix) {
+            rows_.lay_out(matrix, groups);
+            order_ = SweepOrder::make(rows_, ordering, on_velocities);
+            if (ordering != Ordering::Given || on_velocities) rows_.reorder(order_.block, on_velocities);
+            blocks_.clear();
+            row_.clear();
+            for (std::size_t k = 0; k < blocks.size(); ++k) {
+                blocks_.push_back(blocks[static_cast<std::size_t>(order_.block[k])]);
+                groups[k] = blocks_.back().rows;
+                for (std::int32_t i = 0; i < groups[k].rows; ++i) row_.push_back(groups[k].first + i);
+            }
+            rows_.fill(matrix, groups, nullptr, nullptr);
+        };
+        if (on_velocities) {
+            take(whitened_jacobian(problem, N));
+        } else {
+            take(formed);
         }
-        if (ordering != Ordering::Given || on_velocities) rows_ = rows_.reordered(order_.block, on_velocities);
         build_local_problems(problem, N, jacobi, exact);
     }
 
-    /// μ and bounds, and what the sweep starts from; call it at each solve.
-    void set_right_hand_side(const sdk::ProblemView& problem, const sdk::DelassusOperator& N) {
+    /// μ and bounds, and what the sweep starts from; call it at each solve. scaling: s_c by cones
+    /// (sdk::block_scaling).
+    void set_right_hand_side(const sdk::ProblemView& problem, const sdk::DelassusOperator& N,
+                             const std::vector<double>& scaling) {
         for (std::size_t k = 0; k < blocks_.size(); ++k) {
             const delassus_cone& cone = problem.cones[static_cast<std::size_t>(blocks_[k].cone)];
             LocalBlock& local = local_.block[k];
@@ -95,14 +107,20 @@ public:
             }
         }
         std::fill(local_.kappa.begin(), local_.kappa.end(), 0.0);
+        squares_.resize(blocks_.size());
+        for (std::size_t k = 0; k < blocks_.size(); ++k) {
+            const double s = scaling[static_cast<std::size_t>(blocks_[k].cone)];
+            squares_[k] = s * s;
+        }
+        sliding_.assign(blocks_.size(), 0.0);
         if (on_velocities_) {
             to_sweep(problem.b, offset_);
             free_state_.setZero(states_ + sdk::chunk_padding);
             free_state_.head(problem.n) = whitened(problem, N.inverse());
         } else {
             offset_ = N.free_velocity(problem);
+            velocities_.setZero(problem.m);
         }
-        velocities_.setZero(problem.m);
     }
 
     /// The state that belongs to λ (m, as the problem counts rows).
@@ -163,29 +181,30 @@ public:
         state.z.swap(next);
     }
 
-    /// u without the De Saxcé term; m, as the problem counts rows.
-    void constraint_velocities(const SweepState& state, sdk::Vector& u, const sdk::Team& team) {
+    /// The sum of the squared natural residuals of all blocks (sdk::NaturalResidual, not yet divided by the reference).
+    /// The same bits for any team. Keeps De Saxcé's terms μ‖u_t‖.
+    [[nodiscard]] double look(const SweepState& state, bool coulomb, const sdk::Team& team) {
+        constexpr std::size_t part = 512;
+        const std::size_t parts = (blocks_.size() + part - 1) / part;
+        sums_.resize(parts);
+        sliding_.resize(blocks_.size(), 0.0);
+        const double* lambda = on_velocities_ ? state.lambda.data() : state.z.data();
         team.run([&](int member) {
-            const auto [first, last] = team.share(blocks_.size(), member);
-            rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), first, last);
+            const auto [first, last] = team.share(parts, member);
+            for (std::size_t k = first; k < last; ++k)
+                sums_[k] = look_at(rows_, k * part, std::min(blocks_.size(), (k + 1) * part), local_, coulomb,
+                                   squares_.data(), offset_.data(), state.z.data(), lambda, sliding_.data());
         });
-        if (on_velocities_) {
-            to_problem(velocities_, u);
-        } else {
-            u = velocities_;
-        }
+        return std::accumulate(sums_.begin(), sums_.end(), 0.0);
     }
-
-    /// De Saxcé's terms μ‖u_t‖ in the normal rows, 0 in the others; m, in the order of the sweep.
-    void sliding_terms(const SweepState& state, bool coulomb, sdk::Vector& terms) {
-        terms.setZero(offset_.size());
-        if (!coulomb) return;
-        rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), 0, blocks_.size());
-        for (std::size_t k = 0; k < blocks_.size(); ++k) {
-            if (local_.block[k].kind != LocalBlock::Kind::Friction) continue;
-            const auto& group = rows_.groups()[k];
-            terms[group.first] = local_.block[k].mu * velocities_.segment(group.first + 1, group.rows - 1).norm();
-        }
+    /// De Saxcé's terms at the last look(), by blocks; 0 without the Coulomb law and where there is no friction.
+    [[nodiscard]] const std::vector<double>& sliding_terms() const { return sliding_; }
+    /// sᵀλ for De Saxcé's terms s by blocks.
+    [[nodiscard]] double work_against(const std::vector<double>& terms, const SweepState& state) const {
+        const double* lambda = on_velocities_ ? state.lambda.data() : state.z.data();
+        double sum = 0.0;
+        for (std::size_t k = 0; k < terms.size(); ++k) sum += terms[k] * lambda[rows_.groups()[k].first];
+        return sum;
     }
     /// ½λᵀNλ + rᵀλ, up to a constant; on velocities that is ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖².
     [[nodiscard]] double objective(SweepState& state) {
@@ -382,7 +401,9 @@ private:
     LocalProblems local_;
     sdk::Vector offset_;      // m: b on velocities, r on rows of N
     sdk::Vector free_state_;  // v̂ without reactions, padded
-    sdk::Vector velocities_;  // work space of constraint_velocities; m
+    sdk::Vector velocities_;  // work space of objective(); m
+    std::vector<double> squares_, sliding_;  // s² and De Saxcé's terms by blocks
+    std::vector<double> sums_;               // work space of look()
 };
 
 }  // namespace delassus::pgs

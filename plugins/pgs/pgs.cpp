@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Projected Gauss–Seidel over blocks: see README.md.
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -16,6 +18,7 @@ namespace delassus::pgs {
 namespace {
 
 using sdk::ProblemView;
+using sdk::Request;
 using sdk::Vector;
 
 constexpr const char* variants[] = {"forward", "symmetric", "jacobi"};
@@ -77,10 +80,11 @@ public:
         model_.build(problem, operator_, on_velocities, jacobi_, rule_.local == Local::Exact, ordering_);
     }
 
-    sdk::Outcome solve(const ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
+    sdk::Outcome solve(const ProblemView& problem, const Request& request, sdk::MutableVectorView x,
                        sdk::MutableVectorView lambda) override {
-        model_.set_right_hand_side(problem, operator_);
-        residual_ = sdk::NaturalResidual(problem, operator_.diagonal(), operator_.free_velocity(problem));
+        operator_.free_velocity(problem, u_);
+        residual_.assign(problem, operator_.diagonal(), u_);
+        model_.set_right_hand_side(problem, operator_, residual_.scaling());
         rule_.coulomb = problem.coulomb;
         lambda_.setZero(problem.m);
         if (request.warm_start() && lambda.allFinite()) lambda_ = lambda;
@@ -102,7 +106,7 @@ private:
     static constexpr std::chrono::milliseconds patience{20};  // between two calls of progress
     static constexpr std::int64_t fewest_extrapolated = 30;
 
-    void iterate(const ProblemView& problem, const sdk::Request& request, sdk::Monitor& monitor,
+    void iterate(const ProblemView& problem, const Request& request, sdk::Monitor& monitor,
                  const sdk::Team& team) {
         model_.state_of(lambda_, state_);
         // A tolerance below rounding asks for all iterations: then only their end is measured. A few of them gain less
@@ -113,29 +117,42 @@ private:
         std::int64_t next_check = to_the_end ? request.max_iterations() : 0;
         Clock::time_point shown = Clock::now();
         for (std::int64_t iteration = 0;; ++iteration) {
+            bool looks = false;
             if (iteration > 0) {
                 extrapolation_.before(model_, state_);
+                looks = extrapolation_.looks();
                 advance(team);
-                extrapolation_.after(model_, problem.coulomb, state_);
             }
             bool due = iteration >= next_check || iteration >= request.max_iterations();
+            auto answer = DELASSUS_CONTINUE;
             if (!due && request.has_listener() && Clock::now() - shown > patience) {
                 model_.reactions(state_, lambda_);
-                const auto answer = request.progress(iteration, nullptr, lambda_.data());
+                answer = request.progress(iteration, nullptr, lambda_.data());
                 shown = Clock::now();
-                due = answer != DELASSUS_CONTINUE;
-                if (due) {
-                    // The iterate may be better than the best that was measured.
-                    (void)monitor.check(iteration, nullptr, lambda_, measure(problem, request, team));
+                due = answer != DELASSUS_CONTINUE;  // the iterate may be better than the best that was measured
+            }
+            const double error = due || looks ? look(team) : 0.0;
+            if (due) {
+                if (monitor.check(iteration, nullptr, lambda_, confirmed(error, problem, request, team))) return;
+                if (answer != DELASSUS_CONTINUE) {
                     monitor.outcome().status = sdk::status_of(answer);
                     return;
                 }
+                shown = Clock::now();
+                next_check = next_check_after(iteration);
             }
-            if (!due) continue;
-            if (monitor.check(iteration, nullptr, lambda_, measure(problem, request, team))) return;
-            shown = Clock::now();
-            next_check = iteration + (check_every_ > 0 ? check_every_ : iteration < 2 ? 1 : 4 + iteration / 20);
+            if (iteration > 0) extrapolation_.after(model_, state_);
         }
+    }
+
+    // Where the sweeps are extrapolated, the ends of its periods are looked at anyway.
+    [[nodiscard]] std::int64_t next_check_after(std::int64_t iteration) const {
+        if (check_every_ > 0) return iteration + check_every_;
+        if (iteration < 2) return iteration + 1;
+        const std::int64_t next = iteration + 4 + iteration / 20;
+        if (!extrapolation_.works()) return next;
+        constexpr int period = Extrapolation::period;
+        return (iteration + std::max<std::int64_t>(period, iteration / 20)) / period * period;
     }
 
     void advance(const sdk::Team& team) {
@@ -150,15 +167,21 @@ private:
         model_.sweep_in_place(rule_, state_, team);
     }
 
-    // The natural error of λ, which is taken from the state. Where it would end the solve it is measured again as the
-    // host does, from u = D H⁻¹(a + Dᵀλ) + E λ + b, and v̂ is renewed from λ, which takes out the rounding of all
-    // changes so far.
-    double measure(const ProblemView& problem, const sdk::Request& request, const sdk::Team& team) {
+    /// The natural error of the state.
+    [[nodiscard]] double look(const sdk::Team& team) {
+        return std::sqrt(model_.look(state_, rule_.coulomb, team)) / residual_.reference();
+    }
+
+    // λ ← that of the state. Where its error would end the solve, v̂ is renewed from λ, which takes out the rounding of
+    // all changes so far, and the error is measured again: sharp ones as the host does, from u = D H⁻¹(a + Dᵀλ) + E λ +
+    // b, since rounding in another order would make a false claim of a true one.
+    double confirmed(double error, const ProblemView& problem, const Request& request, const sdk::Team& team) {
+        constexpr double sharp = 1e-8;
         model_.reactions(state_, lambda_);
-        model_.constraint_velocities(state_, u_, team);
-        const double error = residual_.natural(lambda_, u_);
         if (error > sdk::Monitor::aim * request.tolerance()) return error;
         model_.state_of(lambda_, state_);
+        error = look(team);
+        if (request.tolerance() > sharp || error > sdk::Monitor::aim * request.tolerance()) return error;
         u_ = problem.b;
         if (problem.n > 0) u_.noalias() += problem.D * operator_.velocity(problem, lambda_);
         if (problem.E.nonZeros() > 0) u_.noalias() += problem.E * lambda_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The sweeps of projected Gauss–Seidel and Jacobi: each visits the blocks and replaces λ_c by the answer of a local
-// problem with the other reactions held fixed. No memory is allocated in a sweep.
+// problem with the other reactions held fixed. And a look, which visits the blocks, changes nothing and measures how far
+// off λ is. No memory is allocated in either.
 #pragma once
 
 #include <cmath>
@@ -157,6 +158,56 @@ void visit(const sdk::BlockRows& rows, std::size_t first, std::size_t last, cons
     sdk::with_width(rows.width(), [&]<int Width>() {
         visit_blocks<OnVelocities, Width>(rows, first, last, problems, rule, offset, z, next, lambda);
     });
+}
+
+/// One block's ‖s⁻¹(λ_c − P(λ_c − s²u_c))‖², as sdk::NaturalResidual has it; square: s². sliding: De Saxcé's term, or 0.
+template <int Rows>
+inline double squared_residual(const LocalBlock& local, double square, double sliding, const double* u,
+                               const double* lambda) {
+    double sum = 0.0;
+    const bool bounded = std::isfinite(local.lo) || std::isfinite(local.hi);
+    if (local.kind == LocalBlock::Kind::Free || (local.kind == LocalBlock::Kind::Interval && !bounded)) {
+        for (int i = 0; i < Rows; ++i) sum += u[i] * u[i];
+        return square * sum;
+    }
+    double trial[Rows];
+    for (int i = 0; i < Rows; ++i) trial[i] = lambda[i] - square * u[i];
+    trial[0] -= square * sliding;
+    if constexpr (Rows == 3) {
+        sdk::FrictionCone::project_spatial(local.mu, trial);
+    } else if constexpr (Rows == 2) {
+        sdk::FrictionCone::project_with_slope(local.mu, Rows, trial);
+    } else {
+        trial[0] = std::min(local.hi, std::max(local.lo, trial[0]));
+    }
+    for (int i = 0; i < Rows; ++i) sum += (lambda[i] - trial[i]) * (lambda[i] - trial[i]);
+    return sum / square;
+}
+
+/// The sum of squared_residual over the blocks first … last − 1. squares: s² by blocks; sliding ← De Saxcé's terms by
+/// blocks, under the Coulomb law; lambda: in the order of the sweep.
+inline double look_at(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
+                      bool coulomb, const double* squares, const double* offset, const double* z, const double* lambda,
+                      double* sliding) {
+    double sum = 0.0;
+    sdk::with_width(rows.width(), [&]<int Width>() {
+        for (std::size_t k = first; k < last; ++k) {
+            const auto& block = rows.groups()[k];
+            const LocalBlock& local = problems.block[k];
+            sdk::with_rows(block.rows, [&]<int Rows>() {
+                double u[Rows];
+                sdk::multiply_group<Rows, Width>(rows.values(block), rows.starts(block), block.chunks, z,
+                                                 offset + block.first, u);
+                if (coulomb && local.kind == LocalBlock::Kind::Friction) {
+                    double tangent = 0.0;
+                    for (int i = 1; i < Rows; ++i) tangent += u[i] * u[i];
+                    sliding[k] = local.mu * std::sqrt(tangent);
+                }
+                sum += squared_residual<Rows>(local, squares[k], sliding[k], u, lambda + block.first);
+            });
+        }
+    });
+    return sum;
 }
 
 }  // namespace delassus::pgs

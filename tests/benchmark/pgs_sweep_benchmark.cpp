@@ -39,7 +39,7 @@ void time_sweeps(benchmark::State& state, delassus::Problem problem, const Way& 
     N.factorize(view);
     delassus::pgs::Model model;
     model.build(view, N, true, false, way.local == Local::Exact, way.ordering);
-    model.set_right_hand_side(view, N);
+    model.set_right_hand_side(view, N, delassus::sdk::block_scaling(view.cones, N.diagonal()));
     delassus::pgs::SweepState sweep;
     model.state_of(delassus::sdk::Vector::Zero(view.m), sweep);
     delassus::ThreadTeam threads(way.threads);

@@ -153,7 +153,7 @@ void compare_forms(Problem problem, pgs::Local local) {
     const sdk::Team alone;
     for (int form = 0; form < 2; ++form) {
         models[form].build(view, N, form == 0, false, true, pgs::Ordering::Given);
-        models[form].set_right_hand_side(view, N);
+        models[form].set_right_hand_side(view, N, sdk::block_scaling(view.cones, N.diagonal()));
         models[form].state_of(sdk::Vector::Zero(view.m), state[form]);
     }
     pgs::SweepRule rule;
@@ -229,7 +229,7 @@ struct Swept {
         N.analyze(view);
         N.factorize(view);
         model.build(view, N, on_velocities, false, true, ordering);
-        model.set_right_hand_side(view, N);
+        model.set_right_hand_side(view, N, delassus::sdk::block_scaling(view.cones, N.diagonal()));
         pgs::SweepState state;
         model.state_of(sdk::Vector::Zero(view.m), state);
         ThreadTeam members(threads);

@@ -77,8 +77,7 @@ struct AnyCone {
         return operations.gap(cone, lambda, u);
     }
 };
-/// Three rows, with the operations of sdk::FrictionCone but without its branches. Near the solution of a pile the
-/// processor cannot predict which branch a contact takes, and a wrong prediction costs more than the whole projection.
+/// Friction with three rows, without branches.
 struct SpatialFriction : sdk::FrictionCone {
     explicit SpatialFriction(const delassus_cone& cone) : mu(sdk::friction_coefficient(cone)) {}
     const double mu;  // a copy, since the compiler must assume that projections overwrite the cone
@@ -86,20 +85,10 @@ struct SpatialFriction : sdk::FrictionCone {
     [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
     [[nodiscard]] static constexpr bool is_linear() { return false; }
 
-    static void project_with_slope(double slope, double* v) {
-        const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
-        const bool inside = t <= slope * v[0], polar = slope * t <= -v[0];
-        const double normal = (v[0] + slope * t) / (1.0 + slope * slope);
-        const double factor = slope * normal / t;  // not finite for t = 0 alone, which is inside or polar
-        v[0] = polar ? 0.0 : inside ? v[0] : normal;
-        const double kept = polar ? 0.0 : inside ? 1.0 : factor;
-        v[1] *= kept;
-        v[2] *= kept;
-    }
-    void project(const delassus_cone&, double* lambda) const { project_with_slope(mu, lambda); }
+    void project(const delassus_cone&, double* lambda) const { project_spatial(mu, lambda); }
     void project_dual(const delassus_cone&, double* u) const {
         if (mu > 0.0) {
-            project_with_slope(1.0 / mu, u);
+            project_spatial(1.0 / mu, u);
         } else {
             u[0] = std::max(0.0, u[0]);
         }

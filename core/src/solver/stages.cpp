@@ -49,24 +49,25 @@ double worst_of(const Errors& error) {
 
 StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                          SolveReport& report)
-    : problem_(problem), best_(solution), settings_(settings), report_(report), started_(settings.warm_start) {
-    if (started_) error_ = problem_.meter().measure(best_.x, best_.lambda);
+    : problem_(problem), best_(solution), settings_(settings), report_(report), started_(settings.warm_start) {}
+
+const Errors& StageRunner::measured_error() {
+    if (!error_) error_ = problem_.meter().measure(best_.x, best_.lambda);
+    return *error_;
 }
 
 bool StageRunner::solved_at_start() {
     if (!started_) return false;
     const Structure structure = problem_.structure();
     if (structure == Structure::Diagonal || structure == Structure::Blocks) {
-        // Reactions of the step before balance the velocities of that step.
-        std::vector<double> x;
-        problem_.meter().velocity_of(best_.lambda, x);
-        const Errors error = problem_.meter().measure(x, best_.lambda);
-        if (worst_of(error) < worst_of(error_)) {
-            best_.x = std::move(x);
-            error_ = error;
-        }
+        // Reactions of the step before balance the velocities of that step. Those that they balance now leave the
+        // natural error alone, which rules most starts out for less than all errors cost.
+        problem_.meter().velocity_of(best_.lambda, best_.x);
+        worst_ = problem_.meter().natural(best_.x.data(), best_.lambda.data());
+        if (!(worst_ <= settings_.tolerance)) return false;
     }
-    if (worst_of(error_) > settings_.tolerance) return false;
+    worst_ = worst_of(measured_error());
+    if (worst_ > settings_.tolerance) return false;
     report_.status = Status::Solved;
     return true;
 }
@@ -90,9 +91,11 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
 
     const Errors error = other ? problem_.meter().measure(solution.x, solution.lambda) : result.error;
     // A stage with the other law provides a start for the next one, whatever its error under the problem's own law.
-    if (!started_ || worst_of(error) < worst_of(error_) || other) {
+    if (started_ && std::isnan(worst_)) worst_ = worst_of(measured_error());
+    if (!started_ || worst_of(error) < worst_ || other) {
         best_ = std::move(solution);
         error_ = error;
+        worst_ = worst_of(error);
         started_ = true;
     }
     add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, result.status, result.message,

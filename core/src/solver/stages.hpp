@@ -70,7 +70,7 @@ public:
     bool solved_at_start();
 
     /// The errors of the solution by the meter of the problem; none if nothing was run and there was no start.
-    [[nodiscard]] std::optional<Errors> error() const { return started_ ? std::optional(error_) : std::nullopt; }
+    [[nodiscard]] std::optional<Errors> error() { return started_ ? std::optional(measured_error()) : std::nullopt; }
 
     /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".
     [[nodiscard]] std::string sentence() const;
@@ -79,13 +79,16 @@ private:
     [[nodiscard]] SolveSettings settings_of(const Stage& stage, DecreaseWatch& watch, bool warm,
                                             const PreparedProblem& problem) const;
     void add(const StageReport& stage, const SolveReport& result);
+    const Errors& measured_error();
 
     const PreparedProblem& problem_;
     std::optional<PreparedProblem> other_;  // problem_ under the other law
     Solution& best_;
     const SolveSettings& settings_;
     SolveReport& report_;
-    Errors error_;  // of the best so far, where there is one
+    // Of the best so far, where there is one; the second is the greater of the natural error and the balance.
+    std::optional<Errors> error_;
+    double worst_ = std::numeric_limits<double>::quiet_NaN();
     bool started_ = false;
 };
 

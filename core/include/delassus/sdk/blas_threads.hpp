@@ -29,10 +29,11 @@ public:
     BlasThreads(const BlasThreads&) = delete;
     BlasThreads& operator=(const BlasThreads&) = delete;
 
-    /// The team of what the calling thread is about to do.
+    /// The team of what the calling thread is about to do. The first call in a plugin sets the library that the plugin
+    /// brings to one thread; what sdk::Blas loads later starts with one.
     static void use(const Team& team) {
         members_ = team.size();
-        set(1);
+        [[maybe_unused]] static const bool begun = (set(1), true);
     }
 
 private:

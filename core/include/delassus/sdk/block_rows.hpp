@@ -44,8 +44,13 @@ public:
     BlockRows(const Matrix& matrix, std::span<const RowGroup> groups, const double* left, const double* right,
               const Team& team = {});
 
-    /// The same rows with group order[k] in place k, and so in memory. renumber: rows are counted anew in that order.
-    [[nodiscard]] BlockRows reordered(std::span<const std::int32_t> order, bool renumber) const;
+    /// The same in steps, in memory that is kept. First the places alone:
+    void lay_out(const Matrix& matrix, std::span<const RowGroup> groups);
+    /// Group order[k] goes to place k, and so in memory. renumber: rows are counted anew in that order. Before fill().
+    void reorder(std::span<const std::int32_t> order, bool renumber);
+    /// The values, of the same matrix. rows[k]: the rows of the matrix that the group in place k takes.
+    void fill(const Matrix& matrix, std::span<const RowGroup> rows, const double* left, const double* right,
+              const Team& team = {});
 
     /// Stored values, shared zeros included: the cost of a product.
     [[nodiscard]] std::size_t entries() const { return value_.size(); }
@@ -69,18 +74,22 @@ public:
     void transpose_multiply_add(const double* v, double* result) const;
 
 private:
-    std::vector<std::int32_t> columns_of(const Matrix& matrix, std::span<const RowGroup> groups);
+    void find_columns(const Matrix& matrix, std::span<const RowGroup> groups);
 
-    static bool append_shared_columns(const Matrix& matrix, const RowGroup& rows, std::vector<std::int32_t>& columns);
+    bool append_shared_columns(const Matrix& matrix, const RowGroup& rows);
 
-    void fill(const Matrix& matrix, const Group& group, const double* left, const double* right);
+    void fill_group(const Matrix& matrix, const RowGroup& rows, const Group& group, const double* left,
+                    const double* right);
 
-    [[nodiscard]] int cheapest_width(const std::vector<std::int32_t>& columns, std::span<const RowGroup> groups) const;
+    [[nodiscard]] int cheapest_width() const;
+
+    void place_values();
 
     std::vector<Group> groups_;
     int width_ = 2;
     std::vector<std::int32_t> start_;  // first column of each chunk
     std::vector<double> value_;
+    std::vector<std::int32_t> columns_;  // of the groups, ascending, one group after another: work space of lay_out()
 };
 
 }  // namespace delassus::sdk

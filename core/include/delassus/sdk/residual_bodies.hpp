@@ -54,6 +54,14 @@ DELASSUS_SDK_FUNCTION double NaturalResidual::squared_block(std::size_t c, const
     const delassus_cone& cone = cones_[c];
     const double s = scaling_[c];
     double sum = 0.0;
+    if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
+        const double mu = friction_coefficient(cone), square = s * s;
+        double trial[3] = {lambda[0] - square * u[0], lambda[1] - square * u[1], lambda[2] - square * u[2]};
+        if (coulomb_) trial[0] -= square * FrictionCone::de_saxce(cone, u);
+        FrictionCone::project_spatial(mu, trial);
+        for (int i = 0; i < 3; ++i) sum += (lambda[i] - trial[i]) * (lambda[i] - trial[i]);
+        return sum / square;
+    }
     if (operations_of(cone).is_linear) {
         for (int i = 0; i < cone.rows; ++i) sum += u[i] * u[i];
         return s * s * sum;
