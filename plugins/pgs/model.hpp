@@ -174,6 +174,14 @@ public:
         });
     }
 
+    /// As sweep_in_place by the calling thread, and what look() would return if each block's residual were that of the
+    /// moment of its visit: about the error before the sweep, at no pass over the rows of its own.
+    [[nodiscard]] double recorded_sweep(const SweepRule& rule, SweepState& state) {
+        Record record{squares_.data(), sliding_.data()};
+        visit_range(rule, state, state.z, 0, blocks_.size(), &record);
+        return record.sum;
+    }
+
     /// One Jacobi step; next is work space.
     void jacobi_step(const SweepRule& rule, SweepState& state, sdk::Vector& next) const {
         next = state.z;
@@ -187,17 +195,20 @@ public:
         constexpr std::size_t part = 512;
         const std::size_t parts = (blocks_.size() + part - 1) / part;
         sums_.resize(parts);
-        sliding_.resize(blocks_.size(), 0.0);
         const double* lambda = on_velocities_ ? state.lambda.data() : state.z.data();
         team.run([&](int member) {
             const auto [first, last] = team.share(parts, member);
-            for (std::size_t k = first; k < last; ++k)
-                sums_[k] = look_at(rows_, k * part, std::min(blocks_.size(), (k + 1) * part), local_, coulomb,
-                                   squares_.data(), offset_.data(), state.z.data(), lambda, sliding_.data());
+            for (std::size_t k = first; k < last; ++k) {
+                Record record{squares_.data(), sliding_.data()};
+                look_at(rows_, k * part, std::min(blocks_.size(), (k + 1) * part), local_, coulomb, offset_.data(),
+                        state.z.data(), lambda, record);
+                sums_[k] = record.sum;
+            }
         });
         return std::accumulate(sums_.begin(), sums_.end(), 0.0);
     }
-    /// De Saxcé's terms at the last look(), by blocks; 0 without the Coulomb law and where there is no friction.
+    /// De Saxcé's terms at the last look() or recorded_sweep(), by blocks; 0 without the Coulomb law and where there is
+    /// no friction.
     [[nodiscard]] const std::vector<double>& sliding_terms() const { return sliding_; }
     /// sᵀλ for De Saxcé's terms s by blocks.
     [[nodiscard]] double work_against(const std::vector<double>& terms, const SweepState& state) const {
@@ -227,13 +238,14 @@ public:
     [[nodiscard]] const LocalProblems& local() const { return local_; }
 
 private:
-    void visit_range(const SweepRule& rule, SweepState& state, sdk::Vector& next, std::size_t first,
-                     std::size_t last) const {
+    void visit_range(const SweepRule& rule, SweepState& state, sdk::Vector& next, std::size_t first, std::size_t last,
+                     Record* record = nullptr) const {
         if (on_velocities_) {
             visit<true>(rows_, first, last, local_, rule, offset_.data(), state.z.data(), next.data(),
-                        state.lambda.data());
+                        state.lambda.data(), record);
         } else {
-            visit<false>(rows_, first, last, local_, rule, offset_.data(), state.z.data(), next.data(), nullptr);
+            visit<false>(rows_, first, last, local_, rule, offset_.data(), state.z.data(), next.data(), nullptr,
+                         record);
         }
     }
 
@@ -399,9 +411,9 @@ private:
     std::vector<Block> blocks_;      // by visits, rows as the problem counts them
     std::vector<std::int32_t> row_;  // the problem's row of each row by visits
     LocalProblems local_;
-    sdk::Vector offset_;      // m: b on velocities, r on rows of N
-    sdk::Vector free_state_;  // v̂ without reactions, padded
-    sdk::Vector velocities_;  // work space of objective(); m
+    sdk::Vector offset_;                     // m: b on velocities, r on rows of N
+    sdk::Vector free_state_;                 // v̂ without reactions, padded
+    sdk::Vector velocities_;                 // work space of objective(); m
     std::vector<double> squares_, sliding_;  // s² and De Saxcé's terms by blocks
     std::vector<double> sums_;               // work space of look()
 };

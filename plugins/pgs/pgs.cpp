@@ -105,25 +105,33 @@ private:
     using Clock = std::chrono::steady_clock;
     static constexpr std::chrono::milliseconds patience{20};  // between two calls of progress
     static constexpr std::int64_t fewest_extrapolated = 30;
+    static constexpr std::int64_t fewest_unchecked = 20;
+    static constexpr double worth_a_look = 1.5;  // times the tolerance: an estimate that low
 
-    void iterate(const ProblemView& problem, const Request& request, sdk::Monitor& monitor,
-                 const sdk::Team& team) {
+    void iterate(const ProblemView& problem, const Request& request, sdk::Monitor& monitor, const sdk::Team& team) {
         model_.state_of(lambda_, state_);
         // A tolerance below rounding asks for all iterations: then only their end is measured. A few of them gain less
         // by extrapolation than it costs.
         const bool to_the_end = request.tolerance() < std::numeric_limits<double>::epsilon();
         const bool few = to_the_end && request.max_iterations() < fewest_extrapolated;
         extrapolation_.reset(model_, operator_, few ? 0 : memory_);
+        // A warm start is a step of a simulation, whose sweeps are few: their own estimate says when to look.
+        const bool estimates = request.warm_start() && check_every_ == 0 && !jacobi_ && ordering_ != Ordering::Coloured;
         std::int64_t next_check = to_the_end ? request.max_iterations() : 0;
         Clock::time_point shown = Clock::now();
         for (std::int64_t iteration = 0;; ++iteration) {
             bool looks = false;
+            double error = std::numeric_limits<double>::infinity();
             if (iteration > 0) {
                 extrapolation_.before(model_, state_);
                 looks = extrapolation_.looks();
-                advance(team);
+                const bool records = estimates && (iteration == 1 || iteration % Extrapolation::period == 0);
+                const double squares = advance(team, records);
+                if (records) error = std::sqrt(squares) / residual_.reference();
+                looks = looks && !records;
             }
-            bool due = iteration >= next_check || iteration >= request.max_iterations();
+            bool due = iteration >= next_check || iteration >= request.max_iterations() ||
+                       error <= worth_a_look * request.tolerance();
             auto answer = DELASSUS_CONTINUE;
             if (!due && request.has_listener() && Clock::now() - shown > patience) {
                 model_.reactions(state_, lambda_);
@@ -131,7 +139,7 @@ private:
                 shown = Clock::now();
                 due = answer != DELASSUS_CONTINUE;  // the iterate may be better than the best that was measured
             }
-            const double error = due || looks ? look(team) : 0.0;
+            if (due || looks) error = look(team);
             if (due) {
                 if (monitor.check(iteration, nullptr, lambda_, confirmed(error, problem, request, team))) return;
                 if (answer != DELASSUS_CONTINUE) {
@@ -139,7 +147,8 @@ private:
                     return;
                 }
                 shown = Clock::now();
-                next_check = next_check_after(iteration);
+                next_check =
+                    estimates ? iteration + std::max(fewest_unchecked, iteration / 20) : next_check_after(iteration);
             }
             if (iteration > 0) extrapolation_.after(model_, state_);
         }
@@ -149,22 +158,25 @@ private:
     [[nodiscard]] std::int64_t next_check_after(std::int64_t iteration) const {
         if (check_every_ > 0) return iteration + check_every_;
         if (iteration < 2) return iteration + 1;
-        const std::int64_t next = iteration + 4 + iteration / 20;
-        if (!extrapolation_.works()) return next;
+        if (!extrapolation_.works()) return iteration + 4 + iteration / 20;
         constexpr int period = Extrapolation::period;
         return (iteration + std::max<std::int64_t>(period, iteration / 20)) / period * period;
     }
 
-    void advance(const sdk::Team& team) {
+    /// records: returns what Model::recorded_sweep returns, else 0.
+    double advance(const sdk::Team& team, bool records) {
         if (jacobi_) {
             model_.jacobi_step(rule_, state_, next_);
-            return;
+            return 0.0;
         }
-        rule_.direction = Direction::Forward;
-        model_.sweep_in_place(rule_, state_, team);
-        if (!symmetric_) return;
-        rule_.direction = Direction::Backward;
-        model_.sweep_in_place(rule_, state_, team);
+        const auto sweep = [&](Direction direction, bool last) {
+            rule_.direction = direction;
+            if (last && records) return model_.recorded_sweep(rule_, state_);
+            model_.sweep_in_place(rule_, state_, team);
+            return 0.0;
+        };
+        const double squares = sweep(Direction::Forward, !symmetric_);
+        return symmetric_ ? sweep(Direction::Backward, true) : squares;
     }
 
     /// The natural error of the state.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The sweeps of projected Gauss–Seidel and Jacobi: each visits the blocks and replaces λ_c by the answer of a local
-// problem with the other reactions held fixed. And a look, which visits the blocks, changes nothing and measures how far
-// off λ is. No memory is allocated in either.
+// problem with the other reactions held fixed. And a look, which visits the blocks, changes nothing and measures how
+// far off λ is. No memory is allocated in either.
 #pragma once
 
 #include <cmath>
@@ -116,51 +116,8 @@ inline void local_step(const LocalProblems& problems, const LocalBlock& local, c
     }
 }
 
-/// Visits the blocks first … last − 1. lambda and offset: by the rows of `rows`.
-///   OnVelocities: z and next have the entries of v̂; Gauss–Seidel passes one array for both, Jacobi reads z and adds to
-///   next (a copy of z on entry). Otherwise z is λ itself and next where new values go; lambda is not used.
-template <bool OnVelocities, int Width>
-void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
-                  const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
-    constexpr std::size_t ahead = 256, line = 8;  // doubles: coefficients are fetched this far ahead
-    const bool forward = rule.direction == Direction::Forward;
-    for (std::size_t k = first; k < last; ++k) {
-        const std::size_t index = forward ? k : last - 1 - (k - first);
-        const auto& block = rows.groups()[index];
-        const LocalBlock& local = problems.block[index];
-        const double* value = rows.values(block);
-        const std::int32_t* start = rows.starts(block);
-        sdk::with_rows(block.rows, [&]<int Rows>() {
-            for (std::size_t i = 0; i < 2 * Rows * Width; i += line)
-                __builtin_prefetch(forward ? value + ahead + i : value - ahead + i);
-            double u[Rows], fresh[Rows], delta[Rows];
-            sdk::multiply_group<Rows, Width>(value, start, block.chunks, z, offset + block.first, u);
-            const double* old = (OnVelocities ? lambda : z) + block.first;
-            for (int i = 0; i < Rows; ++i) fresh[i] = old[i];
-            local_step<Rows>(problems, local, rule, u, fresh);
-            if constexpr (OnVelocities) {
-                for (int i = 0; i < Rows; ++i) {
-                    delta[i] = fresh[i] - lambda[block.first + i];
-                    lambda[block.first + i] = fresh[i];
-                }
-                sdk::transpose_multiply_group<Rows, Width>(value, start, block.chunks, delta, next);
-            } else {
-                for (int i = 0; i < Rows; ++i) next[block.first + i] = fresh[i];
-            }
-        });
-    }
-}
-
-/// visit_blocks with the width chosen at run time.
-template <bool OnVelocities>
-void visit(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
-           const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda) {
-    sdk::with_width(rows.width(), [&]<int Width>() {
-        visit_blocks<OnVelocities, Width>(rows, first, last, problems, rule, offset, z, next, lambda);
-    });
-}
-
-/// One block's ‖s⁻¹(λ_c − P(λ_c − s²u_c))‖², as sdk::NaturalResidual has it; square: s². sliding: De Saxcé's term, or 0.
+/// One block's ‖s⁻¹(λ_c − P(λ_c − s²u_c))‖², as sdk::NaturalResidual has it; square: s². sliding: De Saxcé's term, or
+/// 0.
 template <int Rows>
 inline double squared_residual(const LocalBlock& local, double square, double sliding, const double* u,
                                const double* lambda) {
@@ -184,30 +141,87 @@ inline double squared_residual(const LocalBlock& local, double square, double sl
     return sum / square;
 }
 
-/// The sum of squared_residual over the blocks first … last − 1. squares: s² by blocks; sliding ← De Saxcé's terms by
-/// blocks, under the Coulomb law; lambda: in the order of the sweep.
-inline double look_at(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
-                      bool coulomb, const double* squares, const double* offset, const double* z, const double* lambda,
-                      double* sliding) {
+/// Adds a block's squared_residual, from its velocities u before λ_c moves, to what a sweep or a look finds.
+struct Record {
+    const double* squares;  ///< s² by blocks
+    double* sliding;        ///< by blocks: De Saxcé's terms, under the Coulomb law
     double sum = 0.0;
+
+    template <int Rows>
+    void add(std::size_t k, const LocalBlock& local, bool coulomb, const double* u, const double* lambda) {
+        if (coulomb && local.kind == LocalBlock::Kind::Friction) {
+            double tangent = 0.0;
+            for (int i = 1; i < Rows; ++i) tangent += u[i] * u[i];
+            sliding[k] = local.mu * std::sqrt(tangent);
+        }
+        sum += squared_residual<Rows>(local, squares[k], sliding[k], u, lambda);
+    }
+};
+
+/// Visits the blocks first … last − 1. lambda and offset: by the rows of `rows`. record: null, or what it finds.
+///   OnVelocities: z and next have the entries of v̂; Gauss–Seidel passes one array for both, Jacobi reads z and adds to
+///   next (a copy of z on entry). Otherwise z is λ itself and next where new values go; lambda is not used.
+template <bool OnVelocities, bool Records, int Width>
+void visit_blocks(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
+                  const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda,
+                  Record* record) {
+    constexpr std::size_t ahead = 256, line = 8;  // doubles: coefficients are fetched this far ahead
+    const bool forward = rule.direction == Direction::Forward;
+    for (std::size_t k = first; k < last; ++k) {
+        const std::size_t index = forward ? k : last - 1 - (k - first);
+        const auto& block = rows.groups()[index];
+        const LocalBlock& local = problems.block[index];
+        const double* value = rows.values(block);
+        const std::int32_t* start = rows.starts(block);
+        sdk::with_rows(block.rows, [&]<int Rows>() {
+            for (std::size_t i = 0; i < 2 * Rows * Width; i += line)
+                __builtin_prefetch(forward ? value + ahead + i : value - ahead + i);
+            double u[Rows], fresh[Rows], delta[Rows];
+            sdk::multiply_group<Rows, Width>(value, start, block.chunks, z, offset + block.first, u);
+            const double* old = (OnVelocities ? lambda : z) + block.first;
+            for (int i = 0; i < Rows; ++i) fresh[i] = old[i];
+            if constexpr (Records) record->add<Rows>(index, local, rule.coulomb, u, old);
+            local_step<Rows>(problems, local, rule, u, fresh);
+            if constexpr (OnVelocities) {
+                for (int i = 0; i < Rows; ++i) {
+                    delta[i] = fresh[i] - lambda[block.first + i];
+                    lambda[block.first + i] = fresh[i];
+                }
+                sdk::transpose_multiply_group<Rows, Width>(value, start, block.chunks, delta, next);
+            } else {
+                for (int i = 0; i < Rows; ++i) next[block.first + i] = fresh[i];
+            }
+        });
+    }
+}
+
+/// visit_blocks with the width chosen at run time.
+template <bool OnVelocities>
+void visit(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
+           const SweepRule& rule, const double* offset, const double* z, double* next, double* lambda, Record* record) {
+    sdk::with_width(rows.width(), [&]<int Width>() {
+        if (record)
+            visit_blocks<OnVelocities, true, Width>(rows, first, last, problems, rule, offset, z, next, lambda, record);
+        else
+            visit_blocks<OnVelocities, false, Width>(rows, first, last, problems, rule, offset, z, next, lambda,
+                                                     record);
+    });
+}
+
+/// Records the blocks first … last − 1 and changes nothing. lambda: in the order of the sweep.
+inline void look_at(const sdk::BlockRows& rows, std::size_t first, std::size_t last, const LocalProblems& problems,
+                    bool coulomb, const double* offset, const double* z, const double* lambda, Record& record) {
     sdk::with_width(rows.width(), [&]<int Width>() {
         for (std::size_t k = first; k < last; ++k) {
             const auto& block = rows.groups()[k];
-            const LocalBlock& local = problems.block[k];
             sdk::with_rows(block.rows, [&]<int Rows>() {
                 double u[Rows];
                 sdk::multiply_group<Rows, Width>(rows.values(block), rows.starts(block), block.chunks, z,
                                                  offset + block.first, u);
-                if (coulomb && local.kind == LocalBlock::Kind::Friction) {
-                    double tangent = 0.0;
-                    for (int i = 1; i < Rows; ++i) tangent += u[i] * u[i];
-                    sliding[k] = local.mu * std::sqrt(tangent);
-                }
-                sum += squared_residual<Rows>(local, squares[k], sliding[k], u, lambda + block.first);
+                record.add<Rows>(k, problems.block[k], coulomb, u, lambda + block.first);
             });
         }
     });
-    return sum;
 }
 
 }  // namespace delassus::pgs

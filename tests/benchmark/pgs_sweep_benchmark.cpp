@@ -15,6 +15,7 @@
 #include "delassus/generate.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/sdk/residual.hpp"
 #include "delassus/thread_team.hpp"
 #include "plugins/pgs/model.hpp"
 

@@ -16,6 +16,7 @@
 #include "delassus/errors.hpp"
 #include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/sdk/residual.hpp"
 #include "delassus/solver.hpp"
 #include "delassus/thread_team.hpp"
 #include "support/small_problems.hpp"

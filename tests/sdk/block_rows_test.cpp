@@ -138,7 +138,7 @@ TEST_P(Runs, ReorderedRowsAreTheSameRows) {
         *other = before.rows();
         other->lay_out(random.matrix, random.groups);
         other->reorder(order, other == &renumbered);
-        other->fill(random.matrix, taken, nullptr, nullptr);
+        other->fill(random.matrix, taken, random.left.data(), random.right.data());
     }
     const Vector v = padded(Vector::Random(50));
     Vector a = Vector::Zero(random.dense.rows()), b = a, c = a;

@@ -134,6 +134,9 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
         if (totals.repeated_solves > 0)
             fmt::print("  {} solves missed the tolerance with {} and were repeated with auto\n", totals.repeated_solves,
                        system.solver.name);
+        if (totals.near_goal_solves > 0)
+            fmt::print("  {} solves ended above the tolerance that their steps are worth, within what is good enough\n",
+                       totals.near_goal_solves);
     }
     if (status != RunStatus::Finished) fmt::print("{}\n", status_word(status));
 }

@@ -65,8 +65,9 @@ struct SimulationTotals {
     double worst_linearization = 0.0;
     std::int64_t most_contacts = 0;
     std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
-    std::int64_t resting_parts = 0;    ///< parts of problems that were left out because their bodies sleep
-    std::int64_t repeated_solves = 0;  ///< by `auto`, since the solver that was asked for missed its tolerance
+    std::int64_t resting_parts = 0;     ///< parts of problems that were left out because their bodies sleep
+    std::int64_t repeated_solves = 0;   ///< by `auto`, since the solver that was asked for missed its tolerance
+    std::int64_t near_goal_solves = 0;  ///< that ended somewhat above what their steps are worth (docs/tolerance.md)
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;

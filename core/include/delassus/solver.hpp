@@ -43,6 +43,9 @@ struct CurveSample {
 /// The settings of one solve.
 struct SolveSettings {
     double tolerance = 1e-8;  ///< natural error, > 0
+    /// Nobody asked for the tolerance: the caller chose it for what the answer is worth. `auto` may then end a little
+    /// above it rather than work for ever (SolveReport::near_goal).
+    bool tolerance_is_goal = false;
     std::int64_t max_iterations = 1000000;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
@@ -93,6 +96,8 @@ struct SolveReport {
     Errors error;
     std::vector<CurveSample> curve;
     std::vector<StageReport> stages;  ///< empty if one solver did it all
+    /// Not solved, but within the multiple of a tolerance that is a goal which a stage of `auto` allows.
+    bool near_goal = false;
 };
 
 /// The report as JSON text, with the fields' names as a user of --json sees them (docs/report.md).

@@ -28,9 +28,11 @@ struct SolverEffort {
     std::int64_t iterations = 0;     ///< of the plugin
     double seconds = 0.0;            ///< set-up and solve
     std::int64_t repeated = 0;       ///< solves that `auto` repeated, since the configured solver missed its tolerance
-    double worst_natural = 0.0;      ///< largest natural error of an answer that was used
-    double worst_miss = 0.0;         ///< largest factor by which an answer missed its tolerance; 0: none did
-    std::string unsolved;            ///< the first message of a solve that did not end solved; empty if none
+    /// Solves that ended above the tolerance that their step is worth, but within what a stage of `auto` allows.
+    std::int64_t near_goal = 0;
+    double worst_natural = 0.0;  ///< largest natural error of an answer that was used
+    double worst_miss = 0.0;     ///< largest factor by which an answer missed its tolerance; 0: none did
+    std::string unsolved;        ///< the first message of a solve that did not end solved; empty if none
 };
 
 /// The answer of StepSolver::cancelled was yes.

@@ -110,8 +110,10 @@ struct StepSolver::Implementation {
                     PartResult& result);
     /// Adds to the effort; whether the part was solved.
     bool take(const PartResult& result);
-    /// Of a part, where the method makes this error: see docs/tolerance.md.
-    [[nodiscard]] double tolerance_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
+    /// Whether tolerances follow from the error of the method: see docs/tolerance.md.
+    [[nodiscard]] bool follows_method() const { return !config.tolerance && !config.sweeps && !method_error.empty(); }
+    /// The tolerance of a part then.
+    [[nodiscard]] double goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
     /// solution, what it is worth in report.
     void solve_again(const PreparedProblem& prepared, Instance& by, SolveSettings again, Solution& solution,
@@ -272,6 +274,7 @@ bool StepSolver::Implementation::take(const PartResult& result) {
     effort.iterations += part.iterations;
     effort.seconds += part.seconds;
     effort.repeated += part.repeated;
+    effort.near_goal += part.near_goal;
     effort.worst_natural = std::max(effort.worst_natural, part.worst_natural);
     effort.worst_miss = std::max(effort.worst_miss, part.worst_miss);
     if (effort.unsolved.empty()) effort.unsolved = part.unsolved;
@@ -309,7 +312,8 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
-    part_settings.tolerance = tolerance_for(prepared, columns);
+    part_settings.tolerance_is_goal = follows_method();
+    part_settings.tolerance = part_settings.tolerance_is_goal ? goal_for(prepared, columns) : settings.tolerance;
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
     if (may_repeat && part_settings.warm_start) by.before = solution;
@@ -318,11 +322,13 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     ++spent.plugin_solves;
     by.count(report, spent);
     const auto done = [&] {
-        return report.status == Status::Solved || (config.sweeps && report.status == Status::IterationLimit);
+        return report.status == Status::Solved || report.near_goal ||
+               (config.sweeps && report.status == Status::IterationLimit);
     };
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
     if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
+    if (report.near_goal) ++spent.near_goal;
     if (done()) return;
     result.solved = false;
     spent.worst_miss = std::max(spent.worst_miss, std::max(report.error.natural, report.error.balance) /
@@ -392,10 +398,8 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
     report = std::move(second);
 }
 
-double StepSolver::Implementation::tolerance_for(const PreparedProblem& part,
-                                                 std::span<const std::int32_t> columns) const {
+double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
     constexpr double share = 0.5, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
-    if (config.tolerance || config.sweeps || method_error.empty()) return settings.tolerance;
     const Problem& problem = part.problem();
     double square = 0.0;
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {

@@ -108,6 +108,7 @@ bool RedundancyCheck::operator()(const SparseMatrix& D, const SparseMatrix& E, b
 }
 
 bool RedundancyCheck::by_places(const SparseMatrix& D, const SparseMatrix& E) {
+    if (E.entries() == 0 && D.rows > D.columns) return true;
     touched_.assign(static_cast<std::size_t>(D.columns), 0);
     std::int64_t rigid_rows = 0;
     for (std::int32_t row = 0; row < D.rows; ++row) {

@@ -88,6 +88,7 @@ private:
             }
         }
         for (std::int32_t row = 0; row < A.rows; ++row) {
+            if (columns_ascend(A, row)) continue;
             for (std::int32_t k = A.row_start[row]; k < A.row_start[row + 1]; ++k) {
                 if (A.column[k] < 0 || A.column[k] >= A.columns) {
                     refuse("row {} of {} has an entry in column {}; columns go from 0 to {}.", row, name, A.column[k],
@@ -99,6 +100,15 @@ private:
                 }
             }
         }
+    }
+
+    /// From 0 to the number of columns − 1. Without a branch an entry.
+    static bool columns_ascend(const SparseMatrix& A, std::int32_t row) {
+        const std::int32_t *first = A.column.data() + A.row_start[row], *last = A.column.data() + A.row_start[row + 1];
+        if (first == last) return true;
+        bool ascends = *first >= 0 && last[-1] < A.columns;
+        for (; first + 1 < last; ++first) ascends &= first[0] < first[1];
+        return ascends;
     }
 
     void values(const SparseMatrix& A, const char* name) const {

@@ -311,6 +311,7 @@ const StepRecord& Simulation::step() {
     totals.plugin_solves += effort.plugin_solves;
     totals.resting_parts += effort.resting_parts;
     totals.repeated_solves += effort.repeated;
+    totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
     if (!report.solved) {
         ++totals.unsolved_steps;

@@ -61,10 +61,19 @@ bool StageRunner::solved_at_start() {
     const Structure structure = problem_.structure();
     if (structure == Structure::Diagonal || structure == Structure::Blocks) {
         // Reactions of the step before balance the velocities of that step. Those that they balance now leave the
-        // natural error alone, which rules most starts out for less than all errors cost.
-        problem_.meter().velocity_of(best_.lambda, best_.x);
-        worst_ = problem_.meter().natural(best_.x.data(), best_.lambda.data());
-        if (!(worst_ <= settings_.tolerance)) return false;
+        // natural error alone, which rules most starts out for less than all errors cost. Near the answer either may be
+        // the better one.
+        constexpr double near = 100.0;
+        std::vector<double> x;
+        problem_.meter().velocity_of(best_.lambda, x);
+        worst_ = problem_.meter().natural(x.data(), best_.lambda.data());
+        const bool given = worst_ > settings_.tolerance && worst_ <= near * settings_.tolerance &&
+                           worst_of(measured_error()) < worst_;
+        if (!given) {
+            best_.x = std::move(x);
+            error_.reset();
+            if (!(worst_ <= settings_.tolerance)) return false;
+        }
     }
     worst_ = worst_of(measured_error());
     if (worst_ > settings_.tolerance) return false;
@@ -105,6 +114,10 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
     if (worst_of(error) <= settings_.tolerance ||
         (result.status == Status::Solved && tolerance == settings_.tolerance && !other)) {
         report_.status = Status::Solved;
+        return true;
+    }
+    if (settings_.tolerance_is_goal && worst_ <= stage.good_enough * settings_.tolerance) {
+        report_.near_goal = true;
         return true;
     }
     if (report_.iterations >= settings_.max_iterations) {

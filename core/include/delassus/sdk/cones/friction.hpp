@@ -51,8 +51,8 @@ struct FrictionCone {
         for (int i = 1; i < rows; ++i) v[i] *= factor;
     }
 
-    /// As project_with_slope with three rows, without branches. Near the solution of a pile the processor cannot predict
-    /// which branch a contact takes, and a wrong prediction costs more than the whole projection.
+    /// As project_with_slope with three rows, without branches. Near the solution of a pile the processor cannot
+    /// predict which branch a contact takes, and a wrong prediction costs more than the whole projection.
     static void project_spatial(double slope, double* v) {
         const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
         const bool inside = t <= slope * v[0], polar = slope * t <= -v[0];
