@@ -42,9 +42,8 @@ constexpr delassus_option option_table[] = {
                        "little apart; by colours that share no body"),
     sdk::choice_option("acceleration", "anderson", accelerations, "extrapolation of the sweeps"),
     sdk::integer_option("memory", "5", 1, 100, "points", "differences that anderson keeps"),
-    sdk::integer_option(
-        "check_every", "0", 0, 1e9, "iterations",
-        "iterations between measurements of the natural error; 0: four, and 5 % of the iterations done"),
+    sdk::integer_option("check_every", "0", 0, 1e9, "iterations",
+                        "iterations between measurements of the natural error; 0: five, or 5 % of the iterations done"),
     sdk::integer_option("stall_window", "1000000", 0, 1e15, "iterations",
                         "the solve ends as stalled after this many iterations without a gain of 1 %; 0: never"),
 };

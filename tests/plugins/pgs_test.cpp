@@ -215,6 +215,68 @@ TEST(PgsSweep, JacobiBlocksBoundN) {
     }
 }
 
+/// All kinds of cones, one row of each body to a row of the problem where `apart`.
+Problem all_kinds(bool apart) {
+    Problem problem;
+    problem.cones = {Cone::friction(0.4), Cone::nonnegative(2),   Cone::box({-1.0, 0.0}, {0.5, 2.0}),
+                     Cone::free(2),       Cone::friction(0.7, 2), Cone::free(8)};
+    std::int32_t m = 0;
+    for (const Cone& cone : problem.cones) m += cone.rows;
+    std::mt19937 random(3);
+    const auto draw = [&] { return std::normal_distribution<double>()(random); };
+    std::vector<Triplet> entries;
+    std::vector<double> masses;
+    for (std::int32_t i = 0; i < m; ++i) {
+        masses.push_back(1.0 + 0.1 * i);
+        problem.a.push_back(draw());
+        problem.b.push_back(draw());
+        for (std::int32_t j = 0; j < m; ++j)
+            if (i == j || !apart) entries.push_back({i, j, draw()});
+    }
+    problem.H = diagonal_matrix(masses);
+    problem.D = SparseMatrix::from_triplets(m, m, entries);
+    return problem;
+}
+
+TEST(PgsSweep, ALookSeesTheNaturalError) {
+    for (const Law law : {Law::Associated, Law::Coulomb})
+        for (const bool apart : {true, false})
+            for (const bool on_velocities : {true, false}) {
+                Problem problem = all_kinds(apart);
+                problem.law = law;
+                const PreparedProblem prepared(std::move(problem));
+                const sdk::ProblemView view(prepared.raw());
+                sdk::DelassusOperator N;
+                N.analyze(view);
+                N.factorize(view);
+                const sdk::NaturalResidual residual(view, N.diagonal(), N.free_velocity(view));
+                pgs::Model model;
+                model.build(view, N, on_velocities, false, false, pgs::Ordering::Spaced);
+                model.set_right_hand_side(view, N, residual.scaling());
+                pgs::SweepState state;
+                sdk::Vector lambda = sdk::Vector::LinSpaced(view.m, -1.0, 2.0);
+                model.state_of(lambda, state);
+                pgs::SweepRule rule;
+                rule.local = pgs::Local::Diagonal;
+                rule.coulomb = view.coulomb;
+                const auto natural = [&] {
+                    model.reactions(state, lambda);
+                    const sdk::Vector u = view.D * N.velocity(view, lambda) + view.b;
+                    return residual.natural(lambda, u);
+                };
+                const auto looked = [&] {
+                    return std::sqrt(model.look(state, view.coulomb, {})) / residual.reference();
+                };
+                double before = natural();
+                EXPECT_NEAR(looked(), before, 1e-12 * before);
+                // What a sweep records is the error at the moment of each visit: blocks apart are as they were.
+                const double recorded = std::sqrt(model.recorded_sweep(rule, state)) / residual.reference();
+                if (apart) { EXPECT_NEAR(recorded, before, 1e-12 * before); }
+                before = natural();
+                EXPECT_NEAR(looked(), before, 1e-12 * before);
+            }
+}
+
 // ---- Orders and threads ---------------------------------------------------------------------------------------------
 
 /// A model of a problem, with λ after some sweeps both ways.

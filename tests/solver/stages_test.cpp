@@ -167,6 +167,26 @@ TEST(Auto, RunsTheStagesOfItsRule) {
     EXPECT_EQ(report.message.substr(0, 4), "all:");
 }
 
+// A tolerance that nobody asked for may be missed by as much as a stage allows; one that was asked for may not.
+TEST(Auto, EndsNearAToleranceThatIsAGoal) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "pgs", "max_iterations": 10, "good_enough": 1e11, "reason": "a few sweeps"},
+        {"solver": "apgd", "reason": "to the end"}]}])");
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    for (const bool goal : {true, false}) {
+        Solution solution;
+        SolveSettings settings;
+        settings.tolerance = 1e-10;
+        settings.tolerance_is_goal = goal;
+        const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution, settings);
+        EXPECT_EQ(report.near_goal, goal);
+        EXPECT_EQ(report.stages.size(), goal ? 1U : 2U) << report.message;
+        EXPECT_EQ(report.status, goal ? Status::IterationLimit : Status::Solved);
+        EXPECT_EQ(report.error.natural > settings.tolerance, goal);
+    }
+}
+
 // A rule without a solver that gets there: everyone else who can has a try, from the best so far.
 TEST(Auto, GoesOnWithWhoeverCan) {
     const ScratchFolder scratch;
