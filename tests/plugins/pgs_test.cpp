@@ -271,7 +271,9 @@ TEST(PgsSweep, ALookSeesTheNaturalError) {
                 EXPECT_NEAR(looked(), before, 1e-12 * before);
                 // What a sweep records is the error at the moment of each visit: blocks apart are as they were.
                 const double recorded = std::sqrt(model.recorded_sweep(rule, state)) / residual.reference();
-                if (apart) { EXPECT_NEAR(recorded, before, 1e-12 * before); }
+                if (apart) {
+                    EXPECT_NEAR(recorded, before, 1e-12 * before);
+                }
                 before = natural();
                 EXPECT_NEAR(looked(), before, 1e-12 * before);
             }
