@@ -15,6 +15,8 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <vector>
 
 #include "delassus/sdk/anderson.hpp"
 #include "model.hpp"
@@ -50,9 +52,7 @@ public:
     /// looks().
     void after(Model& model, SweepState& state) {
         if (memory_ == 0 || ++sweeps_ % period != 0) return;
-        end_ = model.swept(state).cwiseProduct(metric_);
-        step_ = end_ - begin_.cwiseProduct(metric_);
-        const double length = step_.norm();
+        const double length = weigh_step(model, state);
         const double without_sliding = model.objective(state);
         if (tried_ && !has_proved_itself(without_sliding + model.work_against(sliding_, state), length)) {
             move(model, plain_, state);
@@ -63,9 +63,9 @@ public:
         sliding_ = model.sliding_terms();
         objective_ = without_sliding + model.work_against(sliding_, state);
         length_ = length;
-        plain_ = end_;
-        anderson_.push(step_, end_);
-        pending_ = tried_ = anderson_.extrapolate(next_);
+        plain_.swap(end_);
+        anderson_.push(step_, plain_, model.team());
+        pending_ = tried_ = anderson_.extrapolate(next_, model.team());
     }
 
     static constexpr int period = 5;  ///< sweeps from one extrapolation to the next
@@ -77,9 +77,28 @@ private:
         return objective < objective_ - rounding || (objective <= objective_ + rounding && length <= length_);
     }
 
+    /// The latest sweep's end and step, weighed by the metric; returns the length of the step.
+    double weigh_step(const Model& model, SweepState& state) {
+        const auto lambda = model.swept(state);
+        end_.resize(lambda.size());
+        step_.resize(lambda.size());
+        squares_.resize(static_cast<std::size_t>(sdk::Team::parts_of(lambda.size())));
+        model.team().for_parts(lambda.size(), [&](Eigen::Index part, Eigen::Index first, Eigen::Index size) {
+            const auto metric = metric_.segment(first, size);
+            auto end = end_.segment(first, size), step = step_.segment(first, size);
+            end = lambda.segment(first, size).cwiseProduct(metric);
+            step = end - begin_.segment(first, size).cwiseProduct(metric);
+            squares_[static_cast<std::size_t>(part)] = step.squaredNorm();
+        });
+        return std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
+    }
+
     /// λ ← one that is weighed by the metric.
     void move(const Model& model, const sdk::Vector& weighed, SweepState& state) const {
-        model.swept(state) = weighed.cwiseQuotient(metric_);
+        auto lambda = model.swept(state);
+        model.team().for_parts(lambda.size(), [&](Eigen::Index, Eigen::Index first, Eigen::Index size) {
+            lambda.segment(first, size) = weighed.segment(first, size).cwiseQuotient(metric_.segment(first, size));
+        });
         model.renew(state);
     }
 
@@ -94,6 +113,7 @@ private:
     // The latest point that was not rejected: λ (weighed), De Saxcé's terms by blocks, φ, ‖f‖.
     sdk::Vector plain_;
     std::vector<double> sliding_;
+    std::vector<double> squares_;  // work space, by parts
     double objective_ = 0.0, length_ = 0.0;
 };
 

@@ -60,6 +60,11 @@ struct SweepState {
 
 class Model {
 public:
+    /// Shares the work of all that follows; the bits do not depend on the team. *team.raw() must live until the next
+    /// call.
+    void use(const sdk::Team& team) { team_ = team; }
+    [[nodiscard]] const sdk::Team& team() const { return team_; }
+
     /// The operator is factorised; exact: one-contact problems are solved. Throws std::length_error where N would be
     /// too large to form.
     void build(const sdk::ProblemView& problem, const sdk::DelassusOperator& N, bool on_velocities, bool jacobi,
@@ -82,7 +87,8 @@ public:
                 groups[k] = blocks_.back().rows;
                 for (std::int32_t i = 0; i < groups[k].rows; ++i) row_.push_back(groups[k].first + i);
             }
-            rows_.fill(matrix, groups, nullptr, nullptr);
+            rows_.fill(matrix, groups, nullptr, nullptr, team_);
+            if (!order_.range.empty()) rows_.renumber_columns(order_.range);
         };
         if (on_velocities) {
             take(whitened_jacobian(problem, N));
@@ -117,6 +123,7 @@ public:
             to_sweep(problem.b, offset_);
             free_state_.setZero(states_ + sdk::chunk_padding);
             free_state_.head(problem.n) = whitened(problem, N.inverse());
+            renumber(free_state_);
         } else {
             offset_ = N.free_velocity(problem);
             velocities_.setZero(problem.m);
@@ -141,7 +148,11 @@ public:
     void renew(SweepState& state) const {
         if (!on_velocities_) return;
         state.z = free_state_;
-        rows_.transpose_multiply_add(state.lambda.data(), state.z.data());
+        team_.run([&](int member) {
+            order_.run(team_, member, true, [&](std::size_t k) {
+                rows_.transpose_multiply_add(state.lambda.data(), state.z.data(), order_.piece[k], order_.piece[k + 1]);
+            });
+        });
     }
     /// λ of a state; m, as the problem counts rows.
     void reactions(const SweepState& state, sdk::Vector& lambda) const {
@@ -152,34 +163,22 @@ public:
         }
     }
 
-    /// One Gauss–Seidel sweep; with a team of more than one, coloured blocks at the same time.
-    void sweep_in_place(const SweepRule& rule, SweepState& state, const sdk::Team& team) const {
-        if (team.size() == 1 || order_.coloured == 0) {
-            visit_range(rule, state, state.z, 0, blocks_.size());
-            return;
-        }
-        team.run([&](int member) {
-            const bool forward = rule.direction == Direction::Forward;
-            if (!forward) visit_rest(rule, state, team, member);
-            const std::size_t count = order_.colour.size();
-            for (std::size_t c = 0; c < count; ++c) {
-                const std::size_t colour = forward ? c : count - 1 - c;
-                const std::size_t begin = order_.colour[colour];
-                const std::size_t end = colour + 1 < count ? order_.colour[colour + 1] : order_.coloured;
-                const auto [first, last] = team.share(end - begin, member);
-                visit_range(rule, state, state.z, begin + first, begin + last);
-                team.barrier();
-            }
-            if (forward) visit_rest(rule, state, team, member);
-        });
+    /// One Gauss–Seidel sweep.
+    void sweep_in_place(const SweepRule& rule, SweepState& state) const {
+        run_pieces(rule,
+                   [&](std::size_t k) { visit_range(rule, state, state.z, order_.piece[k], order_.piece[k + 1]); });
     }
 
-    /// As sweep_in_place by the calling thread, and what look() would return if each block's residual were that of the
-    /// moment of its visit: about the error before the sweep, at no pass over the rows of its own.
+    /// As sweep_in_place, and what look() would return if each block's residual were that of the moment of its visit:
+    /// about the error before the sweep, at no pass over the rows of its own.
     [[nodiscard]] double recorded_sweep(const SweepRule& rule, SweepState& state) {
-        Record record{squares_.data(), sliding_.data()};
-        visit_range(rule, state, state.z, 0, blocks_.size(), &record);
-        return record.sum;
+        sums_.assign(order_.piece.size() - 1, 0.0);
+        run_pieces(rule, [&](std::size_t k) {
+            Record record{squares_.data(), sliding_.data()};
+            visit_range(rule, state, state.z, order_.piece[k], order_.piece[k + 1], &record);
+            sums_[k] = record.sum;
+        });
+        return std::accumulate(sums_.begin(), sums_.end(), 0.0);
     }
 
     /// One Jacobi step; next is work space.
@@ -190,14 +189,14 @@ public:
     }
 
     /// The sum of the squared natural residuals of all blocks (sdk::NaturalResidual, not yet divided by the reference).
-    /// The same bits for any team. Keeps De Saxcé's terms μ‖u_t‖.
-    [[nodiscard]] double look(const SweepState& state, bool coulomb, const sdk::Team& team) {
+    /// Keeps De Saxcé's terms μ‖u_t‖.
+    [[nodiscard]] double look(const SweepState& state, bool coulomb) {
         constexpr std::size_t part = 512;
         const std::size_t parts = (blocks_.size() + part - 1) / part;
         sums_.resize(parts);
         const double* lambda = on_velocities_ ? state.lambda.data() : state.z.data();
-        team.run([&](int member) {
-            const auto [first, last] = team.share(parts, member);
+        team_.run([&](int member) {
+            const auto [first, last] = team_.share(parts, member);
             for (std::size_t k = first; k < last; ++k) {
                 Record record{squares_.data(), sliding_.data()};
                 look_at(rows_, k * part, std::min(blocks_.size(), (k + 1) * part), local_, coulomb, offset_.data(),
@@ -220,7 +219,7 @@ public:
     /// ½λᵀNλ + rᵀλ, up to a constant; on velocities that is ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖².
     [[nodiscard]] double objective(SweepState& state) {
         const auto lambda = swept(state);
-        if (on_velocities_) return 0.5 * state.z.head(states_).squaredNorm() + lambda.dot(offset_);
+        if (on_velocities_) return 0.5 * state.z.squaredNorm() + lambda.dot(offset_);
         rows_.multiply(state.z.data(), offset_.data(), velocities_.data(), 0, blocks_.size());
         return 0.5 * lambda.dot(velocities_ + offset_);
     }
@@ -249,11 +248,20 @@ private:
         }
     }
 
-    // The blocks without a colour, by one member.
-    void visit_rest(const SweepRule& rule, SweepState& state, const sdk::Team& team, int member) const {
-        if (order_.coloured == blocks_.size()) return;
-        if (member == 0) visit_range(rule, state, state.z, order_.coloured, blocks_.size());
-        team.barrier();
+    // visit(k) for all pieces of the order, those of a phase by the members of the team.
+    template <class Visit>
+    void run_pieces(const SweepRule& rule, const Visit& visit) const {
+        team_.run([&](int member) { order_.run(team_, member, rule.direction == Direction::Forward, visit); });
+    }
+
+    // v̂ as the rows count its entries.
+    void renumber(sdk::Vector& state) const {
+        if (order_.range.empty()) return;
+        const sdk::Vector before = state;
+        const int width = rows_.width();
+        for (std::size_t k = 0; k < order_.range.size(); ++k)
+            std::copy_n(before.data() + static_cast<std::ptrdiff_t>(k) * width, width,
+                        state.data() + order_.range[k] * width);
     }
 
     template <class Rows>
@@ -324,8 +332,7 @@ private:
         local_ = {};
         local_.block.resize(blocks_.size());
         const std::vector<double> sharing = jacobi && on_velocities_ ? sharing_of_columns() : std::vector<double>();
-        Eigen::MatrixXd M;
-        for (std::size_t k = 0; k < blocks_.size(); ++k) {
+        const auto matrix_of = [&](std::size_t k, Eigen::MatrixXd& M) {
             const std::int32_t rows = blocks_[k].rows.rows;
             if (jacobi) {
                 bounding_block(rows_.groups()[k], sharing, M);
@@ -334,19 +341,33 @@ private:
             } else {
                 M.setConstant(1, 1, N.diagonal()[blocks_[k].rows.first]);
             }
+        };
+        team_.run([&](int member) {
+            const auto [first, last] = team_.share(blocks_.size(), member);
+            Eigen::MatrixXd M;
+            for (std::size_t k = first; k < last; ++k) {
+                LocalBlock& local = local_.block[k];
+                if (problem.cones[static_cast<std::size_t>(blocks_[k].cone)].kind == DELASSUS_CONE_FRICTION) {
+                    local.kind = LocalBlock::Kind::Friction;
+                } else if (blocks_[k].rows.rows > 1) {
+                    local.kind = LocalBlock::Kind::Free;
+                    continue;
+                }
+                matrix_of(k, M);
+                local.step = reciprocal(M.rows() == 1 ? M(0, 0) : largest_eigenvalue(M));
+            }
+        });
+        Eigen::MatrixXd M;
+        for (std::size_t k = 0; k < blocks_.size(); ++k) {
             LocalBlock& local = local_.block[k];
-            if (problem.cones[static_cast<std::size_t>(blocks_[k].cone)].kind == DELASSUS_CONE_FRICTION) {
-                local.kind = LocalBlock::Kind::Friction;
-                local.step = reciprocal(largest_eigenvalue(M));
-                if (!exact) continue;
+            if (local.kind == LocalBlock::Kind::Friction && exact) {
                 local.matrix = static_cast<std::int32_t>(local_.contact.size());
-                local_.contact.emplace_back(rows, M.data());
-            } else if (rows > 1) {
-                local.kind = LocalBlock::Kind::Free;
+                matrix_of(k, M);
+                local_.contact.emplace_back(blocks_[k].rows.rows, M.data());
+            } else if (local.kind == LocalBlock::Kind::Free) {
                 local.matrix = static_cast<std::int32_t>(local_.inverse.size());
+                matrix_of(k, M);
                 append_pseudo_inverse(M);
-            } else {
-                local.step = reciprocal(M(0, 0));
             }
         }
         local_.kappa.assign(local_.contact.size(), 0.0);
@@ -408,6 +429,7 @@ private:
     Eigen::Index states_ = 0;  // entries of z without padding
     sdk::BlockRows rows_;      // by visits; on velocities its rows are counted so too
     SweepOrder order_;
+    sdk::Team team_;
     std::vector<Block> blocks_;      // by visits, rows as the problem counts them
     std::vector<std::int32_t> row_;  // the problem's row of each row by visits
     LocalProblems local_;
@@ -415,7 +437,7 @@ private:
     sdk::Vector free_state_;                 // v̂ without reactions, padded
     sdk::Vector velocities_;                 // work space of objective(); m
     std::vector<double> squares_, sliding_;  // s² and De Saxcé's terms by blocks
-    std::vector<double> sums_;               // work space of look()
+    std::vector<double> sums_;               // work space of looks and recorded sweeps
 };
 
 }  // namespace delassus::pgs

@@ -44,15 +44,15 @@ void time_sweeps(benchmark::State& state, delassus::Problem problem, const Way& 
     delassus::pgs::SweepState sweep;
     model.state_of(delassus::sdk::Vector::Zero(view.m), sweep);
     delassus::ThreadTeam threads(way.threads);
-    const delassus::sdk::Team team = threads.team();
+    model.use(threads.team());
     delassus::pgs::SweepRule rule;
     rule.local = way.local;
     rule.omega = 1.5;
     rule.coulomb = view.coulomb;
-    for (int k = 0; k < 50; ++k) model.sweep_in_place(rule, sweep, team);
+    for (int k = 0; k < 50; ++k) model.sweep_in_place(rule, sweep);
 
     for (auto _ : state) {
-        model.sweep_in_place(rule, sweep, team);
+        model.sweep_in_place(rule, sweep);
         benchmark::ClobberMemory();
     }
     const auto contacts = static_cast<double>(view.cones.size());
@@ -74,6 +74,8 @@ int main(int argc, char** argv) {
                                    {"diagonal/spaced", Local::Diagonal, Ordering::Spaced, 1},
                                    {"diagonal/coloured", Local::Diagonal, Ordering::Coloured, 1},
                                    {"diagonal/coloured-2", Local::Diagonal, Ordering::Coloured, 2},
+                                   {"diagonal/domains", Local::Diagonal, Ordering::Domains, 1},
+                                   {"diagonal/domains-2", Local::Diagonal, Ordering::Domains, 2},
                                    {"exact/spaced", Local::Exact, Ordering::Spaced, 1},
                                    {"exact/coloured-2", Local::Exact, Ordering::Coloured, 2}};
     for (const Way& way : ways) {

@@ -18,7 +18,6 @@
 #include "delassus/problem_files.hpp"
 #include "delassus/sdk/residual.hpp"
 #include "delassus/solver.hpp"
-#include "delassus/thread_team.hpp"
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
@@ -151,7 +150,6 @@ void compare_forms(Problem problem, pgs::Local local) {
     pgs::Model models[2];
     sdk::Vector lambda[2];
     pgs::SweepState state[2];
-    const sdk::Team alone;
     for (int form = 0; form < 2; ++form) {
         models[form].build(view, N, form == 0, false, true, pgs::Ordering::Given);
         models[form].set_right_hand_side(view, N, sdk::block_scaling(view.cones, N.diagonal()));
@@ -164,7 +162,7 @@ void compare_forms(Problem problem, pgs::Local local) {
     for (int k = 0; k < 30; ++k) {
         rule.direction = k % 3 == 2 ? pgs::Direction::Backward : pgs::Direction::Forward;
         for (int form = 0; form < 2; ++form) {
-            models[form].sweep_in_place(rule, state[form], alone);
+            models[form].sweep_in_place(rule, state[form]);
             models[form].reactions(state[form], lambda[form]);
         }
         ASSERT_GT(lambda[0].norm(), 0.0);
@@ -264,9 +262,7 @@ TEST(PgsSweep, ALookSeesTheNaturalError) {
                     const sdk::Vector u = view.D * N.velocity(view, lambda) + view.b;
                     return residual.natural(lambda, u);
                 };
-                const auto looked = [&] {
-                    return std::sqrt(model.look(state, view.coulomb, {})) / residual.reference();
-                };
+                const auto looked = [&] { return std::sqrt(model.look(state, view.coulomb)) / residual.reference(); };
                 double before = natural();
                 EXPECT_NEAR(looked(), before, 1e-12 * before);
                 // What a sweep records is the error at the moment of each visit: blocks apart are as they were.
@@ -276,99 +272,6 @@ TEST(PgsSweep, ALookSeesTheNaturalError) {
                 }
                 before = natural();
                 EXPECT_NEAR(looked(), before, 1e-12 * before);
-            }
-}
-
-// ---- Orders and threads ---------------------------------------------------------------------------------------------
-
-/// A model of a problem, with λ after some sweeps both ways.
-struct Swept {
-    PreparedProblem prepared;
-    pgs::Model model;
-    sdk::DelassusOperator N;
-    sdk::Vector lambda;
-
-    Swept(Problem problem, pgs::Ordering ordering, bool on_velocities, int threads, pgs::Local local)
-        : prepared(std::move(problem)) {
-        const sdk::ProblemView view(prepared.raw());
-        N.analyze(view);
-        N.factorize(view);
-        model.build(view, N, on_velocities, false, true, ordering);
-        model.set_right_hand_side(view, N, delassus::sdk::block_scaling(view.cones, N.diagonal()));
-        pgs::SweepState state;
-        model.state_of(sdk::Vector::Zero(view.m), state);
-        ThreadTeam members(threads);
-        const sdk::Team team = members.team();
-        pgs::SweepRule rule;
-        rule.local = local;
-        rule.coulomb = view.coulomb;
-        rule.omega = 1.2;
-        for (int k = 0; k < 40; ++k) {
-            rule.direction = k % 3 == 2 ? pgs::Direction::Backward : pgs::Direction::Forward;
-            model.sweep_in_place(rule, state, team);
-        }
-        model.reactions(state, lambda);
-    }
-};
-
-TEST(PgsOrder, EveryBlockIsVisitedOnce) {
-    for (const auto ordering : {pgs::Ordering::Given, pgs::Ordering::Spaced, pgs::Ordering::Coloured}) {
-        for (const bool on_velocities : {true, false}) {
-            const Swept swept(pile(), ordering, on_velocities, 1, pgs::Local::Diagonal);
-            std::vector<std::int32_t> order = swept.model.order().block;
-            std::sort(order.begin(), order.end());
-            for (std::size_t k = 0; k < order.size(); ++k) ASSERT_EQ(order[k], static_cast<std::int32_t>(k));
-            EXPECT_EQ(order.size(), swept.prepared.problem().cones.size());
-        }
-    }
-}
-
-TEST(PgsOrder, BlocksOfOneColourDoNotTouch) {
-    const Swept swept(pile(), pgs::Ordering::Coloured, true, 1, pgs::Local::Diagonal);
-    const auto& order = swept.model.order();
-    ASSERT_GT(order.colour.size(), 2u);
-    EXPECT_GT(order.coloured, order.block.size() / 2);
-    for (std::size_t c = 0; c < order.colour.size(); ++c) {
-        std::vector<int> visits(static_cast<std::size_t>(swept.prepared.problem().n() + swept.prepared.problem().m()) +
-                                sdk::chunk_padding);
-        const std::size_t end = c + 1 < order.colour.size() ? order.colour[c + 1] : order.coloured;
-        for (std::size_t k = order.colour[c]; k < end; ++k) {
-            const auto& group = swept.model.rows().groups()[k];
-            for (int chunk = 0; chunk < group.chunks; ++chunk)
-                for (int j = 0; j < swept.model.rows().width(); ++j)
-                    EXPECT_EQ(++visits[static_cast<std::size_t>(swept.model.rows().starts(group)[chunk] + j)], 1);
-        }
-    }
-}
-
-TEST(PgsOrder, SpacedNeighboursRarelyShareABody) {
-    const auto sharing = [](pgs::Ordering ordering) {
-        const Swept swept(pile(), ordering, true, 1, pgs::Local::Diagonal);
-        int count = 0;
-        const auto groups = swept.model.rows().groups();
-        for (std::size_t k = 1; k < groups.size(); ++k)
-            for (int i = 0; i < groups[k].chunks; ++i)
-                for (int j = 0; j < groups[k - 1].chunks; ++j)
-                    count += swept.model.rows().starts(groups[k])[i] == swept.model.rows().starts(groups[k - 1])[j];
-        return count;
-    };
-    EXPECT_LT(10 * sharing(pgs::Ordering::Spaced), sharing(pgs::Ordering::Given));
-}
-
-TEST(PgsThreads, GiveTheSameBits) {
-    SpherePileParameters parameters;
-    parameters.contacts = 1000;
-    parameters.speed = 0.5;
-    for (const Law law : {Law::Associated, Law::Coulomb})
-        for (const auto local : {pgs::Local::Diagonal, pgs::Local::Exact})
-            for (const bool on_velocities : {true, false}) {
-                Problem problem = on_velocities ? generate_sphere_pile(parameters) : pile();
-                problem.law = law;
-                const Swept one(problem, pgs::Ordering::Coloured, on_velocities, 1, local);
-                ASSERT_GT(one.lambda.norm(), 0.0);
-                for (const int threads : {2, 4})
-                    EXPECT_EQ(one.lambda, Swept(problem, pgs::Ordering::Coloured, on_velocities, threads, local).lambda)
-                        << threads << " threads";
             }
 }
 

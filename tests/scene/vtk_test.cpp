@@ -45,6 +45,8 @@ cables:
     series.write(0, system.initial_state());
     const std::string file = text_of(scratch / "main_000000.vtp");
     EXPECT_NE(file.find("NumberOfVerts=\"3\" NumberOfLines=\"1\""), std::string::npos);
+    const std::size_t section = file.find("<AppendedData");
+    EXPECT_NEAR(static_cast<double>(series.picture_bytes()), static_cast<double>(file.size() - section), 300.0);
     const auto points = array_of<float>(file, "Points", "points");
     const auto point = [&](std::int32_t index) {
         return std::vector<float>(points.begin() + 3 * index, points.begin() + 3 * index + 3);

@@ -27,7 +27,8 @@ using Clock = std::chrono::steady_clock;
 struct RunArguments {
     SceneArguments scene;
     std::filesystem::path output, resume;
-    std::int64_t every = 1, dump = 0, pictures = RunFolder::default_pictures;
+    std::int64_t every = 1, dump = 0;
+    std::optional<std::int64_t> pictures;
     bool contact_forces = false, json = false;
 };
 
@@ -143,7 +144,7 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
 
 int run(const RunArguments& arguments) {
     if (arguments.every < 1) throw InputError("--every must be at least 1");
-    if (arguments.pictures < 0) throw InputError("--pictures must be at least 0");
+    if (arguments.pictures.value_or(0) < 0) throw InputError("--pictures must be at least 0");
     if (arguments.dump < 0) throw InputError("--dump-problems must be at least 1");
     const bool resume = !arguments.resume.empty();
     if (resume && !arguments.output.empty() && arguments.output != arguments.resume)
@@ -205,9 +206,11 @@ void add_run(CLI::App& program, Action& action) {
         ->type_name("DIR");
     command->add_option("--every", arguments->every, "Write the state of every N-th step [1]")->type_name("N");
     command
-        ->add_option("--pictures", arguments->pictures,
-                     fmt::format("Of these states, write about N, evenly in time, for ParaView too [{}]; 0: none",
-                                 RunFolder::default_pictures))
+        ->add_option(
+            "--pictures", arguments->pictures,
+            fmt::format(
+                "Of these states, write about N, evenly in time, for ParaView too [{}, or {} MB of them]; 0: none",
+                RunFolder::default_pictures, RunFolder::default_picture_bytes / 1'000'000))
         ->type_name("N");
     command->add_flag("--contact-forces", arguments->contact_forces,
                       "Write the bodies and the force of each contact with the state");

@@ -37,17 +37,26 @@ void prepare(const fs::path& folder) {
     if (error) throw InputError(fmt::format("{} cannot be made: {}", folder.string(), error.message()));
 }
 
+/// The default number of pictures of all systems.
+std::int64_t worth_writing(const std::vector<VtkSeries>& series) {
+    constexpr std::int64_t fewest = 20;
+    std::int64_t bytes = 0;
+    for (const VtkSeries& one : series) bytes += one.picture_bytes();
+    return std::clamp(RunFolder::default_picture_bytes / std::max<std::int64_t>(bytes, 1), fewest,
+                      RunFolder::default_pictures);
+}
+
 }  // namespace
 
 RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& scene_text,
                      std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces,
-                     std::int64_t most_pictures)
+                     std::optional<std::int64_t> pictures)
     : folder_(std::move(folder)),
       scene_(scene.canonical),
       simulations_(simulations),
       every_(every),
       contact_forces_(contact_forces),
-      most_pictures_(most_pictures) {
+      asked_pictures_(pictures) {
     prepare(folder_);
     write_file_atomically(folder_ / "scene.yaml", scene_text);
     frame_times_.resize(simulations.size());
@@ -61,12 +70,12 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& sce
 }
 
 RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every,
-                     std::int64_t most_pictures)
+                     std::optional<std::int64_t> pictures)
     : folder_(std::move(folder)),
       scene_(scene.canonical),
       simulations_(simulations),
       every_(every),
-      most_pictures_(most_pictures) {
+      asked_pictures_(pictures) {
     Checkpoint checkpoint = read_checkpoint(folder_ / "checkpoint.json");
     if (checkpoint.scene != scene.canonical || checkpoint.systems.size() != simulations.size())
         throw InputError(
@@ -93,6 +102,7 @@ void RunFolder::open(const Scene& scene, bool resume) {
                            simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size())});
         series_.emplace_back(folder_ / "vtk", system.name, *system.system);
     }
+    most_pictures_ = asked_pictures_.value_or(worth_writing(series_));
     trajectory_ = open_trajectory(folder_ / "trajectory.h5", systems, resume);
     last_checkpoint_ = std::chrono::steady_clock::now();
 }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,20 +20,21 @@ namespace delassus {
 
 class DELASSUS_API RunFolder {
 public:
-    static constexpr std::int64_t default_pictures = 200;
+    /// Without another wish so many pictures are written, or as many as take so many bytes, but at least twenty.
+    static constexpr std::int64_t default_pictures = 200, default_picture_bytes = 200'000'000;
 
     /// Begins a new run in the folder, which must be absent, empty, or hold an earlier run, which is removed.
     /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder. every: how many steps there are
-    /// from frame to frame. contact_forces: whether frames have them. most_pictures: about how many frames, evenly in
-    /// time, are written for ParaView too; a picture of 1000 spheres takes 1.5 MB.
+    /// from frame to frame. contact_forces: whether frames have them. pictures: about how many frames, evenly in time,
+    /// are written for ParaView too; a picture of 1000 spheres takes 1.5 MB.
     RunFolder(std::filesystem::path folder, const Scene& scene, const std::string& scene_text,
               std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces = false,
-              std::int64_t most_pictures = default_pictures);
+              std::optional<std::int64_t> pictures = {});
     /// Goes on with the run in the folder, with contact forces if it has them: puts the simulations where its
     /// checkpoint is, and cuts off what was written after it. Throws InputError if there is none or if it belongs to
     /// another scene.
     RunFolder(std::filesystem::path folder, const Scene& scene, std::vector<Simulation>& simulations,
-              std::int64_t every, std::int64_t most_pictures = default_pictures);
+              std::int64_t every, std::optional<std::int64_t> pictures = {});
     ~RunFolder();
     RunFolder(const RunFolder&) = delete;
     RunFolder& operator=(const RunFolder&) = delete;
@@ -60,7 +62,8 @@ private:
     std::vector<Simulation>& simulations_;
     std::int64_t every_;
     bool contact_forces_ = false;
-    std::int64_t most_pictures_;
+    std::optional<std::int64_t> asked_pictures_;
+    std::int64_t most_pictures_ = 0;
     std::vector<std::vector<double>> frame_times_, picture_times_;
     std::vector<VtkSeries> series_;
     std::unique_ptr<TrajectoryWriter> trajectory_;

@@ -74,6 +74,17 @@ std::string VtkSeries::contacts_file_name(std::int64_t number) const {
     return fmt::format("{}.contacts_{:06}.vtp", name_, number);
 }
 
+// A point has three floats. A cell has its body, its speed, where it ends and its corners, each in four bytes.
+std::int64_t VtkSeries::picture_bytes() const {
+    constexpr std::size_t point = 12, vertex = 16, line = 20, triangle = 24;
+    std::size_t bytes = static_cast<std::size_t>(system_.body_count()) * (point + vertex) +
+                        static_cast<std::size_t>(system_.node_count()) * point + loose_nodes_.size() * vertex +
+                        cables_.size() * line + elements_.size() * triangle;
+    for (const Mesh& surface : surfaces_)
+        bytes += surface.vertices.size() * point + surface.triangles.size() * triangle;
+    return static_cast<std::int64_t>(bytes);
+}
+
 void VtkSeries::write(std::int64_t number, const State& state) const {
     std::vector<float> points, speed;
     std::vector<std::int32_t> vertices, vertex_ends, lines, line_ends, corners, corner_ends, body_of_cell;

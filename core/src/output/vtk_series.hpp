@@ -27,6 +27,9 @@ public:
     /// force (N), gap (m), first and second (bodies, as in ContactRecord).
     void write_contacts(std::int64_t number, double t, const std::vector<ContactRecord>& contacts) const;
 
+    /// About how large the file of a frame is.
+    [[nodiscard]] std::int64_t picture_bytes() const;
+
     [[nodiscard]] std::string file_name(std::int64_t number) const;
     [[nodiscard]] std::string contacts_file_name(std::int64_t number) const;
 

@@ -3,14 +3,16 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <vector>
 
 #include "delassus/sdk/problem_view.hpp"
+#include "delassus/sdk/team.hpp"
 
 namespace delassus::sdk {
 
 /// With f(y) = F(y) − y, the next point is F(y) − ΔF γ, where γ minimises ‖f − Δf γ‖ over the latest `memory`
 /// differences of f and F: for a linear F this is GMRES in another guise (Anderson 1965; Walker and Ni 2011, "type II";
-/// Fang and Saad 2009).
+/// Fang and Saad 2009). The bits do not depend on the team.
 class Anderson {
 public:
     /// memory ≥ 1 differences of vectors of the given size are kept.
@@ -20,20 +22,22 @@ public:
     void clear() { count_ = 0, position_ = 0, has_point_ = false; }
 
     /// Takes a point's f and F (y itself is F − f).
-    void push(const Vector& f, const Vector& F);
+    void push(const Vector& f, const Vector& F, const Team& team = {});
 
     /// next ← the accelerated point from the latest push; false if there is no difference yet, or none that helps.
-    [[nodiscard]] bool extrapolate(Vector& next);
+    [[nodiscard]] bool extrapolate(Vector& next, const Team& team = {});
 
 private:
     int memory_ = 0, count_ = 0, position_ = 0;
     bool has_point_ = false;
-    Eigen::MatrixXd df_, dF_;  // size × memory, a ring; each pair divided by ‖Δf‖
+    Eigen::MatrixXd df_, dF_;  // size × memory, a ring
     Eigen::MatrixXd gram_;     // memory × memory: df_ᵀ df_
-    Eigen::MatrixXd matrix_;   // its part in use, regularised
+    Eigen::MatrixXd matrix_;   // its part in use, of differences of length 1, regularised
     Eigen::LDLT<Eigen::MatrixXd> factor_;
     Vector f_, F_;  // of the latest point
-    Vector gamma_;
+    Vector slope_;  // df_ᵀ f_
+    Vector scale_, gamma_;
+    Eigen::MatrixXd sums_;  // by parts of the rows: df_ᵀ times the latest difference and f_
 };
 
 }  // namespace delassus::sdk

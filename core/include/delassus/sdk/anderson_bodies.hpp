@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "delassus/sdk/anderson.hpp"
 #include "delassus/sdk/compiled_once.hpp"
@@ -14,40 +15,72 @@ DELASSUS_SDK_FUNCTION void Anderson::reset(Eigen::Index size, int memory) {
     df_.resize(size, memory);
     dF_.resize(size, memory);
     gram_.resize(memory, memory);
+    slope_.resize(memory);
+    scale_.resize(memory);
     f_.resize(size);
     F_.resize(size);
+    sums_.resize(2 * memory, Team::parts_of(size));
     clear();
 }
 
-DELASSUS_SDK_FUNCTION void Anderson::push(const Vector& f, const Vector& F) {
-    if (has_point_) {
-        const double length = (f - f_).norm();
-        if (length > 0.0) {
-            df_.col(position_) = (f - f_) / length;
-            dF_.col(position_) = (F - F_) / length;
-            count_ = std::min(count_ + 1, memory_);
-            gram_.row(position_).head(count_) = df_.col(position_).transpose() * df_.leftCols(count_);
-            gram_.col(position_).head(count_) = gram_.row(position_).head(count_).transpose();
-            position_ = (position_ + 1) % memory_;
+// One pass over the memory. Differences are not scaled: their lengths stand on the diagonal of the Gram matrix.
+DELASSUS_SDK_FUNCTION void Anderson::push(const Vector& f, const Vector& F, const Team& team) {
+    const bool differs = has_point_;
+    const int kept = differs ? std::min(count_ + 1, memory_) : 0, place = position_;
+    team.for_parts(f.size(), [&](Eigen::Index part, Eigen::Index first, Eigen::Index size) {
+        auto f_part = f_.segment(first, size), F_part = F_.segment(first, size);
+        const auto new_f = f.segment(first, size);
+        if (differs) {
+            auto difference = df_.col(place).segment(first, size);
+            difference = new_f - f_part;
+            dF_.col(place).segment(first, size) = F.segment(first, size) - F_part;
+            for (int k = 0; k < kept; ++k) {
+                const auto other = df_.col(k).segment(first, size);
+                sums_(k, part) = other.dot(difference);
+                sums_(memory_ + k, part) = other.dot(new_f);
+            }
         }
-    }
-    f_ = f;
-    F_ = F;
+        f_part = new_f;
+        F_part = F.segment(first, size);
+    });
     has_point_ = true;
+    if (!differs) return;
+    for (int k = 0; k < kept; ++k) {
+        double product = 0.0, slope = 0.0;
+        for (Eigen::Index part = 0; part < sums_.cols(); ++part) {
+            product += sums_(k, part);
+            slope += sums_(memory_ + k, part);
+        }
+        gram_(place, k) = gram_(k, place) = product;
+        slope_[k] = slope;
+    }
+    if (!(gram_(place, place) > 0.0)) {  // the same point again
+        gram_.row(place).head(kept).setZero();
+        gram_.col(place).head(kept).setZero();
+    }
+    count_ = kept;
+    position_ = (place + 1) % memory_;
 }
 
-DELASSUS_SDK_FUNCTION bool Anderson::extrapolate(Vector& next) {
+DELASSUS_SDK_FUNCTION bool Anderson::extrapolate(Vector& next, const Team& team) {
     // Added to the diagonal of the normalised normal equations: directions below its root are rounding.
     constexpr double regularization = 1e-10;
     if (count_ == 0) return false;
-    matrix_ = gram_.topLeftCorner(count_, count_);
+    auto scale = scale_.head(count_);
+    scale = gram_.diagonal().head(count_).unaryExpr(
+        [](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
+    matrix_ = scale.asDiagonal() * gram_.topLeftCorner(count_, count_) * scale.asDiagonal();
     matrix_.diagonal().array() += regularization;
     factor_.compute(matrix_);
-    gamma_.noalias() = df_.leftCols(count_).transpose() * f_;
+    gamma_ = scale.cwiseProduct(slope_.head(count_));
     factor_.solveInPlace(gamma_);
     if (!gamma_.allFinite()) return false;
-    next = F_;
-    next.noalias() -= dF_.leftCols(count_) * gamma_;
+    gamma_.array() *= scale.array();
+    next.resize(F_.size());
+    team.for_parts(F_.size(), [&](Eigen::Index, Eigen::Index first, Eigen::Index size) {
+        next.segment(first, size) = F_.segment(first, size);
+        next.segment(first, size).noalias() -= dF_.middleRows(first, size).leftCols(count_) * gamma_;
+    });
     return true;
 }
 

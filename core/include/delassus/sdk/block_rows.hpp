@@ -52,6 +52,10 @@ public:
     void fill(const Matrix& matrix, std::span<const RowGroup> rows, const double* left, const double* right,
               const Team& team = {});
 
+    /// Counts columns anew, after fill(): column k w + j, w = width(), becomes range[k] w + j. All chunks start at
+    /// multiples of w.
+    void renumber_columns(std::span<const std::int32_t> range);
+
     /// Stored values, shared zeros included: the cost of a product.
     [[nodiscard]] std::size_t entries() const { return value_.size(); }
     [[nodiscard]] int width() const { return width_; }  ///< of a chunk: 2, 4 or 6 columns
@@ -70,8 +74,11 @@ public:
     /// result += matrix · v. result: rows; v: columns, padded.
     void multiply_add(const double* v, double* result) const { multiply(v, result, result, 0, groups_.size()); }
 
-    /// result += matrixᵀ · v. result: columns, padded; v: rows.
-    void transpose_multiply_add(const double* v, double* result) const;
+    /// result += matrixᵀ · v, for the groups first … last − 1. result: columns, padded; v: rows.
+    void transpose_multiply_add(const double* v, double* result, std::size_t first, std::size_t last) const;
+    void transpose_multiply_add(const double* v, double* result) const {
+        transpose_multiply_add(v, result, 0, groups_.size());
+    }
 
 private:
     void find_columns(const Matrix& matrix, std::span<const RowGroup> groups);

@@ -82,6 +82,10 @@ DELASSUS_SDK_FUNCTION void BlockRows::fill(const Matrix& matrix, std::span<const
     });
 }
 
+DELASSUS_SDK_FUNCTION void BlockRows::renumber_columns(std::span<const std::int32_t> range) {
+    for (std::int32_t& start : start_) start = width_ * range[static_cast<std::size_t>(start / width_)];
+}
+
 // A row that fills its chunks is copied chunk by chunk.
 DELASSUS_SDK_FUNCTION void BlockRows::fill_group(const Matrix& matrix, const RowGroup& rows, const Group& group,
                                                  const double* left, const double* right) {
@@ -125,9 +129,11 @@ DELASSUS_SDK_FUNCTION void BlockRows::multiply(const double* v, const double* of
     });
 }
 
-DELASSUS_SDK_FUNCTION void BlockRows::transpose_multiply_add(const double* v, double* result) const {
+DELASSUS_SDK_FUNCTION void BlockRows::transpose_multiply_add(const double* v, double* result, std::size_t begin,
+                                                              std::size_t end) const {
     with_width(width_, [&]<int Width>() {
-        for (const Group& group : groups_)
+        for (std::size_t k = begin; k < end; ++k) {
+            const Group& group = groups_[k];
             with_rows(group.rows, [&]<int Rows>() {
                 const double* delta = v + group.first;
                 bool zero = true;  // open contacts are many
@@ -135,6 +141,7 @@ DELASSUS_SDK_FUNCTION void BlockRows::transpose_multiply_add(const double* v, do
                 if (!zero)
                     transpose_multiply_group<Rows, Width>(values(group), starts(group), group.chunks, delta, result);
             });
+        }
     });
 }
 

@@ -49,6 +49,24 @@ public:
         return {count * member / members, count * (member + 1) / members};
     }
 
+    /// Vectors are cut into parts of this many entries, so that sums of the parts' sums have the same bits for any
+    /// team.
+    static constexpr std::ptrdiff_t part_entries = 1024;
+    [[nodiscard]] static std::ptrdiff_t parts_of(std::ptrdiff_t entries) {
+        return (entries + part_entries - 1) / part_entries;
+    }
+    /// body(part, first, size) for all parts of so many entries, by all members. body must not throw.
+    template <class Body>
+    void for_parts(std::ptrdiff_t entries, const Body& body) const {
+        run([&](int member) {
+            const auto [begin, end] = share(static_cast<std::size_t>(parts_of(entries)), member);
+            for (auto part = static_cast<std::ptrdiff_t>(begin); part < static_cast<std::ptrdiff_t>(end); ++part) {
+                const std::ptrdiff_t first = part * part_entries;
+                body(part, first, std::min(part_entries, entries - first));
+            }
+        });
+    }
+
     /// body(k) for 0 ≤ k < count, one after another by the members as they are free. body may throw: the exception of
     /// the least k is thrown again when all are done, and those after it may be left out.
     template <class Body>
