@@ -76,8 +76,9 @@ double SemismoothNewton::convex_search(const Proximal& proximal) {
 
 // c = λ: τ acts on the matrix only, and falls with the error.
 SemismoothNewton::Result SemismoothNewton::newton(sdk::ScaledRun& run, double goal) {
-    double f = error(), cap = tau_;
-    int failures = 0;
+    constexpr int rounding_steps = 300;
+    double f = error(), best = f, cap = tau_;
+    int failures = 0, without_gain = 0;
     while (f > goal) {
         const Proximal here{std::max(smallest_tau, std::min(cap, f)), 1.0, nullptr};
         double value = f, length = 0.0;
@@ -89,8 +90,15 @@ SemismoothNewton::Result SemismoothNewton::newton(sdk::ScaledRun& run, double go
             return Result::Stopped;
         }
         failures = value <= 0.5 * f ? 0 : failures + 1;
-        if (failures > failures_allowed) return Result::Failed;
         f = error();
+        // At rounding level the search may find a fall that the same point, taken anew, does not have.
+        if (f <= 0.5 * best) {
+            best = f;
+            without_gain = 0;
+        } else if (++without_gain > rounding_steps) {
+            return Result::Failed;
+        }
+        if (failures > failures_allowed) return Result::Failed;
         if (length == 1.0) cap *= 0.2;
     }
     return Result::Reached;

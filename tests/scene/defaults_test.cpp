@@ -52,6 +52,33 @@ TEST(Defaults, NoStepIsShorterThanHalfOfTheStep) {
     }
 }
 
+// ---- How exactly steps are solved (docs/tolerance.md) ----
+
+// What the heavy box's speed is off by must not excuse the light ones beneath it.
+TEST(Defaults, AHeavyBoxDoesNotShakeWhatCarriesIt) {
+    for (const char* solver : {"auto", "ssn"}) {
+        SceneOverrides overrides;
+        overrides.solver = solver;
+        overrides.values = {{"bodies.top.mass", "1e8"}};
+        Running run(read_scene(DELASSUS_SOURCE_DIR "/examples/suites/stability/stack.yaml", overrides));
+        run.finish();
+        for (const char* body : {"lower", "middle", "top"}) {
+            const auto velocities = run.velocities(body);
+            for (const double v : velocities[0]) EXPECT_LT(std::abs(v), 2e-7) << solver << ' ' << body;
+        }
+        EXPECT_LT(run.simulation.totals().solver_iterations, 1000000) << solver;
+    }
+}
+
+TEST(Defaults, BouncesWithoutLossTakeNothing) {
+    SceneOverrides overrides;
+    overrides.end = 200.0;
+    Running run(read_scene(DELASSUS_SOURCE_DIR "/examples/suites/stability/bounces.yaml", overrides));
+    run.finish();
+    EXPECT_EQ(run.simulation.totals().energy, 0.5);
+    EXPECT_GT(run.simulation.totals().solver_iterations, 100);
+}
+
 // ---- Contact ----
 
 TEST(Defaults, WhatPenetratesIsPushedApartSlowly) {

@@ -193,6 +193,19 @@ Problem masses_with_rows(const std::vector<Triplet>& entries, std::vector<Cone> 
     return problem;
 }
 
+// S² is the mass that a row feels: 1/(1/m₁ + 1/m₂) between two bodies, whatever the heavier one weighs.
+TEST(Meter, NormInRowsIsThatOfTheMassesThatRowsFeel) {
+    Problem data =
+        masses_with_rows({{0, 0, 1.0}, {0, 1, -1.0}, {1, 1, 1.0}}, {Cone::nonnegative(1), Cone::nonnegative(1)});
+    data.H.value = {2.0, 1e9};
+    const PreparedProblem prepared(data);
+    const double between = 1.0 / (1.0 / 2.0 + 1.0 / 1e9);
+    EXPECT_NEAR(prepared.meter().norm_in_rows(std::vector<double>{0.3, 0.1}),
+                std::sqrt(between * 0.2 * 0.2 + 1e9 * 0.1 * 0.1), 1e-9);
+    EXPECT_NEAR(prepared.meter().norm_in_rows(std::vector<double>{0.3, 0.0}), std::sqrt(between) * 0.3, 1e-15);
+    EXPECT_THROW(static_cast<void>(prepared.meter().norm_in_rows(std::vector<double>{1.0})), InputError);
+}
+
 // Rows come, go and change kind while H stays: a renewed problem is judged, and says what it needs, as a new one does.
 TEST(Renewal, EqualsANewProblem) {
     std::vector<Problem> sequence = {

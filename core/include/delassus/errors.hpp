@@ -83,6 +83,9 @@ public:
     /// where r = 0.
     [[nodiscard]] DELASSUS_API double reference() const;
 
+    /// ‖S D v‖ for velocities v (n): how large they are for the rows, in the norm of the masses that the rows feel.
+    [[nodiscard]] DELASSUS_API double norm_in_rows(std::span<const double> v) const;
+
     /// x ← H⁻¹(a + Dᵀλ), n; throws InputError where H is not definite.
     DELASSUS_API void velocity_of(std::span<const double> lambda, std::vector<double>& x) const;
 

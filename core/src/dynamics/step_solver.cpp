@@ -402,14 +402,17 @@ double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::sp
     constexpr double share = 0.5, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
     const Problem& problem = part.problem();
     double square = 0.0;
+    std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {
         const double error = method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
+        errors[static_cast<std::size_t>(i)] = error;
         if (error == 0.0) continue;
         for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
             if (problem.H.column[e] == i) square += problem.H.value[e] * error * error;
     }
     const bool joints = (part.needs() & DELASSUS_CAN_FREE) != 0;
-    return std::clamp(share * std::sqrt(std::abs(square)) / part.meter().reference(), least,
+    const double error = std::min(std::sqrt(std::abs(square)), part.meter().norm_in_rows(errors));
+    return std::clamp(share * error / part.meter().reference(), least,
                       joints ? most_with_joints : most);
 }
 

@@ -354,6 +354,21 @@ double ErrorMeter::reference() const {
     return implementation_->residual.reference();
 }
 
+double ErrorMeter::norm_in_rows(std::span<const double> v) const {
+    const auto& self = *implementation_;
+    const auto& problem = self.view;
+    if (static_cast<Eigen::Index>(v.size()) != problem.n)
+        throw InputError(fmt::format("{} velocities do not fit a problem with n = {}", v.size(), problem.n));
+    if (problem.n == 0) return 0.0;
+    self.plain_u.noalias() = problem.D * VectorView(v.data(), problem.n);
+    double sum = 0.0;
+    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
+        const double s = self.residual.scaling()[c];
+        sum += s * s * self.plain_u.segment(problem.cones[c].first_row, problem.cones[c].rows).squaredNorm();
+    }
+    return std::sqrt(sum);
+}
+
 std::int64_t ErrorMeter::measurements() const {
     return implementation_->measurements;
 }
