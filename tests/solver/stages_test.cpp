@@ -187,6 +187,29 @@ TEST(Auto, EndsNearAToleranceThatIsAGoal) {
     }
 }
 
+// A servo holds against dry friction: their impulses cancel, so that rounding is large beside what is left of the
+// momentum. What the later stage solved counts, although the earlier one balances better.
+TEST(Auto, TakesTheAnswerThatIsSolved) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
+        {"solver": "pgs", "options": {"omega": "1"}, "max_iterations": 3, "reason": "a few sweeps"},
+        {"solver": "ssn", "reason": "to the end"}]}])");
+    Problem data;
+    data.H = SparseMatrix::from_triplets(1, 1, {{0, 0, 0.7001}});
+    data.a = {1.49057e-19};
+    data.b = {0.0, -0.00659103};
+    data.D = SparseMatrix::from_triplets(2, 1, {{0, 0, 1.0}, {1, 0, 1.0}});
+    data.E = SparseMatrix::from_triplets(2, 2, {{1, 1, 49.505}});
+    data.cones = {Cone::box({-0.0002}, {0.0002}), Cone::box({-0.015}, {0.015})};
+    Solution solution;
+    const PreparedProblem problem(data);
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    EXPECT_EQ(report.status, Status::Solved) << report.message;
+    EXPECT_LE(report.error.natural, 1e-8);
+    EXPECT_NEAR(solution.lambda[1], 0.00659103 / 49.505, 1e-12);
+    EXPECT_NEAR(solution.lambda[0] + solution.lambda[1], 0.0, 1e-12);
+}
+
 // A rule without a solver that gets there: everyone else who can has a try, from the best so far.
 TEST(Auto, GoesOnWithWhoeverCan) {
     const ScratchFolder scratch;
