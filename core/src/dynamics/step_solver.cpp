@@ -399,7 +399,7 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
 }
 
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
-    constexpr double share = 0.5, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
+    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
     const Problem& problem = part.problem();
     double square = 0.0;
     std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
@@ -411,9 +411,9 @@ double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::sp
             if (problem.H.column[e] == i) square += problem.H.value[e] * error * error;
     }
     const bool joints = (part.needs() & DELASSUS_CAN_FREE) != 0;
-    const double error = std::min(std::sqrt(std::abs(square)), part.meter().norm_in_rows(errors));
-    return std::clamp(share * error / part.meter().reference(), least,
-                      joints ? most_with_joints : most);
+    const double error =
+        std::min(share * std::sqrt(std::abs(square)), share_in_rows * part.meter().norm_in_rows(errors));
+    return std::clamp(error / part.meter().reference(), least, joints ? most_with_joints : most);
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {

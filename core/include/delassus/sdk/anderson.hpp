@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <vector>
 
 #include "delassus/sdk/problem_view.hpp"
 #include "delassus/sdk/team.hpp"
