@@ -105,8 +105,8 @@ struct ThreadTeam::Threads {
 
 private:
     using Clock = std::chrono::steady_clock;
-    // Waking a sleeper takes about as long; a sweep over a thousand contacts takes less.
-    static constexpr std::chrono::microseconds patience{30};
+    // Waking a sleeper takes a good part of that; between two sweeps of a pile there is less.
+    static constexpr std::chrono::microseconds patience{100};
     static constexpr int looks_between_yields = 64;
 
     /// A member's part of the task: twice the number of the task, and one more when somebody has taken it.

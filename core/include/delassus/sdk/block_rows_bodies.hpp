@@ -130,7 +130,7 @@ DELASSUS_SDK_FUNCTION void BlockRows::multiply(const double* v, const double* of
 }
 
 DELASSUS_SDK_FUNCTION void BlockRows::transpose_multiply_add(const double* v, double* result, std::size_t begin,
-                                                              std::size_t end) const {
+                                                             std::size_t end) const {
     with_width(width_, [&]<int Width>() {
         for (std::size_t k = begin; k < end; ++k) {
             const Group& group = groups_[k];
