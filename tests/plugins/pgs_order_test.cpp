@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "../../plugins/pgs/model.hpp"
+#include "delassus/errors.hpp"
 #include "delassus/generate.hpp"
 #include "delassus/sdk/residual.hpp"
 #include "delassus/thread_team.hpp"
