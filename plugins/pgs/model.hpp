@@ -148,10 +148,8 @@ public:
     void renew(SweepState& state) const {
         if (!on_velocities_) return;
         state.z = free_state_;
-        team_.run([&](int member) {
-            order_.run(team_, member, true, [&](std::size_t k) {
-                rows_.transpose_multiply_add(state.lambda.data(), state.z.data(), order_.piece[k], order_.piece[k + 1]);
-            });
+        run_pieces(Direction::Forward, [&](std::size_t k) {
+            rows_.transpose_multiply_add(state.lambda.data(), state.z.data(), order_.piece[k], order_.piece[k + 1]);
         });
     }
     /// λ of a state; m, as the problem counts rows.
@@ -165,7 +163,7 @@ public:
 
     /// One Gauss–Seidel sweep.
     void sweep_in_place(const SweepRule& rule, SweepState& state) const {
-        run_pieces(rule,
+        run_pieces(rule.direction,
                    [&](std::size_t k) { visit_range(rule, state, state.z, order_.piece[k], order_.piece[k + 1]); });
     }
 
@@ -173,7 +171,7 @@ public:
     /// about the error before the sweep, at no pass over the rows of its own.
     [[nodiscard]] double recorded_sweep(const SweepRule& rule, SweepState& state) {
         sums_.assign(order_.piece.size() - 1, 0.0);
-        run_pieces(rule, [&](std::size_t k) {
+        run_pieces(rule.direction, [&](std::size_t k) {
             Record record{squares_.data(), sliding_.data()};
             visit_range(rule, state, state.z, order_.piece[k], order_.piece[k + 1], &record);
             sums_[k] = record.sum;
@@ -250,8 +248,8 @@ private:
 
     // visit(k) for all pieces of the order, those of a phase by the members of the team.
     template <class Visit>
-    void run_pieces(const SweepRule& rule, const Visit& visit) const {
-        team_.run([&](int member) { order_.run(team_, member, rule.direction == Direction::Forward, visit); });
+    void run_pieces(Direction direction, const Visit& visit) const {
+        team_.run([&](int member) { order_.run(team_, member, direction == Direction::Forward, visit); });
     }
 
     // v̂ as the rows count its entries.

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -168,7 +169,7 @@ private:
         inside.clear();
         between.clear();
         rest.resize(static_cast<std::size_t>(blocks));
-        for (std::int32_t k = 0; k < blocks; ++k) rest[static_cast<std::size_t>(k)] = k;
+        std::iota(rest.begin(), rest.end(), 0);
     }
 };
 

@@ -77,7 +77,7 @@ struct SweepOrder {
             const std::size_t at = forward ? f : phases() - 1 - f;
             const auto [first, last] = team.share(phase[at + 1] - phase[at], member);
             for (std::size_t k = first; k < last; ++k) visit(phase[at] + k);
-            team.barrier();
+            if (f + 1 < phases()) team.barrier();
         }
     }
 

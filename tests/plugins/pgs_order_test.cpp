@@ -93,6 +93,23 @@ TEST(PgsOrder, PiecesOfOnePhaseDoNotTouch) {
     }
 }
 
+// All phases but the last are colours; there the blocks without one may be.
+TEST(PgsOrder, BlocksOfOneColourDoNotTouch) {
+    const Swept swept(pile(200), pgs::Ordering::Coloured, true, 1, pgs::Local::Diagonal);
+    const auto& order = swept.model.order();
+    ASSERT_GT(order.phases(), 3u);
+    EXPECT_GT(order.piece[order.phase[order.phases() - 1]], order.block.size() / 2);
+    for (std::size_t f = 0; f + 1 < order.phases(); ++f) {
+        std::vector<int> visits(static_cast<std::size_t>(swept.prepared.problem().n()) + sdk::chunk_padding);
+        for (std::size_t k = order.piece[order.phase[f]]; k < order.piece[order.phase[f + 1]]; ++k) {
+            const auto& group = swept.model.rows().groups()[k];
+            for (int chunk = 0; chunk < group.chunks; ++chunk)
+                for (int j = 0; j < swept.model.rows().width(); ++j)
+                    EXPECT_EQ(++visits[static_cast<std::size_t>(swept.model.rows().starts(group)[chunk] + j)], 1);
+        }
+    }
+}
+
 TEST(PgsOrder, DomainsOfAHeapShareTheWork) {
     for (const auto& [contacts, domains] : {std::pair{1200, 2u}, std::pair{5000, 4u}}) {
         const Swept swept(pile(contacts), pgs::Ordering::Auto, true, 1, pgs::Local::Diagonal);

@@ -401,19 +401,24 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
     constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
     const Problem& problem = part.problem();
+    const double reference = part.meter().reference();
+    const auto error_of = [&](std::int32_t i) {
+        return method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
+    };
     double square = 0.0;
-    std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {
-        const double error = method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
-        errors[static_cast<std::size_t>(i)] = error;
+        const double error = error_of(i);
         if (error == 0.0) continue;
         for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
             if (problem.H.column[e] == i) square += problem.H.value[e] * error * error;
     }
+    const double by_masses = share * std::sqrt(std::abs(square)) / reference;
+    if (by_masses <= least) return least;  // as at rest
+    std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
+    for (std::int32_t i = 0; i < problem.H.rows; ++i) errors[static_cast<std::size_t>(i)] = error_of(i);
+    const double in_rows = share_in_rows * part.meter().norm_in_rows(errors) / reference;
     const bool joints = (part.needs() & DELASSUS_CAN_FREE) != 0;
-    const double error =
-        std::min(share * std::sqrt(std::abs(square)), share_in_rows * part.meter().norm_in_rows(errors));
-    return std::clamp(error / part.meter().reference(), least, joints ? most_with_joints : most);
+    return std::clamp(std::min(by_masses, in_rows), least, joints ? most_with_joints : most);
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {

@@ -55,13 +55,12 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& sce
       scene_(scene.canonical),
       simulations_(simulations),
       every_(every),
-      contact_forces_(contact_forces),
-      asked_pictures_(pictures) {
+      contact_forces_(contact_forces) {
     prepare(folder_);
     write_file_atomically(folder_ / "scene.yaml", scene_text);
     frame_times_.resize(simulations.size());
     picture_times_.resize(simulations.size());
-    open(scene, false);
+    open(scene, false, pictures);
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         trajectory_->add_step(i, simulations_[i].record());
         add_frame(i);
@@ -71,11 +70,7 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& sce
 
 RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every,
                      std::optional<std::int64_t> pictures)
-    : folder_(std::move(folder)),
-      scene_(scene.canonical),
-      simulations_(simulations),
-      every_(every),
-      asked_pictures_(pictures) {
+    : folder_(std::move(folder)), scene_(scene.canonical), simulations_(simulations), every_(every) {
     Checkpoint checkpoint = read_checkpoint(folder_ / "checkpoint.json");
     if (checkpoint.scene != scene.canonical || checkpoint.systems.size() != simulations.size())
         throw InputError(
@@ -88,12 +83,12 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation
         picture_times_.push_back(std::move(checkpoint.systems[i].picture_times));
         simulations[i].load(std::move(checkpoint.systems[i].simulation));
     }
-    open(scene, true);
+    open(scene, true, pictures);
 }
 
 RunFolder::~RunFolder() = default;
 
-void RunFolder::open(const Scene& scene, bool resume) {
+void RunFolder::open(const Scene& scene, bool resume, std::optional<std::int64_t> pictures) {
     std::vector<TrajectorySystem> systems;
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         const SceneSystem& system = scene.systems[i];
@@ -102,7 +97,7 @@ void RunFolder::open(const Scene& scene, bool resume) {
                            simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size())});
         series_.emplace_back(folder_ / "vtk", system.name, *system.system);
     }
-    most_pictures_ = asked_pictures_.value_or(worth_writing(series_));
+    most_pictures_ = pictures.value_or(worth_writing(series_));
     trajectory_ = open_trajectory(folder_ / "trajectory.h5", systems, resume);
     last_checkpoint_ = std::chrono::steady_clock::now();
 }

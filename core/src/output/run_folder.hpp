@@ -53,7 +53,7 @@ public:
     void write_report(const std::string& json) const;
 
 private:
-    void open(const Scene& scene, bool resume);
+    void open(const Scene& scene, bool resume, std::optional<std::int64_t> pictures);
     void add_frame(std::size_t system);
     [[nodiscard]] bool picture_is_due(std::size_t system) const;
 
@@ -62,7 +62,6 @@ private:
     std::vector<Simulation>& simulations_;
     std::int64_t every_;
     bool contact_forces_ = false;
-    std::optional<std::int64_t> asked_pictures_;
     std::int64_t most_pictures_ = 0;
     std::vector<std::vector<double>> frame_times_, picture_times_;
     std::vector<VtkSeries> series_;
