@@ -10,6 +10,7 @@
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/step_error.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "problem/copy_cone.hpp"
@@ -39,7 +40,10 @@ namespace {
 //     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most the speed η_s (seed footnote 5)
 //
 // and |Φ| taken less by the resolution of gaps: what a solver leaves of the velocities adds up in the gaps, and as Φ/h
-// it would come back as a motion, so that nothing came to rest.
+// it would come back as a motion, so that nothing came to rest. A natural error ε is one of velocities relative to
+// those without reactions, which at rest are h g: a step leaves some ε g h² in the gaps, and in a wall of bricks ten to
+// twenty times that. So the resolution is 20 ε g h², where ε is the largest natural error, up to 10⁻², that any step
+// has left in the bodies of the contact, and at least what the system gives.
 //
 // Rows with a compliance c (of a servo with limits) have u = D v⁺ + Φ_t + c λ/h, λ/h being the force: E = c/h.
 //
@@ -62,6 +66,7 @@ public:
           recovery_speed_(values[0].real < 0.0 ? system.recovery_speed() : values[0].real),
           restitution_speed_(values[1].real),
           gap_resolution_(system.gap_resolution()),
+          free_fall_(system.free_fall()),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
           linearization_(system, values[4].real),
@@ -78,19 +83,18 @@ public:
         multipliers_.clear();
         kept_.clear();
         last_h_ = 0.0;
-        before_.clear();
-        change_.clear();
-        for (auto& jump : jumps_) jump.clear();
+        error_.forget();
+        left_.clear();
     }
 
-    // h, how many of the following there are, the multipliers, what is remembered of velocities, and the impulses of
-    // unilateral blocks.
+    // h, whether there are multipliers, the multipliers, what is remembered of velocities, whether errors were left,
+    // the errors, and the impulses of unilateral blocks.
     std::vector<double> save() const override {
-        double known = 0.0;
-        for (const auto* part : remembered()) known += part->empty() ? 0.0 : 1.0;
-        std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0, known};
+        std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0};
         memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
-        for (const auto* part : remembered()) memory.insert(memory.end(), part->begin(), part->end());
+        error_.save(memory);
+        memory.push_back(left_.empty() ? 0.0 : 1.0);
+        memory.insert(memory.end(), left_.begin(), left_.end());
         kept_.append_to(memory);
         return memory;
     }
@@ -103,12 +107,11 @@ public:
             rest = rest.subspan(count);
             return std::vector<double>(taken.begin(), taken.end());
         };
-        const std::vector<double> head = take(3);
+        const std::vector<double> head = take(2);
         last_h_ = head[0];
         if (head[1] != 0.0) multipliers_ = take(static_cast<std::size_t>(m_));
-        double known = head[2];
-        for (auto* part : {&before_, &change_, &jumps_[0], &jumps_[1]})
-            if (known-- > 0.0) *part = take(static_cast<std::size_t>(n_));
+        error_.load(rest, static_cast<std::size_t>(n_));
+        if (take(1)[0] != 0.0) left_ = take(static_cast<std::size_t>(n_));
         kept_.load(rest);
     }
 
@@ -135,6 +138,7 @@ private:
         double scale = 0.0;
         for (const double momentum : problem_.a) scale = std::max(scale, std::abs(momentum));
         solve(solver, report);
+        note_left(solver.left());
         drop_negligible(scale);
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
         for (const FreeSpin* spin : untouched_)
@@ -150,38 +154,18 @@ private:
         report.multipliers = multipliers_;
     }
 
-    /// What is remembered of velocities, in the order in which it becomes known.
-    [[nodiscard]] std::array<const std::vector<double>*, 4> remembered() const {
-        return {&before_, &change_, &jumps_[0], &jumps_[1]};
-    }
-
-    // The error of a step in the velocities, ½ h² v̈ for implicit Euler, is about half of the second difference of the
-    // velocities: what the last steps show of it is taken for this one. A single impact shows in two differences, and
-    // the steps after it are smooth: so the least of three counts. Of steps of chosen sizes nothing is said: there the
-    // solver must not disturb the estimate.
+    // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
     void estimate_error(const State& state, StepSolver& solver) {
-        const auto n = static_cast<std::size_t>(n_);
         solver.method_error = {};
         if (follows_sliding_) return;
-        if (!change_.empty()) {
-            jumps_[2].swap(jumps_[1]);
-            jumps_[1].swap(jumps_[0]);
-            jumps_[0].resize(n);
-            for (std::size_t i = 0; i < n; ++i) {
-                const double change = state.v[i] - before_[i];
-                jumps_[0][i] = 0.5 * std::abs(change - change_[i]);
-                change_[i] = change;
-            }
-            if (!jumps_[2].empty()) {
-                error_.resize(n);
-                for (std::size_t i = 0; i < n; ++i) error_[i] = std::min({jumps_[0][i], jumps_[1][i], jumps_[2][i]});
-                solver.method_error = error_;
-            }
-        } else if (!before_.empty()) {
-            change_.resize(n);
-            for (std::size_t i = 0; i < n; ++i) change_[i] = state.v[i] - before_[i];
-        }
-        before_ = state.v;
+        error_.note(state.v);
+        solver.method_error = error_.known();
+    }
+
+    void note_left(std::span<const double> left) {
+        left_.resize(left.size());
+        std::ranges::transform(left_, left, left_.begin(),
+                               [](double before, double now) { return std::max(before, now); });
     }
 
     // H and a are looked at once more where the linearisation is judged or contacts slide; else the problem changes
@@ -329,6 +313,16 @@ private:
         D_.finish_into(problem_.D);
     }
 
+    /// Of the gap whose row of the problem this is.
+    [[nodiscard]] double gap_resolution(std::int32_t row, double h) const {
+        constexpr double share = 20.0, most = 1e-2;
+        if (left_.empty() || free_fall_ == 0.0) return gap_resolution_;
+        const SparseMatrix& D = problem_.D;
+        double error = 0.0;
+        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) error = std::max(error, left_[D.column[e]]);
+        return std::max(gap_resolution_, share * std::min(error, most) * free_fall_ * h * h);
+    }
+
     // One walk over the blocks collects their cones, b, their impulses of the last step as a start, and what is needed
     // of them after the solve.
     void assemble_unilateral(const State& state, double h) {
@@ -360,7 +354,8 @@ private:
             const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
             for (std::int32_t i = 0; i < block.cone.rows; ++i) {
                 const auto& [gap, rate] = rows_.rows()[row + i];
-                const double resolved = gap - std::clamp(gap, -gap_resolution_, gap_resolution_);
+                const double resolution = i == 0 ? gap_resolution(m_ + row, h) : gap_resolution_;
+                const double resolved = gap - std::clamp(gap, -resolution, resolution);
                 problem_.b[m_ + row + i] = rate + std::max(resolved / h, -recovery_speed_);
             }
             if (block.along_normal()) {
@@ -444,7 +439,7 @@ private:
     }
 
     DynamicalSystem& system_;
-    double recovery_speed_, restitution_speed_, gap_resolution_;
+    double recovery_speed_, restitution_speed_, gap_resolution_, free_fall_;
     bool exact_;
     bool constraint_stiffness_;
     Linearization linearization_;
@@ -454,9 +449,8 @@ private:
     UnilateralRows rows_;
     std::vector<double> delta_, impulse_, force_;
     // The velocities at the beginning of the last step, their last change, and half of the last three changes of that.
-    std::vector<double> before_, change_;
-    std::array<std::vector<double>, 3> jumps_;
-    std::vector<double> error_;
+    StepError error_;
+    std::vector<double> left_;  ///< largest natural error that a step left in the part of each velocity, n, or empty
     double last_h_ = 0.0;
     KeptImpulses kept_;
     bool coulomb_ = false;                 // the law that the solver was told

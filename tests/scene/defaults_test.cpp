@@ -54,6 +54,34 @@ TEST(Defaults, NoStepIsShorterThanHalfOfTheStep) {
 
 // ---- How exactly steps are solved (docs/tolerance.md) ----
 
+// What a solver leaves in the gaps must not return as a motion, whatever tolerance the scene gives.
+TEST(Defaults, AWallThatWasHitComesToRest) {
+    for (const char* solver : {"", "solver: {tolerance: 0.01}\n", "solver: {tolerance: 1.0e-4}\n"}) {
+        auto run = run_of(fmt::format(
+            "step: 0.005\nend: 1.5\n{}materials: {{m: {{friction: 0.6}}}}\nbodies:\n"
+            "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+            "- {{name: ball, mass: 3, inertia: {{xx: 0.012, yy: 0.012, zz: 0.012}}, position: [0.63, -0.6, 0.35],\n"
+            "   velocity: [0.1, 1.7, 1.3], shapes: [{{sphere: {{radius: 0.1}}, material: m}}]}}\n"
+            "- {{name: \"even_{{i}}_{{k}}\", density: 1800, position: [0, 0, 0.05],\n"
+            "   shapes: [{{box: {{size: [0.25, 0.12, 0.1]}}, material: m}}],\n"
+            "   repeat: {{count: [6, 1, 3], spacing: [0.25, 0, 0.2]}}}}\n"
+            "- {{name: \"odd_{{i}}_{{k}}\", density: 1800, position: [0.125, 0, 0.15],\n"
+            "   shapes: [{{box: {{size: [0.25, 0.12, 0.1]}}, material: m}}],\n"
+            "   repeat: {{count: [5, 1, 3], spacing: [0.25, 0, 0.2]}}}}\n",
+            solver));
+        double hit = 0.0;
+        while (!run.simulation.finished()) {
+            run.simulation.step();
+            hit = std::max(hit, std::abs(run.velocities("odd_2_1")[0][1]));
+        }
+        EXPECT_GT(hit, 0.02) << solver;
+        for (const char* brick : {"even_0_0", "even_2_1", "odd_2_1", "odd_4_2"}) {
+            const auto velocities = run.velocities(brick);
+            for (const double v : velocities[0]) EXPECT_LT(std::abs(v), 1e-6) << solver << brick;
+        }
+    }
+}
+
 // What the heavy box's speed is off by must not excuse the light ones beneath it.
 TEST(Defaults, AHeavyBoxDoesNotShakeWhatCarriesIt) {
     for (const char* solver : {"auto", "ssn"}) {

@@ -230,6 +230,8 @@ public:
     /// Largest speed with which a step should push apart what penetrates, where its user says nothing. Default: 0.01,
     /// the source's advice in m/s (seed footnote 5).
     [[nodiscard]] virtual double recovery_speed() const;
+    /// The acceleration of a body that is let go at rest, m/s². Default: 0, which stands for not known.
+    [[nodiscard]] virtual double free_fall() const;
     /// Gaps nearer to 0 than this count as 0, in their own unit. Default: 0.
     [[nodiscard]] virtual double gap_resolution() const;
 

@@ -95,6 +95,7 @@ public:
     [[nodiscard]] bool has_unilateral() const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
     [[nodiscard]] double recovery_speed() const override;
+    [[nodiscard]] double free_fall() const override;
     [[nodiscard]] double gap_resolution() const override;
     [[nodiscard]] double energy(const State& state) const override;
 

@@ -491,6 +491,7 @@ public:
     /// A hundredth of √(g s), the speed that a fall through s gives but for a factor, s being the median size of the
     /// shapes; without gravity, of the fastest speed at the start; where nothing moves, of s a second.
     [[nodiscard]] double recovery_speed() const override;
+    [[nodiscard]] double free_fall() const override;
     /// 1e-9 of the median size of the shapes.
     [[nodiscard]] double gap_resolution() const override;
     [[nodiscard]] double energy(const State& state) const override;

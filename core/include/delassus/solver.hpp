@@ -43,9 +43,10 @@ struct CurveSample {
 /// The settings of one solve.
 struct SolveSettings {
     double tolerance = 1e-8;  ///< natural error, > 0
-    /// Nobody asked for the tolerance: the caller chose it for what the answer is worth. `auto` may then end a little
-    /// above it rather than work for ever (SolveReport::near_goal).
-    bool tolerance_is_goal = false;
+    /// Above 0, the tolerance is a goal that the caller chose for what the answer is worth, and this is the natural
+    /// error that the caller needs: `auto` tries to reach the goal, and ends within this rather than work for ever
+    /// (SolveReport::near_goal).
+    double needed = 0.0;
     std::int64_t max_iterations = 1000000;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
@@ -96,7 +97,7 @@ struct SolveReport {
     Errors error;
     std::vector<CurveSample> curve;
     std::vector<StageReport> stages;  ///< empty if one solver did it all
-    /// Not solved, but within the multiple of a tolerance that is a goal which a stage of `auto` allows.
+    /// Not solved, but within what is needed where the tolerance is a goal.
     bool near_goal = false;
 };
 

@@ -93,6 +93,10 @@ public:
     /// The law of friction by which problems are solved, whatever theirs: the configured one, else law_of_scenes.
     [[nodiscard]] DELASSUS_API Law law() const;
 
+    /// For each velocity, the natural error that the last solve left in its part of the problem, n; 0 where nothing was
+    /// to be solved. Valid until the next solve.
+    [[nodiscard]] DELASSUS_API std::span<const double> left() const;
+
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;
     DELASSUS_API void reset_effort();
 
@@ -105,8 +109,8 @@ public:
     std::function<bool()> cancelled;
 
     /// The error that the method itself makes in the velocities of this step, n, or empty where it is not known. Where
-    /// the configuration gives no tolerance, each part of the problem is solved to a share of it (docs/tolerance.md).
-    /// Not owned.
+    /// `auto` is the solver, each part of the problem is solved to a share of it, or to the tolerance that the
+    /// configuration gives if that is less (docs/tolerance.md). Not owned.
     std::span<const double> method_error;
 
     /// Asked about each part of a problem; null: all of them are solved. Not owned.

@@ -119,6 +119,9 @@ void DynamicalSystem::free_spins(const State&, double, std::vector<FreeSpin>& sp
 double DynamicalSystem::recovery_speed() const {
     return 0.01;
 }
+double DynamicalSystem::free_fall() const {
+    return 0.0;
+}
 double DynamicalSystem::gap_resolution() const {
     return 0.0;
 }

@@ -52,6 +52,7 @@ struct Chain {
 /// What solving a part came to.
 struct PartResult {
     bool solved = true;
+    double natural = 0.0;  ///< left in the solution
     SolverEffort effort;
 };
 
@@ -111,9 +112,17 @@ struct StepSolver::Implementation {
     /// Adds to the effort; whether the part was solved.
     bool take(const PartResult& result);
     /// Whether tolerances follow from the error of the method: see docs/tolerance.md.
-    [[nodiscard]] bool follows_method() const { return !config.tolerance && !config.sweeps && !method_error.empty(); }
+    [[nodiscard]] bool follows_method() const {
+        return !config.sweeps && !method_error.empty() && (!config.tolerance || config.name == auto_name);
+    }
     /// The tolerance of a part then.
     [[nodiscard]] double goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
+    /// Its upper bound: what is left of a joint's velocity becomes drift.
+    static double loosest_goal(const PreparedProblem& part) {
+        return (part.needs() & DELASSUS_CAN_FREE) != 0 ? 1e-4 : 1e-2;
+    }
+    /// Sets the tolerance of a part. A tolerance that the configuration names is kept at least.
+    void set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns, SolveSettings& of) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
     /// solution, what it is worth in report.
     void solve_again(const PreparedProblem& prepared, Instance& by, SolveSettings again, Solution& solution,
@@ -142,7 +151,8 @@ struct StepSolver::Implementation {
     SolveSettings settings;
     std::deque<KeptKind> kinds;  // few
     Islands islands;
-    std::vector<PartResult> results;  // by the number of the part
+    std::vector<PartResult> results;
+    std::vector<double> left;  // by the number of the part
     std::vector<Chain> chains;
     Solution start;
     std::span<const double> method_error;
@@ -189,6 +199,7 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     self.settings.cancelled = cancelled;
     self.method_error = method_error;
     ++self.effort.solves;
+    self.left.assign(static_cast<std::size_t>(problem.n()), 0.0);
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     KeptKind& kind = self.kind(problem.name);
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
@@ -226,6 +237,7 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
 bool StepSolver::Implementation::solve_whole(KeptKind& kind, Problem& problem, Solution& solution, bool warm_start) {
     PartResult result;
     solve_part(kind, problem, solution, warm_start, 0, {}, settings.team, result);
+    std::ranges::fill(left, result.natural);
     return take(result);
 }
 
@@ -264,7 +276,11 @@ bool StepSolver::Implementation::solve_parts(KeptKind& kind, std::span<const Isl
             if (kind.parts[number].waits) solve(number, nullptr);
     });
     bool solved = true;
-    for (const PartResult& result : results) solved = take(result) && solved;
+    for (std::size_t number = 0; number < list.size(); ++number) {
+        solved = take(results[number]) && solved;
+        for (const std::int32_t column : list[number].columns)
+            left[static_cast<std::size_t>(column)] = results[number].natural;
+    }
     return solved;
 }
 
@@ -312,8 +328,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
-    part_settings.tolerance_is_goal = follows_method();
-    part_settings.tolerance = part_settings.tolerance_is_goal ? goal_for(prepared, columns) : settings.tolerance;
+    set_tolerance(prepared, columns, part_settings);
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
     if (may_repeat && part_settings.warm_start) by.before = solution;
@@ -327,6 +342,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     };
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
     if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
+    result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
     if (done()) return;
@@ -398,8 +414,18 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
     report = std::move(second);
 }
 
+void StepSolver::Implementation::set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns,
+                                               SolveSettings& of) const {
+    constexpr double slack = 3.0;
+    if (!follows_method()) return;
+    const double goal = goal_for(part, columns);
+    if (config.tolerance && goal >= *config.tolerance) return;
+    of.tolerance = goal;
+    of.needed = config.tolerance.value_or(slack * loosest_goal(part));
+}
+
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
-    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, most = 1e-2, most_with_joints = 1e-4;
+    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8;
     const Problem& problem = part.problem();
     const double reference = part.meter().reference();
     const auto error_of = [&](std::int32_t i) {
@@ -417,8 +443,7 @@ double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::sp
     std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
     for (std::int32_t i = 0; i < problem.H.rows; ++i) errors[static_cast<std::size_t>(i)] = error_of(i);
     const double in_rows = share_in_rows * part.meter().norm_in_rows(errors) / reference;
-    const bool joints = (part.needs() & DELASSUS_CAN_FREE) != 0;
-    return std::clamp(std::min(by_masses, in_rows), least, joints ? most_with_joints : most);
+    return std::clamp(std::min(by_masses, in_rows), least, loosest_goal(part));
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
@@ -453,6 +478,10 @@ void StepSolver::use(std::shared_ptr<ThreadTeam> threads) {
 sdk::Team StepSolver::team() const {
     const auto& threads = implementation_->settings.team;
     return threads ? threads->team() : sdk::Team();
+}
+
+std::span<const double> StepSolver::left() const {
+    return implementation_->left;
 }
 
 Law StepSolver::law() const {

@@ -527,6 +527,9 @@ void JointCoordinates::collect_unilateral(const State& state, double h, Unilater
 double JointCoordinates::recovery_speed() const {
     return implementation_->bodies.recovery_speed();
 }
+double JointCoordinates::free_fall() const {
+    return implementation_->bodies.free_fall();
+}
 double JointCoordinates::gap_resolution() const {
     return implementation_->bodies.gap_resolution();
 }

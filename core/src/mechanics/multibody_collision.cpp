@@ -84,6 +84,10 @@ void MultibodySystem::Implementation::make_detector() {
     detector = make_collision_detector(std::move(setup));
 }
 
+double MultibodySystem::free_fall() const {
+    return vector(implementation_->gravity).norm();
+}
+
 double MultibodySystem::gap_resolution() const {
     return 1e-9 * implementation_->size;
 }

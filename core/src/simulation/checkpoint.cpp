@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 3;
+constexpr int version = 4;
 constexpr std::size_t digits = 16;
 
 // Numbers are their 64 bits in hexadecimal, one after the other: no digit is lost, and zeros keep their signs.
@@ -66,19 +66,6 @@ double number(const Json& json) {
     const auto values = numbers(json);
     if (values.size() != 1) throw InputError("a number is damaged");
     return values[0];
-}
-
-/// Version 2 had the real numbers of the totals in one list, in this order.
-constexpr std::array reals_of_version_2 = {"start_energy",  "energy",        "worst_drift",        "worst_penetration",
-                                           "worst_natural", "seconds",       "solver_seconds",     "smallest_step",
-                                           "largest_step",  "start_kinetic", "potential_drop",     "recovered",
-                                           "growth",        "growth_share",  "worst_linearization"};
-
-Json totals_with_names(Json json) {
-    const auto reals = numbers(json.at("reals"));
-    if (reals.size() != reals_of_version_2.size()) throw InputError("the totals are not complete");
-    for (std::size_t i = 0; i < reals.size(); ++i) json[reals_of_version_2[i]] = bits({reals[i]});
-    return json;
 }
 
 SimulationTotals totals_of(const Json& json) {
@@ -130,8 +117,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
     try {
         const Json json = parse_ordered_json(text);
         if (json.at("format") != format) throw InputError("it is not a checkpoint of Delassus");
-        const int written = json.at("version");
-        if (written != version && written != 2) throw InputError("it was written by another version of Delassus");
+        if (json.at("version") != version) throw InputError("it was written by another version of Delassus");
         Checkpoint checkpoint;
         json.at("scene").get_to(checkpoint.scene);
         json.at("contact_forces").get_to(checkpoint.contact_forces);
@@ -140,18 +126,14 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             one.at("name").get_to(system.name);
             one.at("step").get_to(system.simulation.step);
             system.simulation.state = {number(one.at("t")), numbers(one.at("q")), numbers(one.at("v"))};
-            if (one.contains("turns"))  // older checkpoints have joints without counted turns
-                system.simulation.turns = numbers(one.at("turns"));
+            system.simulation.turns = numbers(one.at("turns"));
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
             system.simulation.sleeping = numbers(one.at("sleeping"));
-            if (one.contains("rows_left_out"))  // older checkpoints kept all rows
-                one.at("rows_left_out").get_to(system.simulation.rows_left_out);
-            system.simulation.totals = totals_of(written == 2 ? totals_with_names(one.at("totals")) : one.at("totals"));
+            one.at("rows_left_out").get_to(system.simulation.rows_left_out);
+            system.simulation.totals = totals_of(one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
-            // Older checkpoints had a picture of each frame.
-            system.picture_times =
-                one.contains("picture_times") ? numbers(one.at("picture_times")) : system.frame_times;
+            system.picture_times = numbers(one.at("picture_times"));
             checkpoint.systems.push_back(std::move(system));
         }
         return checkpoint;

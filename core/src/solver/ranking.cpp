@@ -43,7 +43,7 @@ RankedStage read_stage(const nlohmann::json& json) {
     ranked.stage.sharper = json.value("sharper", 1.0);
     ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
     ranked.stage.watched = json.value("watched", false);
-    ranked.stage.good_enough = json.value("good_enough", 0.0);
+    ranked.stage.good_enough = json.value("good_enough", false);
     ranked.last = json.value("last", false);
     if (json.contains("law")) ranked.stage.law = law_of(json.at("law").get<std::string>());
     return ranked;

@@ -116,7 +116,7 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
         report_.status = Status::Solved;
         return true;
     }
-    if (settings_.tolerance_is_goal && worst_ <= stage.good_enough * settings_.tolerance) {
+    if (stage.good_enough && worst_ <= settings_.needed) {
         report_.near_goal = true;
         return true;
     }

@@ -22,8 +22,8 @@ struct Stage {
     /// The stage is given up when, at the measured decrease, it would not reach its tolerance within max_iterations
     /// (see DecreaseWatch).
     bool watched = false;
-    /// Where the tolerance is a goal (SolveSettings), an error within this multiple of it ends the solve; 0: none does.
-    double good_enough = 0.0;
+    /// Where the tolerance is a goal, an error that is within what is needed (SolveSettings) ends the solve.
+    bool good_enough = false;
     /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's own
     /// law.
     std::optional<Law> law = {};

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <delassus/export.hpp>
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace delassus {
+
+/// What the velocities of the last steps show of the error that a step makes in them (docs/tolerance.md).
+class StepError {
+public:
+    /// Takes the velocities at the beginning of a step.
+    DELASSUS_API void note(const std::vector<double>& v);
+
+    /// Absolute values, n, valid until the next call of note() or forget(); zeros until three second differences are
+    /// known.
+    [[nodiscard]] std::span<const double> known() const { return error_; }
+
+    DELASSUS_API void forget();
+
+    /// Appends what a checkpoint keeps.
+    DELASSUS_API void save(std::vector<double>& memory) const;
+    /// Takes it from the front of rest, and leaves what follows. n: of the velocities. Throws InputError where it is too
+    /// short.
+    DELASSUS_API void load(std::span<const double>& rest, std::size_t n);
+
+private:
+    std::vector<double> before_, change_;
+    std::array<std::vector<double>, 3> jumps_;  // the latest first
+    std::vector<double> error_;
+};
+
+}  // namespace delassus
