@@ -341,7 +341,11 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
                (config.sweeps && report.status == Status::IterationLimit);
     };
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
-    if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
+    if (!done() && may_repeat) {
+        solve_again(prepared, by, part_settings, solution, report, spent);
+        report.near_goal =
+            report.near_goal || std::max(report.error.natural, report.error.balance) <= part_settings.needed;
+    }
     result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
@@ -416,12 +420,12 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
 
 void StepSolver::Implementation::set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns,
                                                SolveSettings& of) const {
-    constexpr double slack = 3.0;
+    constexpr double slack = 1e3;
     if (!follows_method()) return;
     const double goal = goal_for(part, columns);
     if (config.tolerance && goal >= *config.tolerance) return;
     of.tolerance = goal;
-    of.needed = config.tolerance.value_or(slack * loosest_goal(part));
+    of.needed = config.tolerance.value_or(std::min(slack * goal, 3.0 * loosest_goal(part)));
 }
 
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
