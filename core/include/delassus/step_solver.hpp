@@ -109,8 +109,8 @@ public:
     std::function<bool()> cancelled;
 
     /// The error that the method itself makes in the velocities of this step, n, or empty where it is not known. Where
-    /// `auto` is the solver, each part of the problem is solved to a share of it, or to the tolerance that the
-    /// configuration gives if that is less (docs/tolerance.md). Not owned.
+    /// the configuration gives no tolerance, each part of the problem is solved to a share of it; where it gives one to
+    /// `auto`, to the smaller of the two (docs/tolerance.md). Not owned.
     std::span<const double> method_error;
 
     /// Asked about each part of a problem; null: all of them are solved. Not owned.

@@ -151,8 +151,8 @@ struct StepSolver::Implementation {
     SolveSettings settings;
     std::deque<KeptKind> kinds;  // few
     Islands islands;
-    std::vector<PartResult> results;
-    std::vector<double> left;  // by the number of the part
+    std::vector<PartResult> results;  // by the number of the part
+    std::vector<double> left;
     std::vector<Chain> chains;
     Solution start;
     std::span<const double> method_error;
