@@ -24,8 +24,8 @@ public:
 
     /// Appends what a checkpoint keeps.
     DELASSUS_API void save(std::vector<double>& memory) const;
-    /// Takes it from the front of rest, and leaves what follows. n: of the velocities. Throws InputError where it is too
-    /// short.
+    /// Takes it from the front of rest, and leaves what follows. n: of the velocities. Throws InputError where it is
+    /// too short.
     DELASSUS_API void load(std::span<const double>& rest, std::size_t n);
 
 private:
