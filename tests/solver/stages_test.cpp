@@ -2,6 +2,7 @@
 // Solvers in stages: `finish`, `auto`, and the forecast that ends a stage.
 #include "solver/stages.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -185,6 +186,26 @@ TEST(Auto, EndsNearAToleranceThatIsAGoal) {
         EXPECT_EQ(report.stages.size(), goal ? 1U : 2U) << report.message;
         EXPECT_EQ(report.status, goal ? Status::IterationLimit : Status::Solved);
         EXPECT_EQ(report.error.natural > settings.tolerance, goal);
+    }
+}
+
+// What an attempt leaves is no start for the stage after it.
+TEST(Auto, GoesOnAsIfAnAttemptHadNotBeen) {
+    const ScratchFolder scratch;
+    const std::string apgd = R"({"solver": "apgd", "max_iterations": 7, "reason": "some steps", "last": true}])";
+    const auto alone = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [)" + apgd + "}]");
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solution expected;
+    static_cast<void>(solve(parse_solver("auto(ranking=" + alone + ")"), problem, expected));
+    for (const bool attempt : {true, false}) {
+        const auto file = ranking(scratch, fmt::format(R"([{{"name": "all", "when": {{}}, "stages": [
+            {{"solver": "pgs", "max_iterations": 10, "attempt": {}, "reason": "a few sweeps"}},)",
+                                                       attempt) +
+                                               apgd + "}]");
+        Solution solution;
+        const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+        EXPECT_EQ(report.stages.size(), 2U);
+        EXPECT_EQ(solution.lambda == expected.lambda, attempt);
     }
 }
 

@@ -32,8 +32,8 @@ Structure structure_of(const std::string& name) {
 
 RankedStage read_stage(const nlohmann::json& json) {
     check_keys(json,
-               {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "good_enough", "last", "law",
-                "reason"},
+               {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "good_enough", "attempt",
+                "last", "law", "reason"},
                "a stage");
     RankedStage ranked;
     ranked.solver = json.at("solver").get<std::string>();
@@ -44,6 +44,7 @@ RankedStage read_stage(const nlohmann::json& json) {
     ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
     ranked.stage.watched = json.value("watched", false);
     ranked.stage.good_enough = json.value("good_enough", false);
+    ranked.stage.attempt = json.value("attempt", false);
     ranked.last = json.value("last", false);
     if (json.contains("law")) ranked.stage.law = law_of(json.at("law").get<std::string>());
     return ranked;

@@ -90,7 +90,7 @@ const PreparedProblem& StageRunner::problem_of(const Stage& stage) {
 bool StageRunner::run(Solver& solver, const Stage& stage) {
     const PreparedProblem& problem = problem_of(stage);
     const bool other = &problem != &problem_;
-    const bool warm = started_ && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
+    const bool warm = started_ && !of_attempt_ && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const double tolerance = stage.tolerance > 0.0 ? stage.tolerance : settings_.tolerance;
     DecreaseWatch watch(tolerance, stage.max_iterations);
     const SolveSettings settings = settings_of(stage, watch, warm, problem);
@@ -102,7 +102,8 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
     const bool solved = result.status == Status::Solved && tolerance == settings_.tolerance && !other;
     // A stage with the other law provides a start for the next one, whatever its error under the problem's own law.
     if (started_ && std::isnan(worst_)) worst_ = worst_of(measured_error());
-    if (!started_ || worst_of(error) < worst_ || other || solved) {
+    if (!started_ || of_attempt_ || worst_of(error) < worst_ || other || solved) {
+        of_attempt_ = stage.attempt && (!started_ || of_attempt_);
         best_ = std::move(solution);
         error_ = error;
         worst_ = worst_of(error);

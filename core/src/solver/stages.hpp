@@ -24,6 +24,8 @@ struct Stage {
     bool watched = false;
     /// Where the tolerance is a goal, an error that is within what is needed (SolveSettings) ends the solve.
     bool good_enough = false;
+    /// An attempt: where it does not solve the problem, the next stage starts as if it had not been.
+    bool attempt = false;
     /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's own
     /// law.
     std::optional<Law> law = {};
@@ -92,6 +94,7 @@ private:
     std::optional<Errors> error_;
     double worst_ = std::numeric_limits<double>::quiet_NaN();
     bool started_ = false;
+    bool of_attempt_ = false;  ///< the best so far is what an attempt left: no start, and less than any other answer
 };
 
 }  // namespace delassus
