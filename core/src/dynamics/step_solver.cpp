@@ -429,7 +429,7 @@ void StepSolver::Implementation::set_tolerance(const PreparedProblem& part, std:
 }
 
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
-    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8;
+    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, many = 300.0;
     const Problem& problem = part.problem();
     const double reference = part.meter().reference();
     const auto error_of = [&](std::int32_t i) {
@@ -447,7 +447,10 @@ double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::sp
     std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
     for (std::int32_t i = 0; i < problem.H.rows; ++i) errors[static_cast<std::size_t>(i)] = error_of(i);
     const double in_rows = share_in_rows * part.meter().norm_in_rows(errors) / reference;
-    return std::clamp(std::min(by_masses, in_rows), least, loosest_goal(part));
+    // Few rows are solved exactly for next to nothing.
+    const double share_of_many = std::min(1.0, part.problem().m() / many);
+    return std::clamp(std::min(by_masses, in_rows), least,
+                      std::max(least, loosest_goal(part) * std::pow(share_of_many, 3)));
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
