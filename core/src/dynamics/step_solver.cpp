@@ -121,6 +121,8 @@ struct StepSolver::Implementation {
     static double loosest_goal(const PreparedProblem& part) {
         return (part.needs() & DELASSUS_CAN_FREE) != 0 ? 1e-4 : 1e-2;
     }
+    /// An error within this multiple of the upper bound is used where nothing better is found.
+    static constexpr double usable = 3.0;
     /// Sets the tolerance of a part. A tolerance that the configuration names is kept at least.
     void set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns, SolveSettings& of) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
@@ -341,11 +343,12 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
                (config.sweeps && report.status == Status::IterationLimit);
     };
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
-    if (!done() && may_repeat) {
-        solve_again(prepared, by, part_settings, solution, report, spent);
-        report.near_goal =
-            report.near_goal || std::max(report.error.natural, report.error.balance) <= part_settings.needed;
-    }
+    if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
+    // What nobody asked for ends no run.
+    if (part_settings.needed > 0.0 && !config.tolerance)
+        part_settings.needed = std::max(part_settings.needed, usable * loosest_goal(prepared));
+    if (!done() && report.status != Status::Infeasible)
+        report.near_goal = std::max(report.error.natural, report.error.balance) <= part_settings.needed;
     result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
@@ -420,12 +423,12 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
 
 void StepSolver::Implementation::set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns,
                                                SolveSettings& of) const {
-    constexpr double slack = 1e3;
+    constexpr double slack = 30.0;
     if (!follows_method()) return;
     const double goal = goal_for(part, columns);
     if (config.tolerance && goal >= *config.tolerance) return;
     of.tolerance = goal;
-    of.needed = config.tolerance.value_or(std::min(slack * goal, 3.0 * loosest_goal(part)));
+    of.needed = config.tolerance.value_or(std::min(slack * goal, usable * loosest_goal(part)));
 }
 
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
