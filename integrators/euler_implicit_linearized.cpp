@@ -2,7 +2,6 @@
 // The linearised implicit Euler method for differential variational inequalities (seed eq. 123, 148): one linear or
 // cone problem a step, contacts and impacts included. Order 1.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/memory.hpp"
 #include "dynamics/step_error.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
@@ -102,9 +102,7 @@ public:
         restart();
         std::span<const double> rest = memory;
         const auto take = [&](std::size_t count) {
-            if (rest.size() < count) throw InputError("the memory of euler_implicit_linearized is too short");
-            const auto taken = rest.first(count);
-            rest = rest.subspan(count);
+            const auto taken = take_from(rest, count, "euler_implicit_linearized");
             return std::vector<double>(taken.begin(), taken.end());
         };
         const std::vector<double> head = take(2);
@@ -313,7 +311,7 @@ private:
         D_.finish_into(problem_.D);
     }
 
-    /// Of the gap whose row of the problem this is.
+    /// Of the gap of a contact whose row of the problem this is.
     [[nodiscard]] double gap_resolution(std::int32_t row, double h) const {
         constexpr double share = 20.0, most = 1e-2;
         if (left_.empty() || free_fall_ == 0.0) return gap_resolution_;
@@ -354,7 +352,7 @@ private:
             const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
             for (std::int32_t i = 0; i < block.cone.rows; ++i) {
                 const auto& [gap, rate] = rows_.rows()[row + i];
-                const double resolution = i == 0 ? gap_resolution(m_ + row, h) : gap_resolution_;
+                const double resolution = contact && i == 0 ? gap_resolution(m_ + row, h) : gap_resolution_;
                 const double resolved = gap - std::clamp(gap, -resolution, resolution);
                 problem_.b[m_ + row + i] = rate + std::max(resolved / h, -recovery_speed_);
             }
@@ -448,7 +446,6 @@ private:
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
     std::vector<double> delta_, impulse_, force_;
-    // The velocities at the beginning of the last step, their last change, and half of the last three changes of that.
     StepError error_;
     std::vector<double> left_;  ///< largest natural error that a step left in the part of each velocity, n, or empty
     double last_h_ = 0.0;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/step_error.hpp"
 
-#include <delassus/error.hpp>
-
 #include <algorithm>
 #include <cmath>
+
+#include "dynamics/memory.hpp"
 
 namespace delassus {
 
@@ -41,12 +41,7 @@ void StepError::save(std::vector<double>& memory) const {
 
 void StepError::load(std::span<const double>& rest, std::size_t n) {
     forget();
-    const auto take = [&rest](std::size_t count) {
-        if (rest.size() < count) throw InputError("the memory of the last steps' velocities is too short");
-        const auto taken = rest.first(count);
-        rest = rest.subspan(count);
-        return taken;
-    };
+    const auto take = [&rest](std::size_t count) { return take_from(rest, count, "the last steps' velocities"); };
     if (take(1)[0] == 0.0) return;
     for (auto* part : {&before_, &change_, &jumps_[0], &jumps_[1]}) {
         const auto values = take(n);

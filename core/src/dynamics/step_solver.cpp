@@ -345,10 +345,9 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
     if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
     // What nobody asked for ends no run.
-    if (part_settings.needed > 0.0 && !config.tolerance)
-        part_settings.needed = std::max(part_settings.needed, usable * loosest_goal(prepared));
-    if (!done() && report.status != Status::Infeasible)
-        report.near_goal = std::max(report.error.natural, report.error.balance) <= part_settings.needed;
+    if (!done() && part_settings.needed > 0.0 && report.status != Status::Infeasible)
+        report.near_goal = std::max(report.error.natural, report.error.balance) <=
+                           config.tolerance.value_or(usable * loosest_goal(prepared));
     result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;

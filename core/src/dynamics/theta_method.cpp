@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "dynamics/memory.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -62,12 +63,7 @@ std::vector<double> ThetaMethod::save() const {
 void ThetaMethod::load(const std::vector<double>& memory) {
     restart();
     std::span<const double> rest = memory;
-    const auto take = [&](std::size_t count) {
-        if (rest.size() < count) throw InputError("the memory of " + settings_.name + " is too short");
-        const auto taken = rest.first(count);
-        rest = rest.subspan(count);
-        return taken;
-    };
+    const auto take = [&](std::size_t count) { return take_from(rest, count, settings_.name); };
     const auto head = take(3);
     last_h_ = head[0];
     if (head[1] != 0.0) {

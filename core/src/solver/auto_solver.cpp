@@ -87,6 +87,7 @@ public:
         if (chosen_.simulation && runner.solved_at_start()) return runner.error();
         bool done = false;
         for (const auto& ranked : rule.stages) {
+            if (!ranked.m.takes(problem.raw().m)) continue;
             Solver* solver = usable(ranked, runner.problem_of(ranked.stage));
             if (!solver) continue;
             done = runner.run(*solver, ranked.stage) || ranked.last;

@@ -30,10 +30,17 @@ Structure structure_of(const std::string& name) {
     throw InputError(fmt::format("there is no structure \"{}\" of H", name));
 }
 
+RowRange read_rows(const nlohmann::json& bounds) {
+    RowRange range;
+    range.smallest = bounds.at(0).get<std::int32_t>();
+    if (!bounds.at(1).is_null()) range.largest = bounds.at(1).get<std::int32_t>();
+    return range;
+}
+
 RankedStage read_stage(const nlohmann::json& json) {
     check_keys(json,
                {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "good_enough", "attempt",
-                "last", "law", "reason"},
+                "last", "law", "m", "reason"},
                "a stage");
     RankedStage ranked;
     ranked.solver = json.at("solver").get<std::string>();
@@ -46,6 +53,7 @@ RankedStage read_stage(const nlohmann::json& json) {
     ranked.stage.good_enough = json.value("good_enough", false);
     ranked.stage.attempt = json.value("attempt", false);
     ranked.last = json.value("last", false);
+    if (json.contains("m")) ranked.m = read_rows(json.at("m"));
     if (json.contains("law")) ranked.stage.law = law_of(json.at("law").get<std::string>());
     return ranked;
 }
@@ -62,10 +70,7 @@ RankingRule read_rule(const nlohmann::json& json) {
     if (when.contains("law")) rule.law = law_of(when.at("law").get<std::string>());
     if (when.contains("structure"))
         for (const auto& name : when.at("structure")) rule.structures.push_back(structure_of(name));
-    if (when.contains("m")) {
-        rule.smallest_m = when.at("m").at(0).get<std::int32_t>();
-        if (!when.at("m").at(1).is_null()) rule.largest_m = when.at("m").at(1).get<std::int32_t>();
-    }
+    if (when.contains("m")) rule.m = read_rows(when.at("m"));
     if (when.contains("tolerance")) {
         if (!when.at("tolerance").at(0).is_null()) rule.smallest_tolerance = when.at("tolerance").at(0).get<double>();
         if (!when.at("tolerance").at(1).is_null()) rule.largest_tolerance = when.at("tolerance").at(1).get<double>();
@@ -104,7 +109,7 @@ Ranking::Ranking(const std::filesystem::path& file) {
 
 const RankingRule& Ranking::rule(const RankedNeeds& asked, std::int32_t m) const {
     return *std::find_if(rules_.begin(), rules_.end(),
-                         [&](const RankingRule& rule) { return rule.matches(asked) && rule.takes(m); });
+                         [&](const RankingRule& rule) { return rule.matches(asked) && rule.m.takes(m); });
 }
 
 std::vector<const RankingRule*> Ranking::rules(const RankedNeeds& asked) const {
@@ -112,7 +117,7 @@ std::vector<const RankingRule*> Ranking::rules(const RankedNeeds& asked) const {
     for (const auto& rule : rules_) {
         if (!rule.matches(asked)) continue;
         found.push_back(&rule);
-        if (rule.smallest_m == 0 && rule.largest_m == RankingRule{}.largest_m) break;  // none comes after it
+        if (rule.m == RowRange{}) break;  // none comes after it
     }
     return found;
 }

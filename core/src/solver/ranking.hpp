@@ -13,12 +13,21 @@
 
 namespace delassus {
 
+/// Numbers of rows, both included.
+struct RowRange {
+    std::int32_t smallest = 0, largest = std::numeric_limits<std::int32_t>::max();
+
+    [[nodiscard]] bool takes(std::int32_t m) const { return m >= smallest && m <= largest; }
+    bool operator==(const RowRange&) const = default;
+};
+
 /// A stage of the ranking: a solver and what it is to do.
 struct RankedStage {
     std::string solver;
     OptionTexts options;
     Stage stage;
     bool last = false;  ///< no other stage follows: where this one fails, the others would too
+    RowRange m = {};    ///< of the problems that the stage is for
 };
 
 /// What a rule looks at, apart from m.
@@ -35,13 +44,12 @@ struct RankingRule {
     std::optional<bool> simulation;     ///< a step of a simulation, or a problem by itself
     std::optional<Law> law;             ///< of problems with friction
     std::vector<Structure> structures;  ///< none: any
-    std::int32_t smallest_m = 0, largest_m = std::numeric_limits<std::int32_t>::max();
+    RowRange m;
     double smallest_tolerance = 0.0, largest_tolerance = std::numeric_limits<double>::infinity();
     std::vector<RankedStage> stages;
 
     /// For some m.
     [[nodiscard]] bool matches(const RankedNeeds& asked) const;
-    [[nodiscard]] bool takes(std::int32_t m) const { return m >= smallest_m && m <= largest_m; }
 };
 
 class Ranking {
