@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include "bench/analysis.hpp"
 #include "bench/results_file.hpp"
 #include "bench/rows.hpp"
 #include "bench_fixture.hpp"
@@ -336,6 +337,23 @@ TEST_F(BenchRun, FamiliesHaveAnExponent) {
     const std::string summary = content_of(folder / "out" / "summary.md");
     EXPECT_NE(summary.find("Growth of cost with size"), std::string::npos) << summary;
     EXPECT_NE(summary.find("| sphere_pile |"), std::string::npos) << summary;
+}
+
+TEST_F(BenchRun, SizesAreToldApart) {
+    ASSERT_EQ(run_suite(suite("problems: [{generate: sphere_pile, set: {contacts: [20, 60, 180]}}]\nsolvers: [apgd, "
+                              "misbehaving]\ntolerances: [1e-3, 1e-6]\nrepeats: 1\nreferences: none\n"))
+                  .exit_code,
+              0);
+    const Json sizes = bench::analyse(results()).at("classes").at(0).at("sizes");
+    ASSERT_EQ(sizes.size(), 2U);
+    EXPECT_EQ(sizes.at(0).at("from"), 10.0);
+    EXPECT_EQ(sizes.at(0).at("problems"), 2);
+    EXPECT_EQ(sizes.at(1).at("problems"), 1);
+    EXPECT_EQ(sizes.at(1).at("tolerances").size(), 2U);
+    const std::string summary = content_of(folder / "out" / "summary.md");
+    EXPECT_NE(summary.find("#### By size"), std::string::npos) << summary;
+    EXPECT_NE(summary.find("| 10 to 99         |   apgd |       2 of 2 |"), std::string::npos) << summary;
+    EXPECT_NE(summary.find("| 100 to 999       |   apgd |       1 of 1 |"), std::string::npos) << summary;
 }
 
 TEST_F(BenchRun, WhatIsNoResultIsRefused) {

@@ -168,19 +168,32 @@ TEST(Auto, RunsTheStagesOfItsRule) {
     EXPECT_EQ(report.message.substr(0, 4), "all:");
 }
 
-// A tolerance that is a goal may be missed where a stage allows it and what is needed is met; another may not.
+// A tolerance that is a goal may be missed where what is needed is met and the stage does not forbid it, and where only
+// patient stages are left and the answer is usable; another may not.
 TEST(Auto, EndsNearAToleranceThatIsAGoal) {
     const ScratchFolder scratch;
-    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "stages": [
-        {"solver": "pgs", "max_iterations": 10, "good_enough": true, "reason": "a few sweeps"},
-        {"solver": "apgd", "reason": "to the end"}]}])");
     const PreparedProblem problem(read_problem(example("box_stack")));
-    for (const double needed : {1.0, 1e-9, 0.0}) {
-        const bool goal = needed == 1.0;
+    struct Case {
+        const char *first, *second;  // keys of the stages
+        double needed, usable;
+        bool goal;
+    };
+    for (const auto& [first, second, needed, usable, goal] : {Case{"", "", 1.0, 0.0, true},
+                                                              {R"("to_goal": true,)", "", 1.0, 0.0, false},
+                                                              {"", "", 1e-9, 0.0, false},
+                                                              {"", "", 1e-9, 1.0, false},
+                                                              {"", R"("patient": true,)", 1e-9, 1.0, true},
+                                                              {"", R"("patient": true,)", 1e-9, 1e-9, false},
+                                                              {"", R"("patient": true,)", 0.0, 0.0, false}}) {
+        const auto file = ranking(scratch, fmt::format(R"([{{"name": "all", "when": {{}}, "stages": [
+                {{"solver": "pgs", "max_iterations": 10, {} "reason": "a few sweeps"}},
+                {{"solver": "apgd", {} "reason": "to the end"}}]}}])",
+                                                       first, second));
         Solution solution;
         SolveSettings settings;
         settings.tolerance = 1e-10;
         settings.needed = needed;
+        settings.usable = usable;
         const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution, settings);
         EXPECT_EQ(report.near_goal, goal);
         EXPECT_EQ(report.stages.size(), goal ? 1U : 2U) << report.message;

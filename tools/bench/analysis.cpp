@@ -98,12 +98,38 @@ Json analyse_tolerance(const Rows& rows, double tolerance, double time_limit) {
             {"solvers", list}};
 }
 
-Json analyse_class(const std::string& name, const Rows& rows, const Json& settings) {
+Json analyse_tolerances(const Rows& rows, const Json& settings) {
     Json tolerances = Json::array();
     for (const auto& tolerance : settings.at("tolerances"))
         tolerances.push_back(analyse_tolerance(rows, tolerance.get<double>(), settings.at("time_limit").get<double>()));
+    return tolerances;
+}
+
+/// The same for the problems of each decade of sizes; empty where all are of one decade.
+Json analyse_sizes(const Rows& rows, const std::map<std::string, const Json*>& problems, const Json& settings) {
+    std::map<double, Rows> decades;
+    for (const Json* row : rows) {
+        const auto problem = problems.find(row->at("problem"));
+        const double size = problem == problems.end() ? 0.0 : problem->second->at("size").get<double>();
+        if (size > 0.0) decades[std::pow(10.0, std::floor(std::log10(size)))].push_back(row);
+    }
+    Json sizes = Json::array();
+    if (decades.size() < 2) return sizes;
+    for (const auto& [from, own] : decades)
+        sizes.push_back({{"from", from},
+                         {"problems", distinct(own, problem_of).size()},
+                         {"tolerances", analyse_tolerances(own, settings)}});
+    return sizes;
+}
+
+Json analyse_class(const std::string& name, const Rows& rows, const std::map<std::string, const Json*>& problems,
+                   const Json& settings) {
     const auto members = distinct(rows, problem_of);
-    return {{"name", name}, {"problems", members.size()}, {"members", members}, {"tolerances", tolerances}};
+    return {{"name", name},
+            {"problems", members.size()},
+            {"members", members},
+            {"tolerances", analyse_tolerances(rows, settings)},
+            {"sizes", analyse_sizes(rows, problems, settings)}};
 }
 
 Json fit_json(const std::vector<double>& x, const std::vector<double>& y) {
@@ -245,9 +271,9 @@ Json analyse(const ResultSet& results) {
         Rows own;
         for (const Json* row : rows)
             if (class_of(*row, problems) == name) own.push_back(row);
-        classes.push_back(analyse_class(name, own, settings));
+        classes.push_back(analyse_class(name, own, problems, settings));
     }
-    if (names.size() > 1) classes.push_back(analyse_class("all", rows, settings));
+    if (names.size() > 1) classes.push_back(analyse_class("all", rows, problems, settings));
     return {{"classes", classes},
             {"scaling", analyse_scaling(rows, problems)},
             {"orders", analyse_orders(results.simulations, results.references)},

@@ -15,8 +15,10 @@ inline constexpr double least_time = 1e-5;
 [[nodiscard]] double total_seconds(const Json& solve);
 
 /// {"classes": [{"name", "problems", "tolerances": [{"tolerance", "problems", "solved_by_any", "solvers": [{"solver",
-/// "ratios", "mean", "solved", "supported", "false_claims", "memory"}]}]}], "scaling": […], "orders": […],
-/// "failures": [{"solver", "cause", "count"}], "recording": {"ratio", "runs"}}
+/// "ratios", "mean", "solved", "supported", "false_claims", "memory"}]}], "sizes": [{"from", "problems",
+/// "tolerances"}]}], "scaling": […], "orders": […], "failures": [{"solver", "cause", "count"}], "recording": {"ratio",
+/// "runs"}}
+/// `sizes` has the same for the problems of each decade [from, 10 from) of sizes, and is empty where there is but one.
 [[nodiscard]] Json analyse(const ResultSet& results);
 
 }  // namespace delassus::bench

@@ -81,6 +81,42 @@ std::string class_text(const Json& one) {
         refused.empty() ? "" : fmt::format("\nSolvers that take none of these problems: {}.\n", refused));
 }
 
+/// Solved, and mean time, for each decade of sizes and solver at each tolerance.
+std::string sizes_text(const Json& one) {
+    if (one.at("sizes").empty()) return {};
+    std::vector<std::string> head = {"contacts or rows", "solver"};
+    for (const Json& at : one.at("tolerances")) {
+        head.push_back(fmt::format("solved {:g}", at.at("tolerance").get<double>()));
+        head.push_back("mean");
+    }
+    MarkdownTable table(head);
+    for (const Json& size : one.at("sizes")) {
+        const auto from = size.at("from").get<double>();
+        std::map<std::string, std::vector<std::string>> rows;
+        std::vector<std::string> order;
+        std::size_t columns = 2;
+        for (const Json& at : size.at("tolerances")) {
+            for (const Json& solver : at.at("solvers")) {
+                const std::string label = solver.at("solver");
+                if (solver.at("supported") == 0) continue;
+                if (!rows.contains(label)) order.push_back(label);
+                auto& row = rows[label];
+                row.resize(columns, "—");
+                row[0] = fmt::format("{:.0f} to {:.0f}", from, 10.0 * from - 1.0);
+                row[1] = label;
+                row.push_back(fmt::format("{} of {}", solver.at("solved").get<int>(), size.at("problems").get<int>()));
+                row.push_back(seconds_text(number_of(solver.at("mean"))));
+            }
+            columns += 2;
+        }
+        for (const auto& label : order) {
+            rows.at(label).resize(head.size(), "—");
+            table.add(rows.at(label));
+        }
+    }
+    return fmt::format("#### By size\n\n{}\n", table.text());
+}
+
 /// The fastest solver of each problem at the tightest tolerance.
 std::string fastest_text(const ResultSet& results) {
     double tightest = 1.0;
@@ -230,7 +266,7 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
     text += '\n';
     text += axes_markdown(results);
     for (const Json& one : analysis.at("classes"))
-        if (one.at("name") != "all") text += class_text(one);
+        if (one.at("name") != "all") text += class_text(one) + sizes_text(one);
     text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) +
             stepping_text(results, analysis) + leaving_out_text(results);
     if (!results.solves.empty())

@@ -47,6 +47,9 @@ struct SolveSettings {
     /// error that the caller needs: `auto` tries to reach the goal, and ends within this rather than work for ever
     /// (SolveReport::near_goal).
     double needed = 0.0;
+    /// Above 0: the natural error with which the caller can do at all, at least `needed`. Where the goal is out of easy
+    /// reach, `auto` ends within this rather than begin what takes long.
+    double usable = 0.0;
     std::int64_t max_iterations = 1000000;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given

@@ -422,12 +422,21 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
 
 void StepSolver::Implementation::set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns,
                                                SolveSettings& of) const {
-    constexpr double slack = 30.0;
-    if (!follows_method()) return;
+    constexpr double slack = 30.0, far_below = 1e-2;
+    if (!follows_method()) {
+        // Contacts may have no answer to a default tolerance that anybody finds.
+        if (config.tolerance || config.sweeps || (part.needs() & DELASSUS_CAN_FRICTION) == 0 ||
+            (part.needs() & DELASSUS_CAN_FREE) != 0)
+            return;
+        of.needed = of.tolerance;
+        of.usable = far_below * loosest_goal(part);
+        return;
+    }
     const double goal = goal_for(part, columns);
     if (config.tolerance && goal >= *config.tolerance) return;
     of.tolerance = goal;
     of.needed = config.tolerance.value_or(std::min(slack * goal, usable * loosest_goal(part)));
+    if (!config.tolerance) of.usable = std::max(of.needed, loosest_goal(part));
 }
 
 double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {

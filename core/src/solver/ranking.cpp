@@ -39,8 +39,8 @@ RowRange read_rows(const nlohmann::json& bounds) {
 
 RankedStage read_stage(const nlohmann::json& json) {
     check_keys(json,
-               {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "good_enough", "attempt",
-                "last", "law", "m", "reason"},
+               {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "to_goal", "patient",
+                "attempt", "last", "law", "m", "reason"},
                "a stage");
     RankedStage ranked;
     ranked.solver = json.at("solver").get<std::string>();
@@ -50,7 +50,8 @@ RankedStage read_stage(const nlohmann::json& json) {
     ranked.stage.sharper = json.value("sharper", 1.0);
     ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
     ranked.stage.watched = json.value("watched", false);
-    ranked.stage.good_enough = json.value("good_enough", false);
+    ranked.stage.to_goal = json.value("to_goal", false);
+    ranked.stage.patient = json.value("patient", false);
     ranked.stage.attempt = json.value("attempt", false);
     ranked.last = json.value("last", false);
     if (json.contains("m")) ranked.m = read_rows(json.at("m"));

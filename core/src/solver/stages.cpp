@@ -88,6 +88,10 @@ const PreparedProblem& StageRunner::problem_of(const Stage& stage) {
 }
 
 bool StageRunner::run(Solver& solver, const Stage& stage) {
+    if (stage.patient && !of_attempt_ && worst_ <= settings_.usable) {
+        report_.near_goal = true;
+        return true;
+    }
     const PreparedProblem& problem = problem_of(stage);
     const bool other = &problem != &problem_;
     const bool warm = started_ && !of_attempt_ && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
@@ -117,7 +121,7 @@ bool StageRunner::run(Solver& solver, const Stage& stage) {
         report_.status = Status::Solved;
         return true;
     }
-    if (stage.good_enough && worst_ <= settings_.needed) {
+    if (!stage.to_goal && worst_ <= settings_.needed) {
         report_.near_goal = true;
         return true;
     }

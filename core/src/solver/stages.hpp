@@ -22,8 +22,11 @@ struct Stage {
     /// The stage is given up when, at the measured decrease, it would not reach its tolerance within max_iterations
     /// (see DecreaseWatch).
     bool watched = false;
-    /// Where the tolerance is a goal, an error that is within what is needed (SolveSettings) ends the solve.
-    bool good_enough = false;
+    /// Where the tolerance is a goal, an error that is within what is needed (SolveSettings) does not end the solve
+    /// here.
+    bool to_goal = false;
+    /// Much work for little: not begun where the answer so far is usable (SolveSettings).
+    bool patient = false;
     /// An attempt: where it does not solve the problem, the next stage starts as if it had not been.
     bool attempt = false;
     /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's own
