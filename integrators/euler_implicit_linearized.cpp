@@ -294,8 +294,7 @@ private:
                 for (std::int32_t i = 0; i < 3; ++i)
                     force_[spins_[k].column + i] += spins_[k].impulse[i] - h * end_spins_[k].torque[i];
         }
-        report.linearization = linearization_.error(begin, end_, h, force_, impulse_, problem_.H);
-        linearization_.judge(report.linearization, begin, h, "euler_implicit_linearized");
+        linearization_.judge(begin, end_, h, force_, impulse_, problem_.H, "euler_implicit_linearized", report);
     }
 
     // D takes its arrays from the unilateral rows where there are no others.

@@ -81,7 +81,8 @@ std::map<std::string, std::string> scenes_of_parts() {
     for (const std::string kind :
          {"sphere", "box", "capsule", "cylinder", "plane", "convex", "terrain", "height_field"})
         scenes[kind] = "step: 1\nend: 1\nbodies: [{shapes: [{" + kind + ": {@}}]}]";
-    for (const std::string kind : {"joint", "motor", "spring", "load"}) scenes[kind] = ball + kind + "s: [{@}]";
+    for (const std::string kind : {"joint", "motor", "spring", "load", "attachment"})
+        scenes[kind] = ball + kind + "s: [{@}]";
     scenes["mesh"] = "step: 1\nend: 1\nbodies: [{shapes: [{mesh: {@}}]}]";
     scenes["elastic_mesh"] = "step: 1\nend: 1\nelastic_meshes: [{@}]";
     scenes["fixed_box"] = "step: 1\nend: 1\nelastic_meshes: [{fixed_boxes: [{@}]}]";

@@ -125,6 +125,9 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
                        simulation.record().sleeping, totals.resting_parts);
         if (totals.worst_linearization > 0.0)
             fmt::print("  worst linearisation error {:.1e}\n", totals.worst_linearization);
+        if (totals.divided_steps > 0)
+            fmt::print("  {} steps were too long for {} and taken in up to {} parts\n", totals.divided_steps,
+                       system.integrator, totals.most_parts);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {

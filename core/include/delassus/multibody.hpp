@@ -188,6 +188,13 @@ struct NodeShare {
     double share = 1.0;
 };
 
+/// Nodes that a body carries: each stays where it is in the body's frame at t = 0. Holds elastic bodies by rigid ones.
+struct AttachmentParameters {
+    std::string name;
+    std::vector<std::int32_t> nodes;
+    BodyIndex body = world_body;  ///< of a fixed body, or the world, the nodes become fixed
+};
+
 /// A force on a body, or on nodes; a torque on a body. Given in time.
 struct LoadParameters {
     std::string name;
@@ -336,6 +343,9 @@ public:
     void add_spring(const SpringParameters& spring);
     void add_bushing(const BushingParameters& bushing);
     void add_load(const LoadParameters& load);
+    /// Three rows for each node of a body that moves, after those of all joints. At the start the nodes move with the
+    /// body. Nodes do not touch the body that carries them. Throws InputError if a node is fixed or attached already.
+    void add_attachment(const AttachmentParameters& attachment);
     /// A tetrahedron with linear displacements between four nodes, its mass shared among them. Throws InputError if it
     /// is inverted.
     void add_tetrahedron(const std::array<std::int32_t, 4>& nodes, const ElasticMaterial& material,
@@ -393,6 +403,9 @@ public:
     /// Throws InputError if there are none.
     [[nodiscard]] std::vector<NodeShare> spread_over_sides(std::int32_t first, std::int32_t count,
                                                            const AlignedBox& box) const;
+    /// Those of the nodes first … first + count − 1 that lie in the box at t = 0, ascending.
+    [[nodiscard]] std::vector<std::int32_t> nodes_in(std::int32_t first, std::int32_t count,
+                                                     const AlignedBox& box) const;
     /// Nodes that no tetrahedron holds, ascending.
     [[nodiscard]] std::vector<std::int32_t> loose_nodes() const;
     /// The two nodes of each cable.
@@ -422,7 +435,7 @@ public:
     /// nothing else. Throws InputError, and names a joint, if there is no such position or velocity, or if a joint with
     /// a start closes a loop: then others decide where it is.
     const Assembly& assemble();
-    /// Rows of all joints and motors, kept or not.
+    /// Rows of all joints and motors, kept or not, and after them of attachments.
     [[nodiscard]] std::int32_t constraint_rows() const;
     /// Their numbers, ascending; all until assemble().
     [[nodiscard]] const std::vector<std::int32_t>& kept_rows() const;

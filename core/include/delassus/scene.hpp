@@ -91,6 +91,7 @@ struct SceneSystem {
     std::vector<SpringParameters> springs;
     std::vector<BushingParameters> bushings;
     std::vector<LoadParameters> loads;
+    std::vector<AttachmentParameters> attachments;
     std::vector<SceneMaterial> materials;
     std::vector<SceneMaterialPair> material_pairs;
     std::vector<std::int32_t> shape_material;     ///< of each of system->shapes()

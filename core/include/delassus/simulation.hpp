@@ -37,6 +37,7 @@ struct StepRecord {
     std::int64_t solver_iterations = 0;
     double natural = 0.0;        ///< largest natural error of the step's solves by a plugin
     double h = 0.0;              ///< size of the step, s
+    std::int64_t parts = 1;      ///< into which the step was divided, as the method could not take it in one
     std::int64_t rejected = 0;   ///< trials of the step control that were thrown away
     bool impact = false;         ///< a short step of the step control, for a contact that closed
     double seconds = 0.0;        ///< of wall time, everything included
@@ -68,6 +69,8 @@ struct SimulationTotals {
     std::int64_t resting_parts = 0;     ///< parts of problems that were left out because their bodies sleep
     std::int64_t repeated_solves = 0;   ///< by `auto`, since the solver that was asked for missed its tolerance
     std::int64_t near_goal_solves = 0;  ///< that ended somewhat above what their steps are worth (docs/tolerance.md)
+    std::int64_t divided_steps = 0;     ///< fixed steps that the method could not take in one
+    std::int64_t most_parts = 0;        ///< that one of them was divided into
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;
@@ -159,7 +162,11 @@ private:
     [[nodiscard]] const State& bodies_at(const State& state, State& memory) const;
     /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
-    void advance(State& state, AdaptiveStepReport& report);
+    /// memory: of the timestepper, before the step.
+    void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
+    /// A fixed step that the timestepper could not take, in parts. Throws StepFailure where that does not help.
+    void advance_in_parts(State& state, AdaptiveStepReport& report, const std::vector<double>& memory,
+                          const StepTooLong& failure);
     /// The timestepper and what controls its steps.
     void make_method();
     /// Has the system choose anew which rows to keep where it must; the method then starts anew.

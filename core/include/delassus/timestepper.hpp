@@ -37,6 +37,7 @@ struct StepReport {
     /// The error of a linearised method's forces at the end of the step, as a share of the velocities
     /// (docs/integrators.md); 0 where forces are linear, or where it is not measured.
     double linearization = 0.0;
+    double linearization_rounding = 0.0;   ///< what the last digits of positions may make of it; not part of it
     double recovered = 0.0;                ///< energy that contacts gave by pushing apart what penetrated, J; ≥ 0
     std::vector<BlockReaction> reactions;  ///< one for each unilateral block of the problem, in its order
     std::vector<ContactPoint> contacts;    ///< UnilateralRows::contacts(): the last of these blocks are theirs
@@ -50,6 +51,12 @@ struct StepReport {
 class DELASSUS_API StepFailure : public Error {
 public:
     using Error::Error;
+};
+
+/// One that the method cannot take at this length, and that it would take well in parts.
+class DELASSUS_API StepTooLong : public StepFailure {
+public:
+    using StepFailure::StepFailure;
 };
 
 /// An estimate of the error of a step, along increments of the positions and in the velocities; n each.

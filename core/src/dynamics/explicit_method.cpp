@@ -165,7 +165,7 @@ void ExplicitMethod::project_positions(const State& begin, State& end, double h,
         // Below 1e-10 what no longer falls is rounding.
         if (off <= rounding || (off <= 1e-10 && off > 0.25 * last)) return;
         if (!(off < last) || i == most_iterations)
-            throw StepFailure(fmt::format(
+            throw StepTooLong(fmt::format(
                 "{} cannot take the step from t = {:.9g} with h = {:.9g}: its end is too far from where the "
                 "constraints hold (off by {:.3g}); take shorter steps",
                 tableau_.name, begin.t, h, off));

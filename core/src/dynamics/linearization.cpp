@@ -23,8 +23,9 @@ double diagonal_entry(const SparseMatrix& A, std::int32_t row) {
 Linearization::Linearization(DynamicalSystem& system, double limit)
     : system_(system), limit_(limit), wanted_(std::isfinite(limit) && system.has_stiffness()) {}
 
-double Linearization::error(const State& begin, const State& end, double h, std::span<const double> force,
-                            std::span<const double> linear, const SparseMatrix& H) {
+void Linearization::judge(const State& begin, const State& end, double h, std::span<const double> force,
+                          std::span<const double> linear, const SparseMatrix& H, std::string_view method,
+                          StepReport& report) {
     const auto n = static_cast<std::int32_t>(linear.size());
     M_.begin(n, n);
     system_.add_mass(end, 1.0, M_);
@@ -46,13 +47,12 @@ double Linearization::error(const State& begin, const State& end, double h, std:
         after += squared(end.v[k]) * mass;
     }
     const double scale = std::sqrt(std::max({before, after, forces}));
-    const double error = std::max(std::sqrt(difference) - std::sqrt(rounding), 0.0);
-    return error > 0.0 ? error / scale : 0.0;
-}
-
-void Linearization::judge(double error, const State& begin, double h, std::string_view method) const {
+    const auto share = [scale](double value) { return value > 0.0 ? value / scale : 0.0; };
+    const double error = share(std::sqrt(difference) - std::sqrt(rounding));
+    report.linearization = error;
+    report.linearization_rounding = share(std::sqrt(rounding));
     if (error <= limit_) return;
-    throw StepFailure(fmt::format(
+    throw StepTooLong(fmt::format(
         "{} cannot take the step from t = {:.9g} with h = {:.9g}: its linear model is off by forces that are {:.2g} of "
         "the velocities in a step, where linearization_limit is {:.2g}; take shorter steps, a method that iterates "
         "(euler_implicit), or a joint in place of a very stiff part",

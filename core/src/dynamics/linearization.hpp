@@ -31,12 +31,10 @@ public:
     /// Whether there is something to measure: forces that are not constant, and a limit.
     [[nodiscard]] bool wanted() const { return wanted_; }
 
-    /// η of the step from begin to end. force: h f there, linear: h f_lin, n each; H: M + h R + h² K or near to it.
-    [[nodiscard]] double error(const State& begin, const State& end, double h, std::span<const double> force,
-                               std::span<const double> linear, const SparseMatrix& H);
-
-    /// Throws StepFailure if the error is beyond the limit.
-    void judge(double error, const State& begin, double h, std::string_view method) const;
+    /// report.linearization ← η of the step from begin to end, and what rounding may make of it. force: h f there,
+    /// linear: h f_lin, n each; H: M + h R + h² K or near to it. Throws StepTooLong if η is beyond the limit.
+    void judge(const State& begin, const State& end, double h, std::span<const double> force,
+               std::span<const double> linear, const SparseMatrix& H, std::string_view method, StepReport& report);
 
 private:
     DynamicalSystem& system_;

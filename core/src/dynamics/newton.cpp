@@ -313,9 +313,8 @@ private:
             const Vector force = h_ * trial_residual_.force,
                          linear = h_ * (trial_residual_.inertia - trial_residual_.reaction);
             const auto n = static_cast<std::size_t>(newton_.n_);
-            report_.linearization =
-                linearization.error(begin_, trial_.state, h_, {force.data(), n}, {linear.data(), n}, newton_.kept_.H);
-            linearization.judge(report_.linearization, begin_, h_, settings_.method);
+            linearization.judge(begin_, trial_.state, h_, {force.data(), n}, {linear.data(), n}, newton_.kept_.H,
+                                settings_.method, report_);
         }
         newton_.judge_turns(begin_, h_, trial_.delta);
         point_ = trial_;

@@ -112,7 +112,7 @@ void PositionProjection::require_nearer(const State& begin, const State& end, do
     if (m_ > 0) system_.constraint(end, constraint_.data());
     for (const double C : constraint_) left = std::max(left, std::abs(C));
     if (left <= 0.5 * off || left <= std::max(1e4 * resolution_, 1e-6)) return;
-    throw StepFailure(fmt::format(
+    throw StepTooLong(fmt::format(
         "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
         "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",
         method, begin.t, h, off, left));

@@ -340,8 +340,7 @@ void ThetaMethod::judge_linearization(const State& begin, double h, const Vector
     system_.multiply_mass(at_theta_, 1.0, back_.data(), linear_.data());
     impulse_of_forces(h);
     const auto n = static_cast<std::size_t>(n_);
-    report.linearization = linearization_.error(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H);
-    linearization_.judge(report.linearization, begin, h, settings_.name);
+    linearization_.judge(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H, settings_.name, report);
 }
 
 // A row's C at the end is what the linear model of its step missed. Beyond linearization_limit times the way h |D| |v|
@@ -362,7 +361,7 @@ void ThetaMethod::judge_constraints(const State& begin, double h) {
                    std::max(std::abs(begin.v[column]), std::abs(end_.v[column]));
         }
         if (off <= settings_.linearization_limit * way) continue;
-        throw StepFailure(fmt::format(
+        throw StepTooLong(fmt::format(
             "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, which is "
             "{:.2g} of the way of what it holds, where linearization_limit is {:.2g}; take shorter steps, or a method "
             "that iterates (euler_implicit, hht)",

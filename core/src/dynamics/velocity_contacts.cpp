@@ -188,7 +188,7 @@ void VelocityContacts::require_same_side(const State& begin, double h) const {
             found = cosine > least_cosine;
         }
         if (!found)
-            throw StepFailure(fmt::format(
+            throw StepTooLong(fmt::format(
                 "the step from t = {:.9g} with h = {:.9g} is too long: a body would go through another one, which it "
                 "meets after {:.3g} s at {:.3g} m/s, before the method looks for contacts in the middle of the step; "
                 "take shorter steps, or euler_implicit_linearized, which looks for them on the way",

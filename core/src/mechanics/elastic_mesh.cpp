@@ -38,6 +38,17 @@ std::vector<std::array<std::int32_t, 3>> MultibodySystem::element_surface() cons
     return triangles;
 }
 
+std::vector<std::int32_t> MultibodySystem::nodes_in(std::int32_t first, std::int32_t count,
+                                                    const AlignedBox& box) const {
+    std::vector<std::int32_t> result;
+    for (auto node = first; node < first + count; ++node) {
+        implementation_->check_node(node, "nodes_in()");
+        if (inside(box, implementation_->nodes[static_cast<std::size_t>(node)].parameters.position))
+            result.push_back(node);
+    }
+    return result;
+}
+
 // ∫ N_a over a side of area A: A/3 for each corner with linear displacements; with quadratic ones A/3 for each middle
 // and nothing for the corners.
 std::vector<NodeShare> MultibodySystem::spread_over_sides(std::int32_t first, std::int32_t count,

@@ -356,6 +356,10 @@ void MultibodySystem::finish() {
         joint.first_row = rows;
         rows += joint.row_count();
     }
+    for (auto& attachment : self.attachments) {
+        attachment.first_row = rows;
+        rows += 3;
+    }
     self.place_of_row.assign(static_cast<std::size_t>(rows), 0);
     self.number_rows();
     self.finished = true;
@@ -539,6 +543,7 @@ State MultibodySystem::initial_state() const {
         state.q.insert(state.q.end(), node.parameters.position.begin(), node.parameters.position.end());
         state.v.insert(state.v.end(), node.parameters.velocity.begin(), node.parameters.velocity.end());
     }
+    self.carry_nodes(state);
     return state;
 }
 

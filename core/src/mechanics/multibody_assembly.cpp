@@ -118,6 +118,7 @@ const Assembly& MultibodySystem::assemble() {
                 linkage.joint_of(left.row), left.value, linkage.size()));
         self.redundant.push_back(std::move(linkage));
     }
+    self.carry_nodes(state);
     self.first_kept_rows = self.kept_rows;
     self.assembled = std::move(state);
     return self.assembly.emplace(done);
@@ -186,6 +187,7 @@ bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
         }
         renewed = true;
     }
+    if (renewed) self.carry_nodes(state);
     return renewed;
 }
 

@@ -62,6 +62,8 @@ void MultibodySystem::Implementation::make_detector() {
         setup.fixed.push_back(node.column < 0);
         setup.group.push_back(0);
     }
+    for (const auto& one : attachments)
+        setup.apart.emplace_back(one.body, static_cast<std::int32_t>(bodies.size()) + one.node);
     for (const auto& contact : node_contacts) {
         Shape sphere;
         sphere.size[0] = contact.radius;

@@ -8,9 +8,11 @@
 namespace delassus {
 
 using mechanics::arm;
+using mechanics::Attachment;
 using mechanics::Feature;
 using mechanics::Gear;
 using mechanics::Matrix3d;
+using mechanics::Placement;
 using mechanics::Row;
 using mechanics::Vector3d;
 
@@ -37,6 +39,7 @@ std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
         }
         if (count > 0) blocks.push_back(count);
     }
+    blocks.insert(blocks.end(), implementation_->attachments.size(), 3);
     return blocks;
 }
 
@@ -45,6 +48,9 @@ void MultibodySystem::constraint(const State& state, double* C) const {
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { C[i] = row.value(self.at, state.t); });
     self.for_each_gear([&](std::int32_t i, const Gear& gear) { C[i] = gear.value(self.at); });
+    self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
+        Eigen::Map<Vector3d>(C + i) = self.node_at(one.node, state.q.data(), state.v.data()).x - one.place(body);
+    });
 }
 
 void MultibodySystem::all_constraints(const State& state, double* C) const {
@@ -55,6 +61,9 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
         if (joint.gear) own[0] = joint.gear->value(self.at);
         for (std::size_t i = 0; i < joint.rows.size(); ++i) own[i] = joint.rows[i].value(self.at, state.t);
     }
+    for (const auto& one : self.attachments)
+        Eigen::Map<Vector3d>(C + one.first_row) =
+            self.node_at(one.node, state.q.data(), state.v.data()).x - one.place(self.at[one.body]);
 }
 
 void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
@@ -76,6 +85,16 @@ void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t f
                 for (int j = 0; j < 3; ++j) D.add(first_row + i, column + 3 + j, coefficients[j]);
             }
     });
+    self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
+        const auto node = self.nodes[static_cast<std::size_t>(one.node)].column;
+        const Matrix3d turn = one.turn(body);
+        for (int k = 0; k < 3; ++k) {
+            D.add(first_row + i + k, node + k, 1.0);
+            if (body.column < 0) continue;
+            D.add(first_row + i + k, body.column + k, -1.0);
+            for (int j = 0; j < 3; ++j) D.add(first_row + i + k, body.column + 3 + j, turn(k, j));
+        }
+    });
 }
 
 void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
@@ -83,6 +102,9 @@ void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { C_t[i] = row.rate(self.at, state.t); });
     self.for_each_gear([&](std::int32_t i, const Gear& gear) { C_t[i] = gear.rate(self.at); });
+    self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
+        Eigen::Map<Vector3d>(C_t + i) = body.prescribed() ? Vector3d(-one.velocity(body)) : Vector3d::Zero();
+    });
 }
 
 void MultibodySystem::constraint_curvature(const State& state, double* c) const {
@@ -96,6 +118,9 @@ void MultibodySystem::constraint_curvature(const State& state, double* c) const 
             const auto &first = self.at[angle.first], &second = self.at[angle.second];
             c[i] += factor * (first.A * first.omega.cross(angle.z)).dot(second.A * second.omega);
         }
+    });
+    self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
+        Eigen::Map<Vector3d>(c + i) = one.curvature(body);
     });
 }
 
@@ -129,6 +154,13 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
                     }
             }
         }
+    });
+    self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
+        if (body.column < 0) return;
+        Matrix3d K = factor * one.stiffness(body, Eigen::Map<const Vector3d>(lambda + i));
+        if (tangent != Tangent::Exact) K = (0.5 * (K + K.transpose())).eval();
+        for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < 3; ++b) H.add(body.column + 3 + a, body.column + 3 + b, K(a, b));
     });
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 
+#include "mechanics/attachment.hpp"
 #include "mechanics/beam.hpp"
 #include "mechanics/cable.hpp"
 #include "mechanics/linkage.hpp"
@@ -28,6 +29,7 @@ struct MultibodySystem::Implementation {
     };
     std::vector<CountedAngle> counted;
     std::vector<mechanics::Load> loads;
+    std::vector<mechanics::Attachment> attachments;  // to bodies that move
     std::vector<mechanics::LinearTetrahedron> linear_tetrahedra;
     std::vector<mechanics::QuadraticTetrahedron> quadratic_tetrahedra;
     std::vector<mechanics::Brick> bricks;
@@ -53,9 +55,10 @@ struct MultibodySystem::Implementation {
 
     // ---- Since finish() ----
     std::int32_t n = 0, position_size = 0;
-    std::vector<std::int32_t> place_of_row;  // of all joints' rows: number among those that are kept, −1: left out
-    std::vector<std::int32_t> kept_rows;     // ascending
-    std::optional<State> assembled;          // since assemble()
+    // Of all joints' rows, then of attachments: number among those that are kept, −1: left out.
+    std::vector<std::int32_t> place_of_row;
+    std::vector<std::int32_t> kept_rows;  // ascending
+    std::optional<State> assembled;       // since assemble()
     std::optional<Assembly> assembly;
     std::vector<std::int32_t> first_kept_rows;  // those of assemble()
     std::vector<mechanics::Linkage> redundant;  // those with rows that are left out
@@ -153,6 +156,15 @@ struct MultibodySystem::Implementation {
     /// state ← with the kept rows of a linkage assembled, if they do not hold; done ← with what that changed since
     /// `given`. Throws InputError.
     void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done) const;
+
+    /// Visits the attachments: visit(first row of C, Attachment, placement of its body).
+    template <class Visitor>
+    void for_each_attachment(Visitor&& visit) const {
+        for (const auto& one : attachments)
+            visit(place_of_row[static_cast<std::size_t>(one.first_row)], one, at[one.body]);
+    }
+    /// Puts attached nodes to where their bodies are, and gives them the velocity of that place.
+    void carry_nodes(State& state) const;
 
     /// The two angles of a gear with their factors in C.
     struct GearTerm {

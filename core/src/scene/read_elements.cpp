@@ -115,26 +115,69 @@ AlignedBox SystemReader::read_box(const YAML::Node& node, std::string_view what)
     return {*lower, *upper};
 }
 
-std::vector<NodeShare> SystemReader::sides_named(const YAML::Node& item, const SideKeys& keys, const Copy& copy) {
-    const Elastic& body = elastic_[static_cast<std::size_t>(elastic_named(keys.elastic, "elastic", copy))];
+AlignedBox SystemReader::box_named(const YAML::Node& item, const Elastic& body, const SideKeys& keys,
+                                   std::string_view what) {
     const std::string name = scalar(source_, keys.elastic, "elastic");
     if (keys.face.IsDefined() == keys.box.IsDefined())
-        source_.refuse(item, fmt::format("the load on \"{}\" needs one of \"face\" and \"box\"", name));
-    AlignedBox box;
-    if (keys.box.IsDefined()) {
-        box = read_box(keys.box, "\"box\"");
-    } else {
-        if (!body.box) source_.refuse(keys.face, fmt::format("\"{}\" is a mesh and has no faces; use \"box\"", name));
-        const std::size_t number = face(source_, keys.face), axis = number / 2;
-        const double low = body.box->lower[axis], high = body.box->upper[axis];
-        const double place = number % 2 == 0 ? low : high, slack = 1e-6 * (high - low);
-        // The other coordinates are free, so that rounding of the nodes' positions does not matter.
-        constexpr double any = std::numeric_limits<double>::infinity();
-        box = {{-any, -any, -any}, {any, any, any}};
-        box.lower[axis] = place - slack;
-        box.upper[axis] = place + slack;
-    }
+        source_.refuse(item, fmt::format("the {} on \"{}\" needs one of \"face\" and \"box\"", what, name));
+    if (keys.box.IsDefined()) return read_box(keys.box, "\"box\"");
+    if (!body.box) source_.refuse(keys.face, fmt::format("\"{}\" is a mesh and has no faces; use \"box\"", name));
+    const std::size_t number = face(source_, keys.face), axis = number / 2;
+    const double low = body.box->lower[axis], high = body.box->upper[axis];
+    const double place = number % 2 == 0 ? low : high, slack = 1e-6 * (high - low);
+    // The other coordinates are free, so that rounding of the nodes' positions does not matter.
+    constexpr double any = std::numeric_limits<double>::infinity();
+    AlignedBox box{{-any, -any, -any}, {any, any, any}};
+    box.lower[axis] = place - slack;
+    box.upper[axis] = place + slack;
+    return box;
+}
+
+const SystemReader::Elastic& SystemReader::elastic_of(const SideKeys& keys, const Copy& copy) {
+    return elastic_[static_cast<std::size_t>(elastic_named(keys.elastic, "elastic", copy))];
+}
+
+std::vector<NodeShare> SystemReader::sides_named(const YAML::Node& item, const SideKeys& keys, const Copy& copy) {
+    const Elastic& body = elastic_of(keys, copy);
+    const AlignedBox box = box_named(item, body, keys, "load");
     return at(item, [&] { return result_.system->spread_over_sides(body.first, body.nodes, box); });
+}
+
+// attachments: {name, body, node}, or {name, body, elastic, face or box}
+void SystemReader::read_attachment(const YAML::Node& item, const Copy& copy) {
+    AttachmentParameters attachment;
+    bool body = false;
+    YAML::Node node{YAML::NodeType::Undefined};
+    SideKeys sides;
+    read_map(source_, item, "an attachment",
+             {{"name", [&](const YAML::Node& n) { attachment.name = name_in(source_, n, "name", copy); }},
+              {"body",
+               [&](const YAML::Node& n) {
+                   attachment.body = body_named(n, "body", copy);
+                   body = true;
+               }},
+              {"node", [&](const YAML::Node& n) { node.reset(n); }},
+              {"elastic", [&](const YAML::Node& n) { sides.elastic.reset(n); }},
+              {"face", [&](const YAML::Node& n) { sides.face.reset(n); }},
+              {"box", [&](const YAML::Node& n) { sides.box.reset(n); }},
+              {"repeat", [](const YAML::Node&) {}}});
+    const std::string who = fmt::format("attachment \"{}\"", attachment.name);
+    if (!body) source_.refuse(item, who + " lacks the key \"body\"");
+    if (node.IsDefined() == sides.elastic.IsDefined())
+        source_.refuse(item, who + " needs one of \"node\" and \"elastic\"");
+    if (!sides.elastic.IsDefined() && (sides.face.IsDefined() || sides.box.IsDefined()))
+        source_.refuse(item, fmt::format("\"face\" and \"box\" of {} need \"elastic\"", who));
+    take_name(item, others_, "attachment", attachment.name, 0);
+    if (node.IsDefined()) {
+        attachment.nodes = {node_named(node, "node", copy)};
+    } else {
+        const Elastic& elastic = elastic_of(sides, copy);
+        const AlignedBox box = box_named(item, elastic, sides, "attachment");
+        attachment.nodes = result_.system->nodes_in(elastic.first, elastic.nodes, box);
+        if (attachment.nodes.empty()) source_.refuse(item, who + " holds no node: none lies in its box");
+    }
+    at(item, [&] { result_.system->add_attachment(attachment); });
+    result_.attachments.push_back(std::move(attachment));
 }
 
 void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {

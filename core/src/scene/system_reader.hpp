@@ -53,6 +53,7 @@ private:
     void read_spring(const YAML::Node& item, const Copy& copy);
     void read_bushing(const YAML::Node& item, const Copy& copy);
     void read_load(const YAML::Node& item, const Copy& copy);
+    void read_attachment(const YAML::Node& item, const Copy& copy);
     void read_keep_apart(const YAML::Node& node);
 
     /// Reads each item of the list, each of its copies.
@@ -82,10 +83,14 @@ private:
     /// Its place in elastic_.
     std::int32_t elastic_named(const YAML::Node& node, std::string_view key, const Copy& copy);
     AlignedBox read_box(const YAML::Node& node, std::string_view what);
-    /// The keys `elastic`, `face` and `box` of a load.
+    /// The keys `elastic`, `face` and `box` of a load or an attachment.
     struct SideKeys {
         YAML::Node elastic{YAML::NodeType::Undefined}, face{YAML::NodeType::Undefined}, box{YAML::NodeType::Undefined};
     };
+    struct Elastic;
+    const Elastic& elastic_of(const SideKeys& keys, const Copy& copy);
+    /// The box of `box`, or the slab of `face`. what: the item.
+    AlignedBox box_named(const YAML::Node& item, const Elastic& body, const SideKeys& keys, std::string_view what);
     std::vector<NodeShare> sides_named(const YAML::Node& item, const SideKeys& keys, const Copy& copy);
     std::int32_t material_named(const YAML::Node& node, std::string_view key);
     /// Also "world".

@@ -92,6 +92,7 @@ private:
         for (const auto& spring : system_.springs) hold(spring.first, spring.second);
         for (const auto& bushing : system_.bushings) hold(bushing.first, bushing.second);
         for (const auto& [first, second] : system_.beams) hold(first, second);
+        for (const auto& attachment : system_.attachments) hold(attachment.body, attachment.body);
         if (!touching_.pairs().empty())
             for (const auto& shape : system_.system->shapes()) held.insert(shape.body);
         for (std::size_t i = 0; i < system_.bodies.size(); ++i) {
@@ -136,12 +137,17 @@ private:
     }
 
     void constraints() {
+        std::size_t attached = 0;
+        for (const auto& attachment : system_.attachments) attached += attachment.nodes.size();
+        if (attached > 0)
+            keep(counted(attached, "attached node", "attached nodes"),
+                 "three rows for each that a moving body carries; one of a fixed body is fixed and has none");
         if (const auto rows = system_.system->m(); rows > 0) {
-            keep(fmt::format("{} rows of joints and motors", rows),
+            keep(fmt::format("{} rows of joints, motors and attachments", rows),
                  fmt::format("{}, in {} that are solved apart", counted(system_.joints.size(), "joint", "joints"),
                              counted(static_cast<std::size_t>(plan_.parts), "part", "parts")));
         } else {
-            leave("bilateral constraints", "the system has no joint with rows");
+            leave("bilateral constraints", "the system has no joint or attachment with rows");
         }
         const JointCoordinates* joints = simulation_.joint_coordinates();
         const std::int32_t of_trees = joints ? joints->rows_saved() : 0;

@@ -184,7 +184,7 @@ bool Simulation::finished() const {
     return system_->end - now_.state.t <= (control_ ? 0.0 : rounding_of_step * system_->step);
 }
 
-void Simulation::advance(State& state, AdaptiveStepReport& report) {
+void Simulation::advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
     if (control_) {
         report = control_->step(state, system_->end, *solver_);
         return;
@@ -192,9 +192,52 @@ void Simulation::advance(State& state, AdaptiveStepReport& report) {
     const FixedStep step = fixed_step(state.t, system_->end, system_->step);
     report.h = step.h;
     if (sleeping_) sleeping_->begin_step(report.h);
-    timestepper_->step(state, report.h, *solver_, report.step);
+    record_.parts = 1;
+    try {
+        timestepper_->step(state, report.h, *solver_, report.step);
+    } catch (const StepTooLong& failure) {
+        advance_in_parts(state, report, memory, failure);
+    }
     state.t = step.end;
     if (sleeping_) sleeping_->end_step(now_.state, state);
+}
+
+// Twice as many parts until the method can take them all.
+void Simulation::advance_in_parts(State& state, AdaptiveStepReport& report, const std::vector<double>& memory,
+                                  const StepTooLong& failure) {
+    constexpr std::int64_t most = 64;
+    // Where rounding makes more of the linear model's error than this, nobody knows whether parts are short enough.
+    constexpr double most_rounding = 0.1;
+    for (std::int64_t parts = 2; parts <= most; parts *= 2) {
+        state = now_.state;
+        timestepper_->restart();
+        timestepper_->load(memory);
+        const double h = report.h / static_cast<double>(parts);
+        StepReport whole;
+        try {
+            for (std::int64_t part = 0; part < parts; ++part) {
+                timestepper_->step(state, h, *solver_, report.step);
+                if (report.step.linearization_rounding > most_rounding) throw StepTooLong(failure.what());
+                whole.newton_iterations += report.step.newton_iterations;
+                whole.linearization = std::max(whole.linearization, report.step.linearization);
+                whole.recovered += report.step.recovered;
+                if (whole.solved && !report.step.solved) {
+                    whole.solved = false;
+                    whole.message = report.step.message;
+                }
+            }
+        } catch (const StepTooLong&) {
+            continue;
+        }
+        report.step.newton_iterations = whole.newton_iterations;
+        report.step.linearization = whole.linearization;
+        report.step.recovered = whole.recovered;
+        report.step.solved = whole.solved;
+        report.step.message = whole.message;
+        record_.parts = parts;
+        return;
+    }
+    throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
 }
 
 void Simulation::measure(const State& state, std::int64_t step) {
@@ -261,7 +304,7 @@ const StepRecord& Simulation::step() {
         if (control_) control_->load(control);
     };
     try {
-        advance(next, taken);
+        advance(next, taken, memory);
         require_usable(solver_->effort());
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
@@ -304,6 +347,10 @@ const StepRecord& Simulation::step() {
 
     auto& totals = now_.totals;
     add_step(record_, totals);
+    if (record_.parts > 1) {
+        ++totals.divided_steps;
+        totals.most_parts = std::max(totals.most_parts, record_.parts);
+    }
     if (!taken.impact) {
         totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
         totals.largest_step = std::max(totals.largest_step, taken.h);

@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 26> total_columns = {{
+inline constexpr std::array<TotalColumn, 28> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -118,6 +118,9 @@ inline constexpr std::array<TotalColumn, 26> total_columns = {{
      &SimulationTotals::repeated_solves, "/repeated_solves"},
     {"near_goal_solves", "1", "solves that ended somewhat above the tolerance that their steps are worth",
      &SimulationTotals::near_goal_solves, "/effort/near_goal_solves"},
+    {"divided_steps", "1", "fixed steps that the method could not take in one", &SimulationTotals::divided_steps,
+     "/divided_steps"},
+    {"most_parts", "1", "that one of them was divided into", &SimulationTotals::most_parts, "/most_parts"},
     {"plugin_solves", "1", "solves by a plugin", &SimulationTotals::plugin_solves, "/effort/solves"},
     {"solver_iterations", "1", "iterations of the solver plugin", &SimulationTotals::solver_iterations,
      "/effort/iterations"},
