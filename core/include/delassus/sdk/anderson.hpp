@@ -2,8 +2,6 @@
 // Anderson acceleration of a fixed-point iteration y ← F(y).
 #pragma once
 
-#include <Eigen/Cholesky>
-
 #include "delassus/sdk/problem_view.hpp"
 #include "delassus/sdk/team.hpp"
 
@@ -31,12 +29,9 @@ private:
     bool has_point_ = false;
     Eigen::MatrixXd df_, dF_;  // size × memory, a ring
     Eigen::MatrixXd gram_;     // memory × memory: df_ᵀ df_
-    Eigen::MatrixXd matrix_;   // its part in use, of differences of length 1, regularised
-    Eigen::LDLT<Eigen::MatrixXd> factor_;
-    Vector f_, F_;  // of the latest point
-    Vector slope_;  // df_ᵀ f_
-    Vector scale_, gamma_;
-    Eigen::MatrixXd sums_;  // by parts of the rows: df_ᵀ times the latest difference and f_
+    Vector f_, F_;             // of the latest point
+    Vector slope_;             // df_ᵀ f_
+    Eigen::MatrixXd sums_;     // by parts of the rows: df_ᵀ times the latest difference and f_
 };
 
 }  // namespace delassus::sdk

@@ -2,6 +2,7 @@
 // The functions of sdk/anderson.hpp (sdk/compiled_once.hpp).
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +17,6 @@ DELASSUS_SDK_FUNCTION void Anderson::reset(Eigen::Index size, int memory) {
     dF_.resize(size, memory);
     gram_.resize(memory, memory);
     slope_.resize(memory);
-    scale_.resize(memory);
     f_.resize(size);
     F_.resize(size);
     sums_.resize(2 * memory, Team::parts_of(size));
@@ -66,20 +66,19 @@ DELASSUS_SDK_FUNCTION bool Anderson::extrapolate(Vector& next, const Team& team)
     // Added to the diagonal of the normalised normal equations: directions below its root are rounding.
     constexpr double regularization = 1e-10;
     if (count_ == 0) return false;
-    auto scale = scale_.head(count_);
-    scale = gram_.diagonal().head(count_).unaryExpr(
+    const Vector scale = gram_.diagonal().head(count_).unaryExpr(
         [](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
-    matrix_ = scale.asDiagonal() * gram_.topLeftCorner(count_, count_) * scale.asDiagonal();
-    matrix_.diagonal().array() += regularization;
-    factor_.compute(matrix_);
-    gamma_ = scale.cwiseProduct(slope_.head(count_));
-    factor_.solveInPlace(gamma_);
-    if (!gamma_.allFinite()) return false;
-    gamma_.array() *= scale.array();
+    // Local: an Eigen object that is resized where memory has ended frees its memory twice (3.4.0).
+    Eigen::MatrixXd matrix = scale.asDiagonal() * gram_.topLeftCorner(count_, count_) * scale.asDiagonal();
+    matrix.diagonal().array() += regularization;
+    Vector gamma = scale.cwiseProduct(slope_.head(count_));
+    matrix.ldlt().solveInPlace(gamma);
+    if (!gamma.allFinite()) return false;
+    gamma.array() *= scale.array();
     next.resize(F_.size());
     team.for_parts(F_.size(), [&](Eigen::Index, Eigen::Index first, Eigen::Index size) {
         next.segment(first, size) = F_.segment(first, size);
-        next.segment(first, size).noalias() -= dF_.middleRows(first, size).leftCols(count_) * gamma_;
+        next.segment(first, size).noalias() -= dF_.middleRows(first, size).leftCols(count_) * gamma;
     });
     return true;
 }
