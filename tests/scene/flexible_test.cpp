@@ -108,6 +108,23 @@ TEST(FlexibleScene, BarStretchesUnderItsWeight) {
 }
 #endif
 
+TEST(FlexibleScene, AWeightThatNodesCarryBendsTheArm) {
+    Running run(read_scene(example_scene("elastic_arm")));
+    const double length = 0.55, width = 0.04, young = 2e8, poisson = 0.3, behind = 0.05, force = 0.5 * 9.81;
+    const double area = width * width, bending = young * area * area / 12.0, own = 200.0 * area * 9.81;
+    const double shear = 10.0 * (1.0 + poisson) / (12.0 + 11.0 * poisson) * young / (2.0 * (1.0 + poisson)) * area;
+    const double square = length * length, cube = square * length;
+    const double sag = force * cube / (3.0 * bending) + force * behind * square / (2.0 * bending) +
+                       force * length / shear + own * square * square / (8.0 * bending) + own * square / (2.0 * shear);
+    const double angle =
+        force * square / (2.0 * bending) + force * behind * length / bending + own * cube / (6.0 * bending);
+    const double expected = sag + behind * angle;
+    EXPECT_NEAR((1.0 - run.pose("weight").position[2]) / expected, 1.0, 0.02);
+    const double before = run.pose("weight").position[2];
+    run.finish();
+    EXPECT_NEAR(run.pose("weight").position[2], before, 1e-9);
+}
+
 std::string refusal(const std::string& text) {
     try {
         static_cast<void>(parse_scene("step: 0.001\nend: 0.1\n" + text, "s.yaml"));

@@ -116,6 +116,25 @@ TEST(EnergyGuard, WarnsOfAGrowthThatIsSeen) {
     EXPECT_TRUE(fine.simulation.warnings().empty());
 }
 
+TEST(EnergyGuard, WarnsOfALossThatIsSeen) {
+    // Implicit Euler divides the energy of ω = 10 rad/s by 1 + h²ω² a step: e^(−0.5) is left after 1/2 s at 10 ms.
+    const std::string block =
+        "step: 0.01\nend: 0.5\ngravity: [0, 0, 0]\n"
+        "bodies: [{name: b, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, velocity: [1, 0, 0]}]\n";
+    const std::string spring = "bushings: [{name: m, second: b, point: [0, 0, 0], stiffness: [100, 100, 100]";
+    Running run = running(block + spring + "}]\n", "euler_implicit_linearized", 0.01);
+    EXPECT_EQ(failure_of(run), "");
+    ASSERT_EQ(run.simulation.warnings().size(), 1U);
+    EXPECT_TRUE(says(run.simulation.warnings()[0], "the energy fell by 0.19")) << run.simulation.warnings()[0];
+    for (const auto& [scene, method] :
+         {std::pair(block + spring + "}]\n", "rk4"),
+          std::pair(block + spring + ", damping: [1, 1, 1]}]\n", "euler_implicit_linearized")}) {
+        Running quiet = running(scene, method, 0.01);
+        EXPECT_EQ(failure_of(quiet), "");
+        EXPECT_TRUE(quiet.simulation.warnings().empty()) << method << quiet.simulation.warnings()[0];
+    }
+}
+
 TEST(EnergyGuard, GoesOnFromACheckpointAsIfItHadNotStopped) {
     Running whole = running(spring_pendulum(1e6), "euler_explicit", 0.001);
     const std::string sentence = failure_of(whole);

@@ -7,10 +7,22 @@
 #include "delassus/simulation.hpp"
 
 namespace delassus {
+namespace {
+
+bool any_damping(const MultibodySystem& mechanics, const State& state) {
+    MatrixAssembler assembler;
+    assembler.begin(mechanics.n(), mechanics.n());
+    mechanics.add_damping(state, 1.0, Tangent::Symmetric, assembler);
+    const std::vector<double>& entries = assembler.finish().value;
+    return std::any_of(entries.begin(), entries.end(), [](double entry) { return entry != 0.0; });
+}
+
+}  // namespace
 
 EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
     const MultibodySystem& mechanics = *system.system;
     const State start = mechanics.initial_state();
+    dissipates_ = mechanics.has_unilateral() || any_damping(mechanics, start);
     const auto n = static_cast<std::size_t>(mechanics.n());
     std::vector<double> fall(n, 0.0), momentum(n, 0.0);
     const auto set = [&](std::int32_t column) {

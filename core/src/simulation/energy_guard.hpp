@@ -26,13 +26,17 @@ public:
     /// Whether energy is known, and nothing supplies any.
     [[nodiscard]] bool watches(const SimulationTotals& totals) const;
 
+    /// Whether energy is known, and nothing supplies or takes any: what it falls by is the method's damping.
+    [[nodiscard]] bool conserved(const SimulationTotals& totals) const { return !dissipates_ && watches(totals); }
+
     /// max(A, floor); longest_step: of the run, s.
     [[nodiscard]] double scale(const SimulationTotals& totals, double longest_step) const;
 
 private:
     const SceneSystem* system_;
-    double fall_;    // ½ ‖2 g‖²_M, of a step of 1 s
-    double digits_;  // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
+    bool dissipates_;  // contacts, stops, friction or damping can take energy
+    double fall_;      // ½ ‖2 g‖²_M, of a step of 1 s
+    double digits_;    // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
 };
 
 }  // namespace delassus

@@ -171,7 +171,7 @@ private:
                                "others imply them in every configuration, their reactions are reported as 0: of {}",
                                some_of(system_.system->joints_with_rows_left_out())));
         if (const std::string start = simulation_.start(); !start.empty())
-            keep("assembly at the start", fmt::format("{} to fit joints and motors", start));
+            keep("a start other than the scene places it", start);
         if (has_limits()) {
             needs_ |= DELASSUS_CAN_NONNEGATIVE;
             keep("joint limits", "a row λ ≥ 0 each, while the joint is near its stop");

@@ -401,6 +401,18 @@ std::vector<std::string> Simulation::warnings() const {
             fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
                         "moved, though nothing supplies any: the steps are long for {}",
                         system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    if (const auto& totals = now_.totals; guard_->conserved(totals)) {
+        const double fall = totals.start_energy - totals.energy;
+        const double share = fall / guard_->scale(totals, totals.largest_step);
+        const bool in_trees = !joint_ && !system_->joints.empty() && system_->system->node_count() == 0;
+        if (share > visible_share)
+            sentences.push_back(
+                fmt::format("system \"{}\": the energy fell by {:.3g} J, {:.0f} % of what can have moved, though "
+                            "nothing takes any: "
+                            "{} damps in steps as long as these; take shorter ones or a method of higher order, {}",
+                            system_->name, fall, 100.0 * share, system_->integrator,
+                            in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
+    }
     if (equilibrium_ && equilibrium_->smallest_eigenvalue < 0.0)
         sentences.push_back(fmt::format(
             "system \"{}\": the equilibrium in which the run begins is unstable (smallest eigenvalue {:.3g} "
