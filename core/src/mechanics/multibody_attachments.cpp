@@ -17,6 +17,8 @@ void MultibodySystem::add_attachment(const AttachmentParameters& parameters) {
     const std::string& name = parameters.name;
     self.check_body(parameters.body, name);
     refuse_unless(!parameters.nodes.empty(), "the attachment", name, "holds no node");
+    const auto placements = self.initial_placements();
+    const auto& place = placements[parameters.body];
     for (const auto node : parameters.nodes) {
         self.check_node(node, fmt::format("the attachment \"{}\"", name));
         const bool taken = std::any_of(self.attachments.begin(), self.attachments.end(),
@@ -27,7 +29,6 @@ void MultibodySystem::add_attachment(const AttachmentParameters& parameters) {
             self.nodes[static_cast<std::size_t>(node)].parameters.fixed = true;
             continue;
         }
-        const auto place = self.initial_placements()[parameters.body];
         const Vector3d p = vector(self.nodes[static_cast<std::size_t>(node)].parameters.position);
         self.attachments.push_back({node, parameters.body, place.A.transpose() * (p - place.x)});
     }

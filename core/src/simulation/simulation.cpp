@@ -408,8 +408,8 @@ std::vector<std::string> Simulation::warnings() const {
         if (share > visible_share)
             sentences.push_back(
                 fmt::format("system \"{}\": the energy fell by {:.3g} J, {:.0f} % of what can have moved, though "
-                            "nothing takes any: "
-                            "{} damps in steps as long as these; take shorter ones or a method of higher order, {}",
+                            "nothing takes any: {} damps in steps as long as these; take shorter ones or a method of "
+                            "higher order, {}",
                             system_->name, fall, 100.0 * share, system_->integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
     }
