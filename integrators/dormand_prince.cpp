@@ -2,6 +2,9 @@
 // The method of order 5 of Dormand and Prince with its embedded one of order 4 (Journal of Computational and Applied
 // Mathematics 6, 1980; Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, table II.5.2). Its
 // seventh stage is the first one of the next step.
+#include <cmath>
+#include <limits>
+
 #include "dynamics/explicit_method.hpp"
 
 namespace delassus {
@@ -18,15 +21,22 @@ constexpr double embedded[] = {71.0 / 57600.0,      0.0,          -71.0 / 16695.
 const RegisterTimestepper dormand_prince_row{
     {.name = "dormand_prince",
      .description = "Dormand and Prince's Runge–Kutta method of order 5(4), for steps by tolerance; without contacts",
-     .options = {},
+     .options = {{.key = "error_limit",
+                  .type = DELASSUS_OPTION_REAL,
+                  .default_value = "inf",
+                  .minimum = std::numeric_limits<double>::min(),
+                  .maximum = HUGE_VAL,
+                  .unit = "m, rad",
+                  .doc = "a step of a fixed size is taken in parts whose own estimates of their errors are below it"}},
      .constraints = true,
      .unilateral = false,
      .order = 5,
-     .make = [](DynamicalSystem& system, const std::vector<OptionValue>&) -> std::unique_ptr<Timestepper> {
+     .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
          return std::make_unique<ExplicitMethod>(
              system,
              ButcherTableau{
-                 .name = "dormand_prince", .order = 5, .c = nodes, .a = stages, .b = weights, .error = embedded});
+                 .name = "dormand_prince", .order = 5, .c = nodes, .a = stages, .b = weights, .error = embedded},
+             values[0].real);
      }}};
 
 }  // namespace

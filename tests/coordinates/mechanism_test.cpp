@@ -143,6 +143,46 @@ TEST_P(Agreement, OfImplicitMethods) {
     }
 }
 
+void expect_same_reactions(const Finished& joint, const Finished& maximal, double tolerance) {
+    const std::vector<double> found = joint.simulation.multipliers(), expected = maximal.simulation.multipliers();
+    ASSERT_EQ(found.size(), expected.size());
+    double largest = 0.0;
+    for (const double value : expected) largest = std::max(largest, std::abs(value));
+    EXPECT_GT(largest, 1.0);
+    for (std::size_t row = 0; row < found.size(); ++row)
+        EXPECT_NEAR(found[row], expected[row], tolerance * largest) << "row " << row;
+}
+
+// Where rows imply others, each choice of rows has reactions of its own.
+TEST_P(Agreement, OfReactions) {
+    const Finished joint(GetParam().text, "joint", "rk4", 1e-3, 0.4);
+    const Finished maximal(GetParam().text, "maximal", "rk4", 1e-3, 0.4);
+    if (const auto& system = *maximal.scene.systems[0].system; system.m() < system.constraint_rows())
+        GTEST_SKIP() << "some of its rows imply others";
+    expect_same_reactions(joint, maximal, 1e-7);
+}
+
+// The stop carries the bar: the hinge has what is left. And asking changes no step.
+TEST(Reactions, KnowOfStops) {
+    const std::string text = "bodies:\n" + body("a", "[0.3, 0, 0]") + body("b", "[0.8, 0, 0]") +
+                             "joints:\n  - {name: i, kind: revolute, second: a, point: [0, 0, 0], axis: [0, 1, 0], "
+                             "upper: 0.3, lower: -1}\n"
+                             "  - {name: j, kind: revolute, first: a, second: b, point: [0.5, 0, 0], axis: [0, 1, 0], "
+                             "damping: 2}\n";
+    const Finished joint(text, "joint", "moreau_jean", 1e-3, 2.0), maximal(text, "maximal", "moreau_jean", 1e-3, 2.0);
+    ASSERT_GT(joint.simulation.report().active_blocks, 0);
+    expect_same_reactions(joint, maximal, 1e-2);
+
+    Registry registry;
+    Scene scene = parse_scene("coordinates: joint\nintegrator: moreau_jean\nstep: 0.001\nend: 2\n" + text, "test");
+    Simulation asked(scene.systems[0], registry);
+    while (!asked.finished()) {
+        asked.step();
+        EXPECT_EQ(asked.multipliers().size(), 10U);
+    }
+    EXPECT_EQ(asked.state().q, joint.simulation.state().q);
+}
+
 INSTANTIATE_TEST_SUITE_P(Mechanisms, Agreement, testing::ValuesIn(mechanisms()), [](const auto& chosen) {
     std::string name = chosen.param.name;
     std::erase_if(name, [](char c) { return !std::isalnum(c); });

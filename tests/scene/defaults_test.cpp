@@ -237,10 +237,11 @@ Spin spin_of(const Running& run) {
 
 TEST(Defaults, AFreeBodyKeepsEnergyAndMomentum) {
     for (const double step : {0.01, 0.137, 1.3}) {
-        auto run = run_of(
-            fmt::format("gravity: [0, 0, -9.81]\nstep: {}\nend: 60\nbodies:\n- {{name: b, mass: 1.7, inertia: {{xx: 1, "
-                        "yy: 2, zz: 3}}, angular_velocity: [0.3, 2.0, 0.4]}}\n",
-                        step));
+        auto run =
+            run_of(fmt::format("integrator: euler_implicit_linearized\ngravity: [0, 0, -9.81]\nstep: {}\nend: "
+                               "60\nbodies:\n- {{name: b, mass: 1.7, inertia: {{xx: 1, "
+                               "yy: 2, zz: 3}}, angular_velocity: [0.3, 2.0, 0.4]}}\n",
+                               step));
         const Spin start = spin_of(run);
         run.finish();
         const Spin end = spin_of(run);
@@ -252,10 +253,11 @@ TEST(Defaults, AFreeBodyKeepsEnergyAndMomentum) {
 // A symmetric body precesses in its own frame with Ω = ω_z (J_z − J_x)/J_x; the rule is of order 2.
 TEST(Defaults, ASpinningBodyPrecessesWithOrderTwo) {
     const auto error = [](double step) {
-        auto run = run_of(fmt::format(
-            "gravity: [0, 0, 0]\nstep: {}\nend: 1\nbodies:\n- {{name: b, mass: 1, inertia: {{xx: 2, yy: 2, zz: 3}}, "
-            "angular_velocity: [0.7, 0, 5]}}\n",
-            step));
+        auto run =
+            run_of(fmt::format("integrator: euler_implicit_linearized\ngravity: [0, 0, 0]\nstep: {}\nend: "
+                               "1\nbodies:\n- {{name: b, mass: 1, inertia: {{xx: 2, yy: 2, zz: 3}}, "
+                               "angular_velocity: [0.7, 0, 5]}}\n",
+                               step));
         run.finish();
         const double angle = 5.0 * (3.0 - 2.0) / 2.0;
         const Vector3 omega = run.velocities("b")[1];

@@ -126,8 +126,8 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
         if (totals.worst_linearization > 0.0)
             fmt::print("  worst linearisation error {:.1e}\n", totals.worst_linearization);
         if (totals.divided_steps > 0)
-            fmt::print("  {} steps were too long for {} and taken in up to {} parts\n", totals.divided_steps,
-                       system.integrator, totals.most_parts);
+            fmt::print("  {} steps taken in up to {} parts: as one they are too long for {}\n", totals.divided_steps,
+                       totals.most_parts, system.integrator);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "delassus/export.hpp"
@@ -33,8 +34,10 @@ struct AdaptiveStepReport {
 /// kept; once alone by a method that estimates its own error.
 class DELASSUS_API AdaptiveStepping {
 public:
-    /// system and stepper, made for it, outlive this. Throws InputError for values of control outside their ranges.
-    AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control);
+    /// system and stepper, made for it, outlive this. advice ends the sentence of a step that would fall below
+    /// `smallest`. Throws InputError for values of control outside their ranges.
+    AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control,
+                     std::string advice = "loosen the tolerance, or allow smaller steps by step: {smallest: …}");
 
     /// Advances state by one step, not beyond end > state.t. Throws StepFailure if a step below `smallest` would be
     /// needed, Unsupported as the stepper; then state is as before and the stepper's memory must be loaded again.
@@ -77,6 +80,7 @@ private:
     DynamicalSystem& system_;
     Timestepper& stepper_;
     StepControl control_;
+    std::string advice_;
     bool extrapolates_, embedded_;
     double next_;
     double last_error_ = 1.0;

@@ -57,6 +57,10 @@ public:
     /// The largest |C| of rows of loops that others imply, in their own units: m and rad.
     [[nodiscard]] double drift_of_rows_left_out(const State& state) const;
 
+    /// λ of rows_of_trees(), in their order, N and Nm: what the joints of trees carry at a state, where f acts on the
+    /// bodies beside it (forces and torques as MultibodySystem::add_force() has them, with those of other rows).
+    [[nodiscard]] std::vector<double> tree_reactions(const State& state, const std::vector<double>& f) const;
+
     /// The state of the bodies.
     [[nodiscard]] State bodies_of(const State& state) const;
     /// The same where memory serves again.

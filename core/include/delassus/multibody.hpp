@@ -453,6 +453,8 @@ public:
     bool renew_rows(State& state, std::int64_t step);
     /// C of all rows, kept or not; constraint_rows().
     void all_constraints(const State& state, double* C) const;
+    /// D += C_q of all rows of joints, kept or not, but those of gears; constraint_rows() × n().
+    void add_joint_jacobian(const State& state, MatrixAssembler& D) const;
     // ---- Whole turns of joints with a spring or an actuator: an orientation does not tell them ----
     /// The whole turns at a state that is within half a turn of the last one that was followed; one for each such
     /// joint.

@@ -69,8 +69,10 @@ struct SceneSystem {
     std::unique_ptr<MultibodySystem> system;
 
     Coordinates coordinates = Coordinates::Maximal;
+    bool coordinates_chosen = false;  ///< the scene names none
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
+    std::string method_reason;                   ///< why the integrator is this one; empty: the scene names it
     SolverConfig solver;                         ///< an empty name: `auto`
     double step = 0.0;                           ///< s, > 0; with `control` the first that is tried
     std::optional<StepControl> control;          ///< steps follow from a tolerance; none: all are `step` long

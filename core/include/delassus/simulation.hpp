@@ -84,7 +84,7 @@ struct SimulationState {
     State state;                  ///< in the coordinates of the simulation
     std::vector<double> turns;    ///< MultibodySystem::turns()
     std::vector<double> memory;   ///< Timestepper::save(), warm starts included
-    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps
+    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps that nothing divides
     std::vector<std::int32_t>
         rows_left_out;             ///< of the bilateral constraints (MultibodySystem::kept_rows()); ascending
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
@@ -132,9 +132,11 @@ public:
     [[nodiscard]] const State& coordinates() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
-    /// What the last step reported; empty before the first, and where a run goes on. Its multipliers are those of all
-    /// rows, 0 in rows that are left out; in joint coordinates not a number in rows that the trees hold.
+    /// What the last step reported; empty before the first, and where a run goes on.
     [[nodiscard]] const StepReport& report() const { return report_.step; }
+    /// λ of all rows of joints, motors and attachments (MultibodySystem::joint_rows()) after the last step, forces: 0
+    /// in rows that are left out. Empty before the first, and where a run goes on.
+    [[nodiscard]] DELASSUS_API std::vector<double> multipliers() const;
     /// The contacts in report(), in their order.
     [[nodiscard]] DELASSUS_API std::vector<ContactRecord> contacts() const;
     [[nodiscard]] StepSolver& solver() { return *solver_; }
@@ -164,9 +166,13 @@ private:
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     /// memory: of the timestepper, before the step.
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
+    /// A fixed step in parts, whose sizes follow from their errors.
+    void advance_within_error(State& state, double end, StepReport& report);
     /// A fixed step that the timestepper could not take, in parts. Throws StepFailure where that does not help.
     void advance_in_parts(State& state, AdaptiveStepReport& report, const std::vector<double>& memory,
                           const StepTooLong& failure);
+    /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
+    void add_unilateral_forces(std::vector<double>& force) const;
     /// The timestepper and what controls its steps.
     void make_method();
     /// Has the system choose anew which rows to keep where it must; the method then starts anew.
@@ -175,7 +181,7 @@ private:
     SceneSystem* system_;
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Timestepper> timestepper_;
-    std::unique_ptr<AdaptiveStepping> control_;  // empty with fixed steps
+    std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the parts of fixed ones; or empty
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     Assembly assembly_;
     std::shared_ptr<const Equilibrium> equilibrium_;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -45,6 +46,9 @@ struct StepReport {
 
     /// Back to the beginning; the memory stays.
     DELASSUS_API void clear();
+    /// Of a part of a step ← of the step so far, of which `before` is the rest: sums and extremes of both. Reactions,
+    /// contacts and multipliers stay those of this part.
+    DELASSUS_API void follow(const StepReport& before);
 };
 
 /// A step that cannot be taken: Newton's method does not converge, a state is not finite. The state is as before it.
@@ -88,6 +92,9 @@ public:
     [[nodiscard]] virtual bool has_embedded_error() const { return false; }
     /// The estimate for the last step; valid until the next. Empty by default.
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
+    /// The estimate, in units of positions, above which a step of a fixed size is to be taken in parts: as
+    /// StepControl::absolute. Infinity by default: every step is one.
+    [[nodiscard]] virtual double error_limit() const { return std::numeric_limits<double>::infinity(); }
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
     [[nodiscard]] virtual double reaction_growth() const { return 0.0; }

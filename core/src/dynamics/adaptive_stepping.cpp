@@ -40,10 +40,12 @@ constexpr double rounding_of_step = 1e-9;
 
 }  // namespace
 
-AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control)
+AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control,
+                                   std::string advice)
     : system_(system),
       stepper_(stepper),
       control_(control),
+      advice_(std::move(advice)),
       extrapolates_(stepper.damps_at_once() && system.m() == 0),
       embedded_(stepper.has_embedded_error()),
       next_(control.initial) {
@@ -232,7 +234,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
     report_ = {};
     bool shrunk = false;
     double proposed = std::clamp(next_, control_.smallest, control_.largest);
-    std::string failure = "loosen the tolerance, or allow smaller steps by step: {smallest: …}";
+    std::string failure = advice_;
     while (true) {
         const bool smallest = proposed < control_.smallest;
         const auto fell_below = [&] {

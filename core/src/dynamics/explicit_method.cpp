@@ -9,9 +9,10 @@
 
 namespace delassus {
 
-ExplicitMethod::ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau)
+ExplicitMethod::ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau, double error_limit)
     : system_(system),
       tableau_(std::move(tableau)),
+      error_limit_(error_limit),
       accelerations_(system),
       n_(system.n()),
       m_(system.m()),

@@ -2,6 +2,7 @@
 // Explicit Runge–Kutta methods on the Lie group, for systems with and without bilateral constraints (internal).
 #pragma once
 
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -48,12 +49,14 @@ struct ButcherTableau {
 class ExplicitMethod : public Timestepper {
 public:
     /// system outlives it; the tableau's arrays too.
-    ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau);
+    ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau,
+                   double error_limit = std::numeric_limits<double>::infinity());
 
     void restart() override;
     [[nodiscard]] int order() const override { return tableau_.order; }
     [[nodiscard]] bool has_embedded_error() const override { return !tableau_.error.empty(); }
     [[nodiscard]] EmbeddedError embedded_error() const override;
+    [[nodiscard]] double error_limit() const override { return error_limit_; }
     // What is known at the end of the last step: the state, its accelerations and multipliers.
     [[nodiscard]] std::vector<double> save() const override;
     void load(const std::vector<double>& memory) override;
@@ -68,6 +71,7 @@ private:
 
     DynamicalSystem& system_;
     ButcherTableau tableau_;
+    double error_limit_;
     Accelerations accelerations_;
     std::int32_t n_, m_;
     std::vector<Cone> cones_;

@@ -39,6 +39,17 @@ void StepReport::clear() {
     *this = std::move(empty);
 }
 
+void StepReport::follow(const StepReport& before) {
+    newton_iterations += before.newton_iterations;
+    unilateral_blocks = std::max(unilateral_blocks, before.unilateral_blocks);
+    linearization = std::max(linearization, before.linearization);
+    linearization_rounding = std::max(linearization_rounding, before.linearization_rounding);
+    recovered += before.recovered;
+    if (before.solved) return;
+    solved = false;
+    message = before.message;
+}
+
 StepReport Timestepper::step(State& state, double h, StepSolver& solver) {
     StepReport report;
     take_step(state, h, solver, report);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "delassus/joint_coordinates.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -522,6 +523,64 @@ void JointCoordinates::collect_unilateral(const State& state, double h, Unilater
         rows.end_block(block.cone, block.key, block.restitution, block.compliance);
     }
     rows.contacts() = from.contacts();
+}
+
+// ---- Reactions ----
+//
+// The joint of a link carries what the link and all beyond it need besides the forces that act on them. With
+// w = M̄ v̇ − f̄ on each body, v̇ = J u̇ + J̇ u, and C_k the rows of the joint in the columns of its link k and of the
+// parent p (Newton and Euler's recursion from the leaves to the ground: Featherstone, section 5.3)
+//
+//     C_{k,k}ᵀ λ_k = w_k,      w_p ← w_p − C_{k,p}ᵀ λ_k
+//
+// The rows of a joint are independent, and what w_k has along its freedoms is zero by the equations of motion.
+std::vector<double> JointCoordinates::tree_reactions(const State& state, const std::vector<double>& f) const {
+    using Eigen::Matrix;
+    auto& self = *implementation_;
+    const auto bodies = self.bodies.n();
+    State moving = state;
+    self.place(state);
+    self.tree.accelerate(f.data(), moving.v.data());
+    std::vector<double> bias(f.size(), 0.0), wanting(f.size(), 0.0);
+    self.tree.bias(bias.data());
+    State accelerated;
+    bodies_of(moving, accelerated);
+    for (std::size_t i = 0; i < f.size(); ++i) accelerated.v[i] += bias[i];
+    self.place(state);
+    self.bodies.multiply_mass(self.state, 1.0, accelerated.v.data(), wanting.data());
+    for (std::size_t i = 0; i < f.size(); ++i) wanting[i] -= f[i];
+
+    self.rows.begin(self.bodies.constraint_rows(), bodies);
+    self.bodies.add_joint_jacobian(self.state, self.rows);
+    const SparseMatrix& C = self.rows.finish();
+    std::vector<double> carried(self.held.size(), 0.0);
+    const auto& links = self.tree.links();
+    for (std::size_t k = links.size(); k-- > 1;) {
+        const mechanics::Link& link = links[k];
+        if (link.joint < 0 || link.freedoms == 6) continue;
+        const std::int32_t first = self.bodies.joint_rows(link.joint)[0], count = 6 - link.freedoms;
+        const std::int32_t parent = links[static_cast<std::size_t>(link.parent)].body_column;
+        Matrix<double, 6, Eigen::Dynamic, 0, 6, 6> own(6, count), other(6, count);
+        own.setZero();
+        other.setZero();
+        for (std::int32_t i = 0; i < count; ++i) {
+            const auto row = static_cast<std::size_t>(first + i);
+            for (auto at = C.row_start[row]; at < C.row_start[row + 1]; ++at) {
+                const auto entry = static_cast<std::size_t>(at);
+                if (const auto j = C.column[entry] - link.body_column; j >= 0 && j < 6) {
+                    own(j, i) = C.value[entry];
+                } else if (link.parent > 0) {
+                    other(C.column[entry] - parent, i) = C.value[entry];
+                }
+            }
+        }
+        const Eigen::Map<const Matrix<double, 6, 1>> needed(wanting.data() + link.body_column);
+        const Matrix<double, Eigen::Dynamic, 1, 0, 6, 1> lambda = own.colPivHouseholderQr().solve(needed);
+        const auto place = std::lower_bound(self.held.begin(), self.held.end(), first) - self.held.begin();
+        for (std::int32_t i = 0; i < count; ++i) carried[static_cast<std::size_t>(place + i)] = lambda[i];
+        if (link.parent > 0) Eigen::Map<Matrix<double, 6, 1>>(wanting.data() + parent) -= other * lambda;
+    }
+    return carried;
 }
 
 double JointCoordinates::recovery_speed() const {

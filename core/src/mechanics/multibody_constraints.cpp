@@ -66,16 +66,26 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
             self.node_at(one.node, state.q.data(), state.v.data()).x - one.place(self.at[one.body]);
 }
 
+void MultibodySystem::Implementation::add_gradient(const Row& row, double t, std::int32_t to,
+                                                   MatrixAssembler& D) const {
+    const auto columns = row.columns(at);
+    row.gradient(at, t, columns, gradient);
+    for (int k = 0; k < columns.bodies; ++k)
+        for (int j = 0; j < 6; ++j) D.add(to, columns.column[static_cast<std::size_t>(k)] + j, gradient[6 * k + j]);
+}
+
+void MultibodySystem::add_joint_jacobian(const State& state, MatrixAssembler& D) const {
+    const auto& self = *implementation_;
+    self.place(state.q.data(), nullptr, state.t);
+    for (const auto& joint : self.joints)
+        for (std::size_t i = 0; i < joint.rows.size(); ++i)
+            self.add_gradient(joint.rows[i], state.t, joint.first_row + static_cast<std::int32_t>(i), D);
+}
+
 void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr, state.t);
-    self.for_each_row([&](std::int32_t i, const Row& row) {
-        const auto columns = row.columns(self.at);
-        row.gradient(self.at, state.t, columns, self.gradient);
-        for (int k = 0; k < columns.bodies; ++k)
-            for (int j = 0; j < 6; ++j)
-                D.add(first_row + i, columns.column[static_cast<std::size_t>(k)] + j, self.gradient[6 * k + j]);
-    });
+    self.for_each_row([&](std::int32_t i, const Row& row) { self.add_gradient(row, state.t, first_row + i, D); });
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
         for (const auto& [angle, factor] : self.terms_of(gear))
             for (const bool second : {true, false}) {

@@ -136,6 +136,8 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] std::int32_t place_of(const mechanics::Joint& joint, std::size_t i) const {
         return place_of_row[static_cast<std::size_t>(joint.first_row) + i];
     }
+    /// D ← with the gradient of a row of a joint in its row `to`; at the placement of now.
+    void add_gradient(const mechanics::Row& row, double t, std::int32_t to, MatrixAssembler& D) const;
     /// Visits the kept rows of all joints but gears: visit(row of C, Row).
     template <class Visitor>
     void for_each_row(Visitor&& visit) const {

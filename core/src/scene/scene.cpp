@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "config/sections.hpp"
+#include "scene/choose_method.hpp"
 #include "scene/overrides.hpp"
 #include "scene/system_reader.hpp"
 #include "solver/name_with_options.hpp"
@@ -124,7 +125,10 @@ Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOv
         } else {
             read_one_system(source, root, scene, "main", "the scene", {title, {"systems", [](const YAML::Node&) {}}});
         }
-        for (auto& system : scene.systems) apply(overrides, system);
+        for (auto& system : scene.systems) {
+            apply(overrides, system);
+            scene::choose_method(system);
+        }
         scene.canonical = canonical_text(root, overrides);
     } catch (const YAML::Exception& error) {
         throw InputError(fmt::format("{}: not valid YAML: {}", source.at(error.mark), error.msg));

@@ -6,11 +6,14 @@
 #include <limits>
 
 #include "config/sections.hpp"
+#include "scene/choose_method.hpp"
 
 namespace delassus::scene {
 
 SystemReader::SystemReader(const Source& source, SceneSystem& result) : source_(source), result_(result) {
     result_.system = std::make_unique<MultibodySystem>();
+    result_.integrator = chosen;
+    result_.coordinates_chosen = true;
 }
 
 std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
@@ -189,8 +192,9 @@ void SystemReader::build_step(const YAML::Node& place) {
 
 void SystemReader::read_coordinates(const YAML::Node& node) {
     const std::string name = scalar(source_, node, "coordinates");
-    if (name != "maximal" && name != "joint")
-        source_.refuse(node, fmt::format("\"coordinates\" is \"{}\"; it must be maximal or joint", name));
+    if (name != chosen && name != "maximal" && name != "joint")
+        source_.refuse(node, fmt::format("\"coordinates\" is \"{}\"; it must be auto, maximal or joint", name));
+    result_.coordinates_chosen = name == chosen;
     result_.coordinates = name == "joint" ? Coordinates::Joint : Coordinates::Maximal;
 }
 

@@ -46,6 +46,7 @@ public:
 
     SystemPlan make() {
         first_step();
+        method();
         bodies();
         files();
         constraints();
@@ -78,6 +79,11 @@ private:
         simulation_.step();
         system_.end = end;
         plan_.solvers = simulation_.solver().loaded();
+    }
+
+    void method() {
+        if (system_.method_reason.empty()) return;
+        keep(fmt::format("integrator {}", system_.integrator), "the scene names none: " + system_.method_reason);
     }
 
     void bodies() {
@@ -158,7 +164,8 @@ private:
             for (std::size_t i = 0; i < system_.joints.size(); ++i)
                 if (!held.contains(static_cast<std::int32_t>(i))) loops.push_back(system_.joints[i].name);
             keep("joint coordinates",
-                 fmt::format("the scene asks for them: {} velocities{}", joints->n(),
+                 fmt::format("{}: {} velocities{}",
+                             system_.coordinates_chosen ? "joints make trees" : "the scene asks for them", joints->n(),
                              loops.empty() ? std::string(", no loops") : "; as rows stay " + some_of(loops)));
             leave(fmt::format("{} of {} velocities and {} rows", joints->body_velocities() - joints->n(),
                               joints->body_velocities(), of_trees),

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
@@ -113,7 +114,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
             if (in_joints)
                 throw Unsupported("bodies cannot sleep in joint coordinates; remove \"sleeping\" or \"coordinates\"");
             require_sleeping(system);
-            if (control_)
+            if (system.control)
                 throw InputError("bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
             sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
             solver_->resting = sleeping_.get();
@@ -144,7 +145,19 @@ Simulation::Simulation(Simulation&&) noexcept = default;
 void Simulation::make_method() {
     control_.reset();
     timestepper_ = make_timestepper(system_->integrator, dynamics(), system_->integrator_options);
-    if (system_->control) control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
+    if (system_->control) {
+        control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
+    } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
+        // Short enough for a jump of velocities: a part across it of the size h errs by h times the jump.
+        constexpr double shortest = 1e-6;
+        const double step = system_->step;
+        control_ = std::make_unique<AdaptiveStepping>(
+            dynamics(), *timestepper_,
+            StepControl{.absolute = limit, .initial = step, .smallest = shortest * step, .largest = step},
+            fmt::format("{} cannot follow the motion, as near a configuration in which a mechanism jams or branches; "
+                        "take another integrator, such as euler_implicit_linearized, which is the roughest",
+                        system_->integrator));
+    }
 }
 
 DynamicalSystem& Simulation::dynamics() {
@@ -181,11 +194,11 @@ void Simulation::renew_rows(State& state) {
 
 bool Simulation::finished() const {
     // The last of steps that are chosen ends at `end` itself.
-    return system_->end - now_.state.t <= (control_ ? 0.0 : rounding_of_step * system_->step);
+    return system_->end - now_.state.t <= (system_->control ? 0.0 : rounding_of_step * system_->step);
 }
 
 void Simulation::advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
-    if (control_) {
+    if (system_->control) {
         report = control_->step(state, system_->end, *solver_);
         return;
     }
@@ -193,13 +206,26 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     report.h = step.h;
     if (sleeping_) sleeping_->begin_step(report.h);
     record_.parts = 1;
-    try {
-        timestepper_->step(state, report.h, *solver_, report.step);
-    } catch (const StepTooLong& failure) {
-        advance_in_parts(state, report, memory, failure);
+    if (control_) {
+        advance_within_error(state, step.end, report.step);
+    } else {
+        try {
+            timestepper_->step(state, report.h, *solver_, report.step);
+        } catch (const StepTooLong& failure) {
+            advance_in_parts(state, report, memory, failure);
+        }
     }
     state.t = step.end;
     if (sleeping_) sleeping_->end_step(now_.state, state);
+}
+
+void Simulation::advance_within_error(State& state, double end, StepReport& report) {
+    report.clear();
+    for (record_.parts = 0; state.t < end; ++record_.parts) {
+        AdaptiveStepReport part = control_->step(state, end, *solver_);
+        part.step.follow(report);
+        std::swap(report, part.step);
+    }
 }
 
 // Twice as many parts until the method can take them all.
@@ -213,27 +239,18 @@ void Simulation::advance_in_parts(State& state, AdaptiveStepReport& report, cons
         timestepper_->restart();
         timestepper_->load(memory);
         const double h = report.h / static_cast<double>(parts);
-        StepReport whole;
+        StepReport part;
+        report.step.clear();
         try {
-            for (std::int64_t part = 0; part < parts; ++part) {
-                timestepper_->step(state, h, *solver_, report.step);
-                if (report.step.linearization_rounding > most_rounding) throw StepTooLong(failure.what());
-                whole.newton_iterations += report.step.newton_iterations;
-                whole.linearization = std::max(whole.linearization, report.step.linearization);
-                whole.recovered += report.step.recovered;
-                if (whole.solved && !report.step.solved) {
-                    whole.solved = false;
-                    whole.message = report.step.message;
-                }
+            for (std::int64_t i = 0; i < parts; ++i) {
+                timestepper_->step(state, h, *solver_, part);
+                if (part.linearization_rounding > most_rounding) throw StepTooLong(failure.what());
+                part.follow(report.step);
+                std::swap(report.step, part);
             }
         } catch (const StepTooLong&) {
             continue;
         }
-        report.step.newton_iterations = whole.newton_iterations;
-        report.step.linearization = whole.linearization;
-        report.step.recovered = whole.recovered;
-        report.step.solved = whole.solved;
-        report.step.message = whole.message;
         record_.parts = parts;
         return;
     }
@@ -365,12 +382,47 @@ const StepRecord& Simulation::step() {
         if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
     }
     std::swap(report_, next_report_);
-    if (const MultibodySystem& mechanics = *system_->system; mechanics.m() < mechanics.constraint_rows())
-        report_.step.multipliers = mechanics.all_multipliers(report_.step.multipliers);
-    if (joint_)
-        for (const auto row : joint_->rows_of_trees())
-            report_.step.multipliers[static_cast<std::size_t>(row)] = std::numeric_limits<double>::quiet_NaN();
     return record_;
+}
+
+std::vector<double> Simulation::multipliers() const {
+    MultibodySystem& mechanics = *system_->system;
+    const std::vector<double>& kept = report().multipliers;
+    if (record_.h == 0.0) return {};
+    std::vector<double> all = mechanics.all_multipliers(kept);
+    if (!joint_) return all;
+    std::vector<double> force(static_cast<std::size_t>(mechanics.n()), 0.0);
+    mechanics.add_force(state(), 1.0, force.data());
+    MatrixAssembler rows;
+    rows.begin(mechanics.m(), mechanics.n());
+    mechanics.add_constraint_jacobian(state(), 0, rows);
+    rows.finish().transpose_multiply_add(1.0, kept.data(), force.data());
+    add_unilateral_forces(force);
+    const std::vector<double> carried = joint_->tree_reactions(coordinates(), force);
+    for (std::size_t i = 0; i < carried.size(); ++i)
+        all[static_cast<std::size_t>(joint_->rows_of_trees()[i])] = carried[i];
+    return all;
+}
+
+// Where contacts and stops are now; what acted in them in the step.
+void Simulation::add_unilateral_forces(std::vector<double>& force) const {
+    MultibodySystem& mechanics = *system_->system;
+    if (!mechanics.has_unilateral()) return;
+    std::map<std::uint64_t, std::array<double, 3>> acted;
+    for (const BlockReaction& one : report().reactions) acted[one.key] = one.force;
+    UnilateralRows now;
+    mechanics.collect_unilateral(state(), record_.h, now);
+    std::size_t row = 0;
+    for (const auto& block : now.blocks()) {
+        const auto found = acted.find(block.key);
+        for (std::int32_t i = 0; i < block.cone.rows; ++i, ++row) {
+            if (found == acted.end() || i > 2) continue;
+            for (auto k = static_cast<std::size_t>(now.row_start()[row]);
+                 k < static_cast<std::size_t>(now.row_start()[row + 1]); ++k)
+                force[static_cast<std::size_t>(now.column()[k])] +=
+                    now.value()[k] * found->second[static_cast<std::size_t>(i)];
+        }
+    }
 }
 
 std::vector<ContactRecord> Simulation::contacts() const {

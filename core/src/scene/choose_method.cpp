@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/choose_method.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace delassus::scene {
+namespace {
+
+// ---- Which method pays ----
+//
+// A system in which nothing can touch and nothing is stiff has smooth motions, and an explicit method of order 5 takes
+// them for the price of a few implicit steps of order 1 with errors smaller by orders. It pays as long as its steps are
+// limited by accuracy. Its stability limit is h ω ≈ 1 to 3 for the fastest motion ω, and a step beyond it is divided,
+// so that h ω says into how many parts. With joints the velocities are those with C_q v = 0: x ← P M⁻¹ A x with the
+// projection P = 1 − M⁻¹ C_qᵀ (C_q M⁻¹ C_qᵀ)⁻¹ C_q has the eigenvalues of A among them. None is above the largest of
+// the bodies without joints, as eigenvalues of a projected pencil lie between those of the whole: so the joints are
+// looked at only where the bodies alone are too fast.
+
+/// h ω up to which an explicit step costs about as much as the implicit one of order 1, or a little more. In trees,
+/// where accelerations follow from link to link, it costs a fiftieth (measured: examples/scenes/governor.yaml).
+constexpr double most_rate = 10.0, most_rate_in_trees = 50.0;
+/// Of each part of a fixed step, m and rad.
+constexpr const char* error_limit = "1e-6";
+
+using Matrix = Eigen::SparseMatrix<double>;
+using Factor = Eigen::SimplicialLDLT<Matrix>;
+
+template <class Add>
+Matrix assembled(std::int32_t rows, std::int32_t columns, Add add) {
+    MatrixAssembler assembler;
+    assembler.begin(rows, columns);
+    add(assembler);
+    const SparseMatrix& matrix = assembler.finish();
+    return Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+        rows, columns, matrix.entries(), matrix.row_start.data(), matrix.column.data(), matrix.value.data());
+}
+
+/// The rates of a system at its start, with the joints or without.
+class Rates {
+public:
+    explicit Rates(const MultibodySystem& mechanics)
+        : mechanics_(mechanics), n_(mechanics.n()), start_(mechanics.initial_state()) {
+        M_.compute(assembled(n_, n_, [&](MatrixAssembler& target) { mechanics_.add_mass(start_, 1.0, target); }));
+    }
+
+    /// The fastest that stiffness, damping and spins make, 1/s.
+    [[nodiscard]] double fastest() const {
+        const auto radius = [&](auto add) {
+            return spectral_radius(assembled(
+                n_, n_, [&](MatrixAssembler& target) { (mechanics_.*add)(start_, 1.0, Tangent::Symmetric, target); }));
+        };
+        double spin = 0.0;
+        for (BodyIndex body = 0; body < mechanics_.body_count(); ++body)
+            if (const auto column = mechanics_.body_column(body); column >= 0)
+                spin = std::max(spin, Eigen::Map<const Eigen::Vector3d>(start_.v.data() + column + 3).norm());
+        return std::max(
+            {std::sqrt(radius(&MultibodySystem::add_stiffness)), radius(&MultibodySystem::add_damping), spin});
+    }
+
+    /// From now on velocities are those that joints allow. Rows that repeat each other make C M⁻¹ Cᵀ singular: its
+    /// diagonal is raised by rounding.
+    void hold_joints() {
+        const std::int32_t m = mechanics_.m();
+        C_ = assembled(m, n_, [&](MatrixAssembler& target) { mechanics_.add_constraint_jacobian(start_, 0, target); });
+        const Matrix columns = C_.transpose();
+        Matrix S = C_ * Matrix(M_.solve(columns));
+        for (std::int32_t i = 0; i < m; ++i) S.coeffRef(i, i) *= 1.0 + 1e-9;
+        S_.compute(S);
+    }
+
+private:
+    /// |largest eigenvalue| of M⁻¹ A, from below, within a few percent: the power method from a vector without
+    /// symmetry.
+    [[nodiscard]] double spectral_radius(const Matrix& A) const {
+        constexpr int iterations = 40;
+        if (A.norm() == 0.0) return 0.0;
+        Eigen::VectorXd x = Eigen::VectorXd::NullaryExpr(
+            n_, [](Eigen::Index i) { return 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i)); });
+        double radius = 0.0;
+        for (int i = 0; i < iterations; ++i) {
+            x.normalize();
+            x = M_.solve(Eigen::VectorXd(A * x));
+            if (C_.rows() > 0) x -= M_.solve(Eigen::VectorXd(C_.transpose() * S_.solve(Eigen::VectorXd(C_ * x))));
+            radius = x.norm();
+            if (!(radius > 0.0) || !std::isfinite(radius)) break;
+        }
+        return radius;
+    }
+
+    const MultibodySystem& mechanics_;
+    std::int32_t n_;
+    State start_;
+    Factor M_, S_;
+    Matrix C_;
+};
+
+/// Whether joints connect bodies and ground to trees, by kinds that joint coordinates can hold.
+bool is_tree(const SceneSystem& system) {
+    const auto ground = system.bodies.size();
+    const auto node = [&](BodyIndex body) {
+        return body == world_body || system.bodies[static_cast<std::size_t>(body)].fixed
+                   ? ground
+                   : static_cast<std::size_t>(body);
+    };
+    std::vector<std::size_t> parent(ground + 1);
+    std::iota(parent.begin(), parent.end(), std::size_t{0});
+    const auto root = [&](std::size_t i) {
+        while (parent[i] != i) i = parent[i] = parent[parent[i]];
+        return i;
+    };
+    const auto told = [&](BodyIndex body) {
+        return body != world_body && system.bodies[static_cast<std::size_t>(body)].motion.has_value();
+    };
+    return std::all_of(system.joints.begin(), system.joints.end(), [&](const JointParameters& joint) {
+        if (told(joint.first) || told(joint.second)) return false;
+        switch (joint.kind) {
+            case JointKind::PointOnPlane:
+            case JointKind::Distance:
+            case JointKind::Gear:
+                return false;
+            default:
+                break;
+        }
+        const std::size_t first = root(node(joint.first)), second = root(node(joint.second));
+        parent[first] = second;
+        return first != second;
+    });
+}
+
+/// Why the system has to take the default of all systems; empty: it need not. most: of h ω.
+std::string why_implicit(const SceneSystem& system, double most) {
+    const MultibodySystem& mechanics = *system.system;
+    if (!system.solver.name.empty() && system.solver.name != "auto") return "the scene names a solver for its problems";
+    if (!system.leave_out) return "leave_out is false";
+    if (system.sleeping) return "bodies may sleep";
+    if (mechanics.n() == 0) return "nothing moves";
+    if (mechanics.node_count() > 0) return "it has nodes of elastic bodies or cables";
+    if (mechanics.has_unilateral()) return "it has contacts, stops, dry friction or forces with limits";
+    // A tolerance chooses its steps; these are as long as its users take them.
+    const double step = system.control ? std::min(system.control->largest, 0.01) : system.step;
+    Rates rates(mechanics);
+    if (rates.fastest() * step <= most) return {};
+    if (mechanics.m() > 0) rates.hold_joints();
+    const double rate = rates.fastest();
+    if (rate * step <= most) return {};
+    return fmt::format("its forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
+}
+
+}  // namespace
+
+void choose_method(SceneSystem& system) {
+    if (system.integrator != chosen) return;
+    const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
+                           !system.joints.empty() && is_tree(system);
+    system.method_reason = why_implicit(system, in_joints ? most_rate_in_trees : most_rate);
+    if (!system.method_reason.empty()) {
+        system.integrator = "euler_implicit_linearized";
+        return;
+    }
+    system.integrator = "dormand_prince";
+    system.method_reason = "nothing can touch, and no force is stiff";
+    if (!system.control) system.integrator_options.insert_or_assign("error_limit", error_limit);
+    if (in_joints) system.coordinates = Coordinates::Joint;
+}
+
+}  // namespace delassus::scene

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The integrator and the coordinates of scenes that name none.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <string>
+
+#include "delassus/error.hpp"
+#include "delassus/plan.hpp"
+#include "support/run_command.hpp"
+#include "support/scenes.hpp"
+
+namespace delassus::tests::method_test {
+namespace {
+
+using Chosen = std::pair<std::string, Coordinates>;
+
+/// So many links of 0.4 m on hinges, from the horizontal.
+std::string chain(int links, const std::string& joint = "") {
+    return fmt::format(
+        "bodies:\n"
+        "- {{name: 'l{{i}}', mass: 1.137, inertia: {{xx: 0.001, yy: 0.0152, zz: 0.0152}}, position: [0.2, 0, 0], "
+        "repeat: {{count: {}, spacing: [0.4, 0, 0]}}}}\n"
+        "joints:\n"
+        "- {{name: j0, kind: revolute, second: l0, point: [0, 0, 0], axis: [0, 1, 0]{}}}\n"
+        "- {{name: 'j{{i+1}}', kind: revolute, first: 'l{{i}}', second: 'l{{i+1}}', point: [0.4, 0, 0], axis: [0, 1, "
+        "0], repeat: {{count: {}, spacing: [0.4, 0, 0]}}}}\n",
+        links, joint, links - 1);
+}
+
+const std::string head = "step: 0.004\nend: 3.1\n";
+
+Chosen chosen_for(const std::string& text, const SceneOverrides& overrides = {}) {
+    const Scene scene = parse_scene(text, "test.yaml", overrides);
+    return {scene.systems[0].integrator, scene.systems[0].coordinates};
+}
+
+const Chosen explicit_in_joints{"dormand_prince", Coordinates::Joint},
+    explicit_in_bodies{"dormand_prince", Coordinates::Maximal},
+    implicit{"euler_implicit_linearized", Coordinates::Maximal};
+
+TEST(Method, FollowsFromTheScene) {
+    EXPECT_EQ(chosen_for(head + chain(6)), explicit_in_joints);
+    EXPECT_EQ(chosen_for(head + "integrator: auto\ncoordinates: auto\nsolver: auto\n" + chain(6)), explicit_in_joints);
+    EXPECT_EQ(chosen_for("tolerance: 1.0e-5\nend: 1\n" + chain(6)), explicit_in_joints);
+    EXPECT_EQ(chosen_for(head + "coordinates: maximal\n" + chain(6)), explicit_in_bodies);
+    const std::string last = "- {name: last, kind: revolute, second: l1, point: [0.8, 0, 0], axis: [0, 1, 0]}\n";
+    EXPECT_EQ(chosen_for(head + chain(2) + last), explicit_in_bodies) << "a loop";
+    const std::string free =
+        "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 2, zz: 3}, angular_velocity: [0, 1, 0]}]";
+    EXPECT_EQ(chosen_for(head + free), explicit_in_bodies);
+    EXPECT_EQ(chosen_for(head + "coordinates: joint\n" + chain(6)), explicit_in_joints);
+    EXPECT_EQ(chosen_for(head + "integrator: rk4\n" + chain(6)), Chosen("rk4", Coordinates::Maximal));
+
+    EXPECT_EQ(chosen_for(head + chain(6, ", lower: -1")), implicit) << "a stop";
+    EXPECT_EQ(chosen_for(head + chain(6, ", friction: 0.1")), implicit);
+    EXPECT_EQ(chosen_for(head + "solver: cholmod\n" + chain(6)), implicit);
+    EXPECT_EQ(chosen_for(head + "leave_out: false\n" + chain(6)), implicit);
+    EXPECT_EQ(chosen_for(head + "sleeping: true\n" + chain(6)), implicit);
+    EXPECT_EQ(chosen_for(head + "bodies: []\n"), implicit);
+    SceneOverrides overrides;
+    overrides.integrator = "auto";
+    EXPECT_EQ(chosen_for(head + "integrator: rk4\n" + chain(6), overrides), explicit_in_joints);
+    overrides.integrator = "hht";
+    EXPECT_EQ(chosen_for(head + chain(6), overrides), Chosen("hht", Coordinates::Maximal));
+}
+
+// A mass of 2 kg on a spring: ω = √(k/2). On a prismatic joint the ring of 1e-6 kg m² that it carries cannot turn.
+TEST(Method, IsImplicitWhereForcesAreStiff) {
+    const auto on_spring = [](double rate, const std::string& joints) {
+        return head + fmt::format(
+                          "bodies: [{{name: b, mass: 2, inertia: {{xx: 1.0e-6, yy: 1.0e-6, zz: 1.0e-6}}, "
+                          "position: [0, 0, 1]}}]\nsprings: [{{name: s, second: b, second_point: [0.1, 0, 1], "
+                          "stiffness: {}}}]\n{}",
+                          2.0 * rate * rate, joints);
+    };
+    const std::string slide = "joints: [{name: j, kind: prismatic, second: b, point: [0, 0, 1]}]\n";
+    EXPECT_EQ(chosen_for(on_spring(1.0, "")), explicit_in_bodies);
+    EXPECT_EQ(chosen_for(on_spring(400.0, "")), implicit) << "the spring turns the ring 141 times as fast";
+    EXPECT_EQ(chosen_for(on_spring(400.0, slide)), explicit_in_joints);
+    EXPECT_EQ(chosen_for(on_spring(1e5, slide)), implicit);
+}
+
+TEST(Method, ThePlanSaysWhy) {
+    Scene scene = parse_scene(head + chain(6), "test.yaml"), stopped = parse_scene(head + chain(6, ", lower: -1"), "t"),
+          named = parse_scene(head + "integrator: rk4\n" + chain(6), "test.yaml");
+    const auto said = [](Scene& of) {
+        std::string all;
+        const SystemPlan plan = make_plan(of, registry()).at(0);
+        for (const auto& line : plan.kept) all += line.what + ": " + line.reason + "\n";
+        return all;
+    };
+    EXPECT_NE(said(scene).find("integrator dormand_prince: the scene names none: nothing can touch"),
+              std::string::npos);
+    EXPECT_NE(said(scene).find("joint coordinates: joints make trees"), std::string::npos);
+    EXPECT_NE(said(stopped).find("integrator euler_implicit_linearized: the scene names none: it has contacts, stops"),
+              std::string::npos);
+    EXPECT_EQ(said(named).find("integrator"), std::string::npos);
+}
+
+// The chain of six links falls through its lowest point and swings: what a first-order method lost a third of.
+TEST(Method, AChainWithoutOptionsKeepsItsEnergy) {
+    Running run(parse_scene(head + chain(6), "test.yaml"));
+    run.finish();
+    const auto& totals = run.simulation.totals();
+    EXPECT_LE(std::abs(totals.energy - totals.start_energy), 1e-5 * totals.potential_drop);
+    EXPECT_EQ(run.simulation.record().step, 775);
+    EXPECT_GT(totals.divided_steps, 0);
+    EXPECT_GT(totals.most_parts, 1);
+    EXPECT_TRUE(run.simulation.warnings().empty());
+    Running exact(parse_scene(head + "integrator: {name: dormand_prince, options: {error_limit: 1.0e-11}}\n" + chain(6),
+                              "test.yaml"));
+    exact.finish();
+    const Vector3 end = run.pose("l5").position, expected = exact.pose("l5").position;
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(end[i], expected[i], 1e-3);  // it is chaotic
+}
+
+// Its error is that of the limit, whatever the step is.
+TEST(ErrorLimit, HoldsForAnyStep) {
+    const auto end = [](double step, double limit) {
+        Running run(parse_scene(fmt::format("step: {}\nend: 1.3\nintegrator: {{name: dormand_prince, options: "
+                                            "{{error_limit: {}}}}}\n{}",
+                                            step, limit, chain(2)),
+                                "test.yaml"));
+        run.finish();
+        return run.pose("l1").position;
+    };
+    const Vector3 exact = end(1e-3, 1e-13);
+    for (const double step : {0.0073, 0.05, 0.4, 1.0}) {
+        const Vector3 found = end(step, 1e-7);
+        EXPECT_LE(std::hypot(found[0] - exact[0], found[2] - exact[2]), 3e-6) << step;
+    }
+}
+
+// A motor whose speed jumps: from one path to the other, both exact.
+TEST(ErrorLimit, PassesJumpsOfVelocities) {
+    Running run(parse_scene("step: 0.01\nend: 1.515\n" + chain(2) +
+                                "motors: [{name: m, joint: j0, motion: {table: {times: [0, 0.503, 0.911, 2], values: "
+                                "[0, 0.7, 0.1, 1.2]}}}]\n",
+                            "test.yaml"));
+    EXPECT_EQ(run.simulation.system().integrator, "dormand_prince");
+    run.finish();
+    const double angle = 0.1 + 1.1 * (1.515 - 0.911) / (2.0 - 0.911);
+    EXPECT_NEAR(run.pose("l0").position[0], 0.2 * std::cos(angle), 1e-12);
+    EXPECT_NEAR(run.velocities("l0")[1][1], 1.1 / (2.0 - 0.911), 1e-9);
+}
+
+TEST(ErrorLimit, GoesOnFromACheckpointWithTheSameBits) {
+    const std::string text = "step: 0.02\nend: 2\n" + chain(3);
+    Running whole(parse_scene(text, "test.yaml")), resumed(parse_scene(text, "test.yaml"));
+    while (whole.simulation.state().t < 0.7) whole.simulation.step();
+    resumed.simulation.load(whole.simulation.save());
+    whole.finish();
+    resumed.finish();
+    EXPECT_GT(whole.simulation.totals().most_parts, 1);
+    EXPECT_EQ(whole.simulation.totals().divided_steps, resumed.simulation.totals().divided_steps);
+    EXPECT_EQ(whole.simulation.state().q, resumed.simulation.state().q);
+    EXPECT_EQ(whole.simulation.state().v, resumed.simulation.state().v);
+}
+
+// A crank of 0.3 m turns away from a plane to which a rod of √0.05 m ties its end: until 0.2 + 0.3 sin t = √0.05.
+TEST(ErrorLimit, SaysThatAMechanismJams) {
+    Running run(parse_scene(
+        "step: 0.01\nend: 3\nbodies:\n"
+        "- {name: crank, mass: 1, inertia: {xx: 0.01, yy: 0.01, zz: 0.01}, position: [0.15, 0, 0]}\n"
+        "- {name: rod, mass: 1, inertia: {xx: 0.01, yy: 0.01, zz: 0.01}, position: [0.3, 0, 0.1]}\n"
+        "joints:\n"
+        "- {name: a, kind: revolute, second: crank, point: [0, 0, 0], axis: [0, 1, 0]}\n"
+        "- {name: b, kind: revolute, first: crank, second: rod, point: [0.3, 0, 0], axis: [0, 1, 0]}\n"
+        "- {name: c, kind: point_on_plane, first: world, second: rod, point: [0.4, 0, 0.2], axis: [0, 0, 1]}\n"
+        "motors: [{name: m, joint: a, speed: true, motion: 1}]\n",
+        "test.yaml"));
+    EXPECT_EQ(run.simulation.system().integrator, "dormand_prince");
+    try {
+        run.finish();
+        FAIL();
+    } catch (const StepFailure& failure) {
+        EXPECT_NE(std::string(failure.what()).find("system \"main\", step"), std::string::npos) << failure.what();
+    }
+    EXPECT_NEAR(run.simulation.state().t, std::asin((std::sqrt(0.05) - 0.2) / 0.3), 0.01);
+}
+
+TEST(ErrorLimit, IsSaidByARun) {
+    const ScratchFolder scratch;
+    const auto file = (scratch / "chain.yaml").string();
+    std::ofstream(file) << head << chain(6);
+    const auto result = run_command("run " + file);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.out.find("775 steps of dormand_prince"), std::string::npos) << result.out;
+    EXPECT_NE(result.out.find("steps taken in up to"), std::string::npos) << result.out;
+    EXPECT_EQ(
+        run_command("run " + file + " --set integrator.name=dormand_prince --set integrator.options.error_limit=0")
+            .exit_code,
+        2);
+}
+
+}  // namespace
+}  // namespace delassus::tests::method_test
