@@ -47,10 +47,14 @@ TEST(Method, FollowsFromTheScene) {
     EXPECT_EQ(chosen_for("tolerance: 1.0e-5\nend: 1\n" + chain(6)), explicit_in_joints);
     EXPECT_EQ(chosen_for(head + "coordinates: maximal\n" + chain(6)), explicit_in_bodies);
     const std::string last = "- {name: last, kind: revolute, second: l1, point: [0.8, 0, 0], axis: [0, 1, 0]}\n";
-    EXPECT_EQ(chosen_for(head + chain(2) + last), explicit_in_bodies) << "a loop";
+    EXPECT_EQ(chosen_for(head + chain(2) + last), explicit_in_joints) << "a loop";
+    EXPECT_EQ(chosen_for(head + chain(2) + "- {name: rod, kind: distance, second: l1, second_point: [0.7, 0, 0]}\n"),
+              explicit_in_joints);
     const std::string free =
         "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 2, zz: 3}, angular_velocity: [0, 1, 0]}]";
     EXPECT_EQ(chosen_for(head + free), explicit_in_bodies);
+    EXPECT_EQ(chosen_for(head + free + "\njoints: [{name: rod, kind: distance, second: b, point: [1, 0, 0]}]"),
+              explicit_in_bodies);
     EXPECT_EQ(chosen_for(head + "coordinates: joint\n" + chain(6)), explicit_in_joints);
     EXPECT_EQ(chosen_for(head + "integrator: rk4\n" + chain(6)), Chosen("rk4", Coordinates::Maximal));
 

@@ -54,8 +54,8 @@ public:
     /// Their numbers among all rows, ascending.
     [[nodiscard]] const std::vector<std::int32_t>& rows_of_trees() const;
     [[nodiscard]] std::int32_t body_velocities() const;
-    /// The largest |C| of rows of loops that others imply, in their own units: m and rad.
-    [[nodiscard]] double drift_of_rows_left_out(const State& state) const;
+    /// MultibodySystem::renew_rows() for rows of loops: state ← moved to where the new ones hold.
+    bool renew_rows(State& state, std::int64_t step);
 
     /// λ of rows_of_trees(), in their order, N and Nm: what the joints of trees carry at a state, where f acts on the
     /// bodies beside it (forces and torques as MultibodySystem::add_force() has them, with those of other rows).

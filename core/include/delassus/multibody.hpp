@@ -441,10 +441,10 @@ public:
     [[nodiscard]] const std::vector<std::int32_t>& kept_rows() const;
     /// Keeps these rows; ascending. Timesteppers made before do not know.
     void keep_rows(const std::vector<std::int32_t>& rows);
-    /// Of all rows but those that are certain, enough that the others hold wherever the certain ones do, and no more;
-    /// ascending. certain: rows of a tree of joints, ascending; state: assembled.
-    [[nodiscard]] std::vector<std::int32_t> rows_beside(const std::vector<std::int32_t>& certain,
-                                                        const State& state) const;
+    /// After assemble(), which undoes it: these rows hold by other means from now on, as by coordinates of joints.
+    /// Keeps of all others enough that the rest holds wherever these and they do, and no more. held: rows of trees of
+    /// joints, ascending.
+    void hold_rows(const std::vector<std::int32_t>& held);
     /// Chooses anew which rows to keep, if those that are kept nearly depend on each other at this state and others do
     /// not, or if rows that were left out no longer hold; moves the state to where the new ones hold. Returns whether
     /// it did: then timesteppers must be made anew. Throws StepFailure where rows that are left out no longer hold and

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "delassus/error.hpp"
 #include "mechanics/kinematic_tree.hpp"
@@ -37,13 +38,12 @@ struct JointCoordinates::Implementation {
     mechanics::KinematicTree tree;
     mechanics::TreeDerivatives derivatives;
     State start;
-    std::vector<std::int32_t> held;           // rows that the trees hold
-    std::vector<std::int32_t> rows_left_out;  // that others imply
-    bool turns = false;                       // a link with a joint, whose forces depend on the state
-    std::vector<std::size_t> link_at;         // by the body's column / 6
+    std::vector<std::int32_t> held;    // rows that the trees hold
+    bool turns = false;                // a link with a joint, whose forces depend on the state
+    std::vector<std::size_t> link_at;  // by the body's column / 6
     // Work space of the call that runs:
     State state;  // of the bodies
-    std::vector<double> force, rates, all_rows;
+    std::vector<double> force, rates;
     MatrixAssembler matrix, rows;
     UnilateralRows body_rows;
     std::vector<FreeSpin> body_spins;
@@ -192,11 +192,7 @@ JointCoordinates::JointCoordinates(MultibodySystem& bodies)
         for (std::int32_t row = first; row < first + std::min(own, count); ++row) held.push_back(row);
     }
     std::sort(held.begin(), held.end());
-    const std::vector<std::int32_t> kept = bodies.rows_beside(held, start);
-    bodies.keep_rows(kept);
-    for (std::int32_t row = 0; row < bodies.constraint_rows(); ++row)
-        if (!std::binary_search(kept.begin(), kept.end(), row) && !std::binary_search(held.begin(), held.end(), row))
-            self.rows_left_out.push_back(row);
+    bodies.hold_rows(held);
     self.start = coordinates_of(start);
 }
 
@@ -226,16 +222,22 @@ std::int32_t JointCoordinates::body_velocities() const {
     return implementation_->bodies.n();
 }
 
-double JointCoordinates::drift_of_rows_left_out(const State& state) const {
+bool JointCoordinates::renew_rows(State& state, std::int64_t step) {
     auto& self = *implementation_;
-    if (self.rows_left_out.empty()) return 0.0;
-    self.place(state);
-    self.all_rows.resize(static_cast<std::size_t>(self.bodies.constraint_rows()));
-    self.bodies.all_constraints(self.state, self.all_rows.data());
-    double drift = 0.0;
-    for (const auto row : self.rows_left_out)
-        drift = std::max(drift, std::abs(self.all_rows[static_cast<std::size_t>(row)]));
-    return drift;
+    State bodies = bodies_of(state);
+    if (!self.bodies.renew_rows(bodies, step)) return false;
+    State renewed = coordinates_of(bodies);
+    const auto keep_turns = [&](std::int32_t place) {
+        const auto at = static_cast<std::size_t>(place);
+        renewed.q[at] += 2.0 * std::numbers::pi * std::round((state.q[at] - renewed.q[at]) / (2.0 * std::numbers::pi));
+    };
+    for (const Link& link : self.tree.links()) {
+        if (link.kind == LinkJoint::Revolute || link.kind == LinkJoint::Universal) keep_turns(link.position);
+        if (link.kind == LinkJoint::Cylindrical || link.kind == LinkJoint::Universal) keep_turns(link.position + 1);
+        if (link.kind == LinkJoint::Planar) keep_turns(link.position + 2);
+    }
+    state = std::move(renewed);
+    return true;
 }
 
 State JointCoordinates::bodies_of(const State& state) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -32,6 +33,10 @@ public:
         certain_.clear();
         for (std::size_t i = 0; i < numbers_.size(); ++i)
             if (is_certain(numbers_[i])) certain_.push_back(i);
+    }
+
+    [[nodiscard]] bool is_certain(std::size_t row) const {
+        return std::binary_search(certain_.begin(), certain_.end(), row);
     }
 
     /// The largest of a body: m and rad, or m/s and rad/s.

@@ -37,13 +37,15 @@ constexpr double assembled_position = 1e-9, assembled_velocity = 1e-7;
 std::vector<std::size_t> MultibodySystem::Implementation::rows_of(const Linkage& linkage, bool kept) const {
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < linkage.numbers().size(); ++i)
-        if ((place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] >= 0) == kept) rows.push_back(i);
+        if ((linkage.is_certain(i) || place_of_row[static_cast<std::size_t>(linkage.numbers()[i])] >= 0) == kept)
+            rows.push_back(i);
     return rows;
 }
 
 void MultibodySystem::Implementation::keep_of(const Linkage& linkage, const std::vector<std::size_t>& rows) {
     for (const auto number : linkage.numbers()) place_of_row[static_cast<std::size_t>(number)] = -1;
-    for (const auto row : rows) place_of_row[static_cast<std::size_t>(linkage.numbers()[row])] = 0;
+    for (const auto row : rows)
+        if (!linkage.is_certain(row)) place_of_row[static_cast<std::size_t>(linkage.numbers()[row])] = 0;
     number_rows();
 }
 
@@ -96,6 +98,7 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
 const Assembly& MultibodySystem::assemble() {
     auto& self = *implementation_;
     self.must_be_finished();
+    self.beside_held.reset();
     if (self.assembly) {
         keep_rows(self.first_kept_rows);
         return *self.assembly;
@@ -144,25 +147,27 @@ void MultibodySystem::keep_rows(const std::vector<std::int32_t>& rows) {
     self.number_rows();
 }
 
-std::vector<std::int32_t> MultibodySystem::rows_beside(const std::vector<std::int32_t>& certain,
-                                                       const State& state) const {
-    const auto& self = *implementation_;
-    self.must_be_finished();
-    const auto is_certain = [&](std::int32_t row) { return std::binary_search(certain.begin(), certain.end(), row); };
-    std::vector<std::int32_t> rows;
+void MultibodySystem::hold_rows(const std::vector<std::int32_t>& held) {
+    auto& self = *implementation_;
+    const State start = initial_state();
+    std::vector<Linkage> redundant;
+    std::vector<std::int32_t> kept;
     for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {
-        linkage.take_as_certain(is_certain);
-        for (const auto row : linkage.independent_rows(state))
-            if (!is_certain(linkage.numbers()[row])) rows.push_back(linkage.numbers()[row]);
+        linkage.take_as_certain([&](std::int32_t row) { return std::binary_search(held.begin(), held.end(), row); });
+        const auto rows = linkage.independent_rows(start);
+        for (const auto row : rows)
+            if (!linkage.is_certain(row)) kept.push_back(linkage.numbers()[row]);
+        if (rows.size() < linkage.numbers().size()) redundant.push_back(std::move(linkage));
     }
-    std::sort(rows.begin(), rows.end());
-    return rows;
+    std::sort(kept.begin(), kept.end());
+    keep_rows(kept);
+    self.beside_held = std::move(redundant);
 }
 
 bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
     auto& self = *implementation_;
     bool renewed = false;
-    for (const auto& linkage : self.redundant) {
+    for (const auto& linkage : self.beside_held ? *self.beside_held : self.redundant) {
         auto rows = self.rows_of(linkage, true);
         const auto drift = linkage.residual(state, self.rows_of(linkage, false));
         // A method whose steps are long opens all joints alike.

@@ -60,8 +60,9 @@ struct MultibodySystem::Implementation {
     std::vector<std::int32_t> kept_rows;  // ascending
     std::optional<State> assembled;       // since assemble()
     std::optional<Assembly> assembly;
-    std::vector<std::int32_t> first_kept_rows;  // those of assemble()
-    std::vector<mechanics::Linkage> redundant;  // those with rows that are left out
+    std::vector<std::int32_t> first_kept_rows;                   // those of assemble()
+    std::vector<mechanics::Linkage> redundant;                   // those with rows that are left out
+    std::optional<std::vector<mechanics::Linkage>> beside_held;  // likewise, where hold_rows() has been called
     std::vector<mechanics::MovingBody> moving;
     std::vector<BodyIndex> prescribed;  // bodies that move as they are told
     bool gyroscopic = false;            // a moving body whose moments differ

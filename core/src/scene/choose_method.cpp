@@ -99,7 +99,17 @@ private:
     Matrix C_;
 };
 
-/// Whether joints connect bodies and ground to trees, by kinds that joint coordinates can hold.
+/// Whether joint coordinates can hold a joint, where it closes no loop.
+bool can_be_in_a_tree(const SceneSystem& system, const JointParameters& joint) {
+    const auto told = [&](BodyIndex body) {
+        return body != world_body && system.bodies[static_cast<std::size_t>(body)].motion.has_value();
+    };
+    const bool row_alone =
+        joint.kind == JointKind::PointOnPlane || joint.kind == JointKind::Distance || joint.kind == JointKind::Gear;
+    return !row_alone && !told(joint.first) && !told(joint.second);
+}
+
+/// Whether its joints leave no row in joint coordinates: bodies and ground are trees of them.
 bool is_tree(const SceneSystem& system) {
     const auto ground = system.bodies.size();
     const auto node = [&](BodyIndex body) {
@@ -113,19 +123,8 @@ bool is_tree(const SceneSystem& system) {
         while (parent[i] != i) i = parent[i] = parent[parent[i]];
         return i;
     };
-    const auto told = [&](BodyIndex body) {
-        return body != world_body && system.bodies[static_cast<std::size_t>(body)].motion.has_value();
-    };
     return std::all_of(system.joints.begin(), system.joints.end(), [&](const JointParameters& joint) {
-        if (told(joint.first) || told(joint.second)) return false;
-        switch (joint.kind) {
-            case JointKind::PointOnPlane:
-            case JointKind::Distance:
-            case JointKind::Gear:
-                return false;
-            default:
-                break;
-        }
+        if (!can_be_in_a_tree(system, joint)) return false;
         const std::size_t first = root(node(joint.first)), second = root(node(joint.second));
         parent[first] = second;
         return first != second;
@@ -156,8 +155,9 @@ std::string why_implicit(const SceneSystem& system, double most) {
 void choose_method(SceneSystem& system) {
     if (system.integrator != chosen) return;
     const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
-                           !system.joints.empty() && is_tree(system);
-    system.method_reason = why_implicit(system, in_joints ? most_rate_in_trees : most_rate);
+                           std::any_of(system.joints.begin(), system.joints.end(),
+                                       [&](const JointParameters& joint) { return can_be_in_a_tree(system, joint); });
+    system.method_reason = why_implicit(system, in_joints && is_tree(system) ? most_rate_in_trees : most_rate);
     if (!system.method_reason.empty()) {
         system.integrator = "euler_implicit_linearized";
         return;

@@ -176,17 +176,10 @@ void Simulation::renew_rows(State& state) {
     constexpr std::int64_t every = 10;
     constexpr double drifted = 1e-4;
     MultibodySystem& mechanics = *system_->system;
-    if (joint_) {
-        /// Of rows that are implied, m or rad; as in maximal coordinates.
-        constexpr double most_drift = 1e-3;
-        if (record_.drift > most_drift && joint_->drift_of_rows_left_out(state) > most_drift)
-            throw StepFailure(
-                "rows of a loop that others implied at the start no longer hold; in joint coordinates they are not "
-                "chosen anew: take \"coordinates: maximal\"");
+    const std::int32_t held = joint_ ? joint_->rows_saved() : 0;
+    if (mechanics.m() + held == mechanics.constraint_rows() || (now_.step % every != 0 && record_.drift < drifted))
         return;
-    }
-    if (mechanics.m() == mechanics.constraint_rows() || (now_.step % every != 0 && record_.drift < drifted)) return;
-    if (!mechanics.renew_rows(state, now_.step)) return;
+    if (joint_ ? !joint_->renew_rows(state, now_.step) : !mechanics.renew_rows(state, now_.step)) return;
     const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
     make_method();
     if (control_) control_->load(control);
