@@ -27,7 +27,7 @@ const RegisterTimestepper dormand_prince_row{
                   .minimum = std::numeric_limits<double>::min(),
                   .maximum = HUGE_VAL,
                   .unit = "m, rad",
-                  .doc = "a step of a fixed size is taken in parts whose own estimates of their errors are below it"}},
+                  .doc = "a tolerance: a step of a fixed size is taken in as many parts as steps by tolerance would be"}},
      .constraints = true,
      .unilateral = false,
      .order = 5,

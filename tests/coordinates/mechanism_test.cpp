@@ -223,7 +223,7 @@ TEST(EmbeddedError, MeetsTheTolerance) {
             double off = 0.0;
             for (std::size_t i = 0; i < simulation.state().q.size(); ++i)
                 off = std::max(off, std::abs(simulation.state().q[i] - best.simulation.state().q[i]));
-            EXPECT_LE(off, 100.0 * tolerance) << all[k].name;
+            EXPECT_LE(off, 10.0 * tolerance) << all[k].name;
             EXPECT_LE(simulation.totals().newton_iterations,
                       8 * (simulation.save().step + simulation.totals().rejected + 1) + 200)
                 << "one trial a step";

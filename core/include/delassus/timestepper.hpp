@@ -92,8 +92,8 @@ public:
     [[nodiscard]] virtual bool has_embedded_error() const { return false; }
     /// The estimate for the last step; valid until the next. Empty by default.
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
-    /// The estimate, in units of positions, above which a step of a fixed size is to be taken in parts: as
-    /// StepControl::absolute. Infinity by default: every step is one.
+    /// The tolerance, as StepControl::absolute, by which a step of a fixed size is to be taken in parts. Infinity by
+    /// default: every step is one.
     [[nodiscard]] virtual double error_limit() const { return std::numeric_limits<double>::infinity(); }
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.

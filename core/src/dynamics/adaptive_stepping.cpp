@@ -28,13 +28,17 @@ namespace delassus {
 // A method of order p with an embedded one of order p − 1 gives their difference, the error of the latter, c h^p. It
 // takes one trial in place of three. The result is that of order p, as with the sum.
 //
-// What is bounded: with the sum or an embedded method, the error of a step; without, the error of a step divided by its
-// size. Either way the error at a fixed time is proportional to the tolerance, and the estimate to h^{p+1} or h^p.
+// What is bounded: with the sum, the error of a step; with an embedded method likewise, by a hundredth of the tolerance;
+// without, the error of a step divided by its size. Each way the error at a fixed time is proportional to the tolerance,
+// and the estimate to h^{p+1} or h^p. The hundredth makes the error at the end of a run about the tolerance: steps of
+// order 5 are long, some hundreds a run, and mechanisms magnify errors by some ten (docs/references.md).
 
 namespace {
 
 /// Longest and shortest next step, relative to the last.
 constexpr double most_growth = 4.0, least_growth = 0.2, safety = 0.9;
+/// Of the tolerance, in a step of an embedded method.
+constexpr double share_of_step = 0.01;
 /// Remaining times within this fraction of a step are whole steps that rounding spoiled.
 constexpr double rounding_of_step = 1e-9;
 
@@ -85,7 +89,7 @@ double AdaptiveStepping::error_of(const State& begin, const State& end, const Em
     for (std::size_t i = 0; i < error.positions.size(); ++i) {
         const double speed = std::max(std::abs(begin.v[i]), std::abs(end.v[i]));
         const double ratio = std::max(std::abs(error.positions[i]), h * std::abs(error.velocities[i])) /
-                             (control_.absolute + control_.relative * speed);
+                             (share_of_step * (control_.absolute + control_.relative * speed));
         worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
     }
     return worst;

@@ -24,8 +24,8 @@ namespace {
 /// h ω up to which an explicit step costs about as much as the implicit one of order 1, or a little more. In trees,
 /// where accelerations follow from link to link, it costs a fiftieth (measured: examples/scenes/governor.yaml).
 constexpr double most_rate = 10.0, most_rate_in_trees = 50.0;
-/// Of each part of a fixed step, m and rad.
-constexpr const char* error_limit = "1e-6";
+/// m and rad.
+constexpr const char* error_limit = "1e-4";
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Factor = Eigen::SimplicialLDLT<Matrix>;
