@@ -21,9 +21,10 @@ namespace {
 // the bodies without joints, as eigenvalues of a projected pencil lie between those of the whole: so the joints are
 // looked at only where the bodies alone are too fast.
 
-/// h ω up to which an explicit step costs about as much as the implicit one of order 1, or a little more. In trees,
-/// where accelerations follow from link to link, it costs a fiftieth (measured: examples/scenes/governor.yaml).
-constexpr double most_rate = 10.0, most_rate_in_trees = 50.0;
+/// h ω up to which an explicit step, in parts, costs a few times what the implicit one of order 1 does, or less. In
+/// trees accelerations follow from link to link: a part costs a fiftieth of an implicit step (measured:
+/// examples/scenes/governor.yaml).
+constexpr double most_rate = 50.0, most_rate_in_trees = 500.0;
 /// m and rad.
 constexpr const char* error_limit = "1e-4";
 
