@@ -250,10 +250,11 @@ TEST(Actuator, KeepsIslandsApart) {
         "actuators:\n"
         "  - {name: a, joint: hinge_disc, position: 9, kp: 50, kd: 4, limit: 5}\n"
         "  - {name: b, joint: hinge_third, position: -9, kp: 50, kd: 4, limit: 7}\n";
-    Scene scene = parse_scene(yaml, "s");
-    // Each body is three parts, as it is in its mass centre that it is held: where it is, its axis, and its angle if an
-    // actuator acts on it.
-    EXPECT_EQ(make_plan(scene, registry()).front().parts, 8);
+    // In joint coordinates two angles have a row. In maximal ones each body is three parts, as it is in its mass centre
+    // that it is held: where it is, its axis, and its angle if an actuator acts on it.
+    Scene scene = parse_scene(yaml, "s"), maximal = parse_scene("coordinates: maximal\n" + yaml, "s");
+    EXPECT_EQ(make_plan(scene, registry()).front().parts, 2);
+    EXPECT_EQ(make_plan(maximal, registry()).front().parts, 8);
     Running run(parse_scene(yaml, "s"));
     run.finish();
     EXPECT_NEAR(run.velocities("disc")[1][2], 0.3 * 2.5, 1e-9);

@@ -422,6 +422,8 @@ public:
     [[nodiscard]] std::array<Vector3, 2> velocities(const State& state, BodyIndex index) const;
     /// Of bodies; the spheres of nodes are not among them.
     [[nodiscard]] const std::vector<Shape>& shapes() const;
+    /// Whether shapes or nodes could meet, so that contacts are looked for; after finish().
+    [[nodiscard]] bool detects_contacts() const;
     /// Rows of joint `index` within all_constraints() and all_multipliers(): first row and count.
     [[nodiscard]] std::array<std::int32_t, 2> joint_rows(std::int32_t index) const;
 

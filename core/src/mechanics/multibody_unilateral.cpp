@@ -39,10 +39,14 @@ std::uint64_t key_of(const ContactPoint& contact) {
 
 }  // namespace
 
+bool MultibodySystem::detects_contacts() const {
+    implementation_->must_be_finished();
+    return implementation_->detector != nullptr;
+}
+
 bool MultibodySystem::has_unilateral() const {
     const auto& self = *implementation_;
-    self.must_be_finished();
-    return self.detector || !self.bounded_motors.empty() || !self.bounded_actuators.empty() ||
+    return detects_contacts() || !self.bounded_motors.empty() || !self.bounded_actuators.empty() ||
            !self.frictions.empty() || std::any_of(self.joints.begin(), self.joints.end(), [](const auto& joint) {
                return !std::isnan(joint.parameters.lower) || !std::isnan(joint.parameters.upper);
            });

@@ -25,6 +25,8 @@ namespace {
 /// trees accelerations follow from link to link: a part costs a fiftieth of an implicit step (measured:
 /// examples/scenes/governor.yaml).
 constexpr double most_rate = 50.0, most_rate_in_trees = 500.0;
+/// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
+constexpr double most_rate_of_order_2 = 2.0;
 /// m and rad.
 constexpr const char* error_limit = "1e-4";
 
@@ -132,20 +134,25 @@ bool is_tree(const SceneSystem& system) {
     });
 }
 
-/// Why the system has to take the default of all systems; empty: it need not. most: of h ω.
-std::string why_implicit(const SceneSystem& system, double most) {
+/// Why only the default of all systems takes it; empty: others do.
+std::string why_default(const SceneSystem& system) {
     const MultibodySystem& mechanics = *system.system;
     if (!system.solver.name.empty() && system.solver.name != "auto") return "the scene names a solver for its problems";
     if (!system.leave_out) return "leave_out is false";
     if (system.sleeping) return "bodies may sleep";
     if (mechanics.n() == 0) return "nothing moves";
     if (mechanics.node_count() > 0) return "it has nodes of elastic bodies or cables";
-    if (mechanics.has_unilateral()) return "it has contacts, stops, dry friction or forces with limits";
+    if (mechanics.detects_contacts()) return "bodies may touch";
+    return {};
+}
+
+/// Why a step would be too long for a method that takes h ω up to `most`; empty: it is not.
+std::string why_stiff(const SceneSystem& system, double most) {
     // A tolerance chooses its steps; these are as long as its users take them.
     const double step = system.control ? std::min(system.control->largest, 0.01) : system.step;
-    Rates rates(mechanics);
+    Rates rates(*system.system);
     if (rates.fastest() * step <= most) return {};
-    if (mechanics.m() > 0) rates.hold_joints();
+    if (system.system->m() > 0) rates.hold_joints();
     const double rate = rates.fastest();
     if (rate * step <= most) return {};
     return fmt::format("its forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
@@ -155,18 +162,31 @@ std::string why_implicit(const SceneSystem& system, double most) {
 
 void choose_method(SceneSystem& system) {
     if (system.integrator != chosen) return;
+    system.integrator = "euler_implicit_linearized";
+    system.method_reason = why_default(system);
+    if (!system.method_reason.empty()) return;
     const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
                            std::any_of(system.joints.begin(), system.joints.end(),
                                        [&](const JointParameters& joint) { return can_be_in_a_tree(system, joint); });
-    system.method_reason = why_implicit(system, in_joints && is_tree(system) ? most_rate_in_trees : most_rate);
-    if (!system.method_reason.empty()) {
-        system.integrator = "euler_implicit_linearized";
+    const bool unilateral = system.system->has_unilateral();
+    if (unilateral && (!in_joints || system.control)) {
+        system.method_reason = "joints have stops, dry friction or forces with limits";
+        return;
+    }
+    system.method_reason = why_stiff(system, unilateral                     ? most_rate_of_order_2
+                                             : in_joints && is_tree(system) ? most_rate_in_trees
+                                                                            : most_rate);
+    if (!system.method_reason.empty()) return;
+    if (in_joints) system.coordinates = Coordinates::Joint;
+    if (unilateral) {
+        system.integrator = "moreau_jean";
+        system.method_reason =
+            "nothing can touch, joints have stops, dry friction or forces with limits, and no force is stiff";
         return;
     }
     system.integrator = "dormand_prince";
     system.method_reason = "nothing can touch, and no force is stiff";
     if (!system.control) system.integrator_options.insert_or_assign("error_limit", error_limit);
-    if (in_joints) system.coordinates = Coordinates::Joint;
 }
 
 }  // namespace delassus::scene
