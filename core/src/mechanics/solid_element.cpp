@@ -110,6 +110,7 @@ SolidShape quadratic_tetrahedron(const std::array<std::int32_t, 10>& nodes, cons
         shape.points.push_back(point);
     }
     for (std::size_t k = 0; k < 10; ++k) shape.share.push_back(k < 4 ? 1.0 / 36.0 : 4.0 / 27.0);
+    shape.own_bulk = 1.2;
     return shape;
 }
 
@@ -149,21 +150,25 @@ SolidShape brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vect
 // where dR = R [ω]× and Y = Rᵀ dF gives [ω]× U + U [ω]× = Y − Yᵀ, that is (tr(U) I − U) ω = axial vector of Y − Yᵀ.
 // K is the derivative of the forces exactly, not the usual R K₀ Rᵀ.
 //
-// In an element θ is the mean Σ V_p θ_p/V: nothing else changes above, and with B the one of F and R that θ's
-// derivative names, dθ = sᵀdx/V with s_a = Σ V_p B g_a. So the last term of dP gives the rank-one matrix (λ/V) s sᵀ.
+// In an element the energy ½ λ θ² is that of c times the mean θ̄ = Σ V_p θ_p/V and of 1 − c times the points' own,
+// ½ λ (c V θ̄² + (1 − c) Σ V_p θ_p²): above, λ θ is λ (c θ̄ + (1 − c) θ_p), and with B the one of F and R that θ's
+// derivative names, s_p,a = V_p B g_a and s = Σ s_p, the last term of dP gives λ (c s sᵀ/V + (1 − c) Σ s_p s_pᵀ/V_p).
+// With means alone (c = 1) a layer of elements that bends hides the change of volume in each, and a cantilever one
+// element deep is 11 % too soft at ν = 0.3. With none (c = 0) elements lock as λ/μ grows. So the points have their own
+// up to the λ/μ at which they do not yet lock.
 //
 // Damping, for both: a stress F (2μτ Ė + λτ tr(Ė) I) with Ė = sym(Fᵀ Ḟ), which rigid motion does not feel; tr(Ė) is
-// the mean of F : Ḟ likewise. Damping by the mass adds −α m_a v_a.
+// shared out likewise. Damping by the mass adds −α m_a v_a.
 struct ElasticSolid::Point {
     Matrix3d F, rate;
     Matrix3d R = Matrix3d::Identity();
     Matrix3d turning = Matrix3d::Zero();  // (tr(U) I − U)⁻¹
-    double theta = 0.0;
+    double theta = 0.0, swell = 0.0;      // θ_p and tr(Ė) of its own, then as they count
 };
 
 struct ElasticSolid::Strain {
-    std::array<Point, 6> points;     // as many as there are in the shape
-    double theta = 0.0, rate = 0.0;  // the means of θ and of tr(Ė)
+    std::array<Point, 6> points;  // as many as there are in the shape
+    double squares = 0.0;         // c V θ̄² + (1 − c) Σ V_p θ_p²
 };
 
 ElasticSolid::ElasticSolid(SolidShape shape, const ElasticMaterial& material, ElementModel model)
@@ -173,12 +178,14 @@ ElasticSolid::ElasticSolid(SolidShape shape, const ElasticMaterial& material, El
       density_(material.density),
       damping_(material.damping_time),
       damping_rate_(material.damping_rate),
+      own_(lambda_ > shape.own_bulk * mu_ ? shape.own_bulk * mu_ / lambda_ : 1.0),
       shape_(std::move(shape)) {
     for (const auto& point : shape_.points) volume_ += point.volume;
 }
 
 ElasticSolid::Strain ElasticSolid::strain(const NodeColumns& x, const NodeColumns& v) const {
     Strain result;
+    double theta = 0.0, swell = 0.0;  // the means
     for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         Point& point = result.points[p];
         point.F.noalias() = x * shape_.points[p].gradient.transpose();
@@ -197,15 +204,23 @@ ElasticSolid::Strain ElasticSolid::strain(const NodeColumns& x, const NodeColumn
         } else {
             point.theta = 0.5 * (point.F.squaredNorm() - 3.0);
         }
-        result.theta += shape_.points[p].volume / volume_ * point.theta;
-        result.rate += shape_.points[p].volume / volume_ * point.F.cwiseProduct(point.rate).sum();
+        point.swell = point.F.cwiseProduct(point.rate).sum();
+        theta += shape_.points[p].volume / volume_ * point.theta;
+        swell += shape_.points[p].volume / volume_ * point.swell;
+    }
+    result.squares = (1.0 - own_) * volume_ * theta * theta;
+    for (std::size_t p = 0; p < shape_.points.size(); ++p) {
+        Point& point = result.points[p];
+        result.squares += own_ * shape_.points[p].volume * point.theta * point.theta;
+        point.theta = (1.0 - own_) * theta + own_ * point.theta;
+        point.swell = (1.0 - own_) * swell + own_ * point.swell;
     }
     return result;
 }
 
 double ElasticSolid::energy(const NodeColumns& x) const {
     const Strain now = strain(x, NodeColumns::Zero(3, x.cols()));
-    double result = 0.5 * lambda_ * volume_ * now.theta * now.theta;
+    double result = 0.5 * lambda_ * now.squares;
     for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         const Point& point = now.points[p];
         const double square = model_ == ElementModel::Corotational
@@ -224,13 +239,14 @@ void ElasticSolid::force(const NodeColumns& x, const NodeColumns& v, double* res
         const Point& point = now.points[p];
         Matrix3d P;
         if (model_ == ElementModel::Corotational) {
-            P = 2.0 * mu_ * (point.F - point.R) + lambda_ * now.theta * point.R;
+            P = 2.0 * mu_ * (point.F - point.R) + lambda_ * point.theta * point.R;
         } else {
-            P = mu_ * point.F * (point.F.transpose() * point.F - Matrix3d::Identity()) + lambda_ * now.theta * point.F;
+            P = mu_ * point.F * (point.F.transpose() * point.F - Matrix3d::Identity()) +
+                lambda_ * point.theta * point.F;
         }
         if (damping_ > 0.0)
             P += damping_ * (2.0 * mu_ * point.F * symmetric_part(point.F.transpose() * point.rate) +
-                             lambda_ * now.rate * point.F);
+                             lambda_ * point.swell * point.F);
         P *= -shape_.points[p].volume;
         f.noalias() += P * shape_.points[p].gradient;
     }
@@ -266,16 +282,20 @@ void ElasticSolid::stiffness(const NodeColumns& x, const NodeColumns& v, double*
         const Point& point = now.points[p];
         const NodeColumns& g = shape_.points[p].gradient;
         const double volume = shape_.points[p].volume;
-        s += volume * (corotational ? point.R : point.F) * g;
+        const NodeColumns own = volume * (corotational ? point.R : point.F) * g;
+        s += own;
+        if (own_ > 0.0) add_outer(own_ * lambda_ / volume, own, own, K);
         Matrix3d S = Matrix3d::Zero();
         if (!corotational)
             S = mu_ * (point.F.transpose() * point.F - Matrix3d::Identity()) +
-                lambda_ * now.theta * Matrix3d::Identity();
+                lambda_ * point.theta * Matrix3d::Identity();
         if (damping_ > 0.0) {
             S += damping_ * (2.0 * mu_ * symmetric_part(point.F.transpose() * point.rate) +
-                             lambda_ * now.rate * Matrix3d::Identity());
-            swelling += volume * point.F * g;
-            swelling_rate += volume * point.rate * g;
+                             lambda_ * point.swell * Matrix3d::Identity());
+            const NodeColumns swells = volume * point.F * g, swells_faster = volume * point.rate * g;
+            swelling += swells;
+            swelling_rate += swells_faster;
+            if (own_ > 0.0) add_outer(damping_ * own_ * lambda_ / volume, swells, swells_faster, K);
         }
         for (Eigen::Index b = 0; b < x.cols(); ++b)
             for (int j = 0; j < 3; ++j) {
@@ -285,7 +305,7 @@ void ElasticSolid::stiffness(const NodeColumns& x, const NodeColumns& v, double*
                     const Matrix3d Y = point.R.transpose() * dF;
                     const Vector3d axial(Y(2, 1) - Y(1, 2), Y(0, 2) - Y(2, 0), Y(1, 0) - Y(0, 1));
                     dP += 2.0 * mu_ * dF +
-                          (lambda_ * now.theta - 2.0 * mu_) * point.R * skew(Vector3d(point.turning * axial));
+                          (lambda_ * point.theta - 2.0 * mu_) * point.R * skew(Vector3d(point.turning * axial));
                 } else {
                     dP += 2.0 * mu_ * point.F * symmetric_part(point.F.transpose() * dF);
                 }
@@ -295,8 +315,8 @@ void ElasticSolid::stiffness(const NodeColumns& x, const NodeColumns& v, double*
                 add_column(change, 3 * b + j, K);
             }
     }
-    add_outer(lambda_ / volume_, s, s, K);
-    if (damping_ > 0.0) add_outer(damping_ * lambda_ / volume_, swelling, swelling_rate, K);
+    add_outer((1.0 - own_) * lambda_ / volume_, s, s, K);
+    if (damping_ > 0.0) add_outer(damping_ * (1.0 - own_) * lambda_ / volume_, swelling, swelling_rate, K);
 }
 
 void ElasticSolid::damping(const NodeColumns& x, double* result) const {
@@ -307,7 +327,9 @@ void ElasticSolid::damping(const NodeColumns& x, double* result) const {
     NodeColumns swelling = NodeColumns::Zero(3, x.cols()), change(3, x.cols());
     for (const auto& [volume, g] : shape_.points) {
         const Matrix3d F = x * g.transpose();
-        swelling += volume * F * g;
+        const NodeColumns swells = volume * F * g;
+        swelling += swells;
+        if (own_ > 0.0) add_outer(damping_ * own_ * lambda_ / volume, swells, swells, R);
         for (Eigen::Index b = 0; b < x.cols(); ++b)
             for (int j = 0; j < 3; ++j) {
                 const Matrix3d dF = Vector3d::Unit(j) * g.col(b).transpose();
@@ -316,7 +338,7 @@ void ElasticSolid::damping(const NodeColumns& x, double* result) const {
                 add_column(change, 3 * b + j, R);
             }
     }
-    add_outer(damping_ * lambda_ / volume_, swelling, swelling, R);
+    add_outer(damping_ * (1.0 - own_) * lambda_ / volume_, swelling, swelling, R);
 }
 
 }  // namespace delassus::mechanics

@@ -52,6 +52,7 @@ struct SolidShape {
     };
     std::vector<Point> points;
     std::vector<double> share;  ///< of the mass that goes to each node; their sum is 1
+    double own_bulk = 0.0;  ///< λ/μ up to which each point's change of volume is its own; beyond, all have the mean
 };
 
 /// Throws InputError if the element has no volume or is inverted (negative det of its edges). nodes: for the message.
@@ -63,9 +64,9 @@ struct SolidShape {
 /// The corners as in brick_tetrahedra.
 [[nodiscard]] SolidShape brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vector3d, 8>& positions);
 
-/// An elastic material with Rayleigh damping between nodes. Its change of volume counts as the mean over the element
-/// (Nagtegaal, Parks and Rice, Comput. Methods Appl. Mech. Engrg. 4, 1974), so that elements of several points do not
-/// lock where the material hardly changes its volume.
+/// An elastic material with Rayleigh damping between nodes. What λ is beyond SolidShape::own_bulk counts for the mean
+/// change of volume over the element (Nagtegaal, Parks and Rice, Comput. Methods Appl. Mech. Engrg. 4, 1974), so that
+/// elements of several points do not lock where the material hardly changes its volume.
 class ElasticSolid {
 public:
     ElasticSolid(SolidShape shape, const ElasticMaterial& material, ElementModel model);
@@ -88,6 +89,7 @@ private:
 
     ElementModel model_;
     double lambda_, mu_, density_, damping_, damping_rate_;
+    double own_;  // the share of λ that counts for each point's own change of volume
     double volume_ = 0.0;
     SolidShape shape_;
 };
