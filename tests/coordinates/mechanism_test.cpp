@@ -191,7 +191,8 @@ INSTANTIATE_TEST_SUITE_P(Mechanisms, Agreement, testing::ValuesIn(mechanisms()),
 
 // With steps at which the error is well above rounding.
 TEST(ExplicitOrders, WithAndWithoutLoops) {
-    for (auto [name, longest] : {std::pair{"balls", 1.6e-2}, {"four-bar", 1.6e-2}, {"spatial loop", 2.5e-3}}) {
+    for (const auto& [wanted, longest] : {std::pair{"balls", 1.6e-2}, {"four-bar", 1.6e-2}, {"spatial loop", 2.5e-3}}) {
+        const std::string name = wanted;
         const auto all = mechanisms();
         const auto found = std::find_if(all.begin(), all.end(), [&](const Mechanism& one) { return one.name == name; });
         ASSERT_NE(found, all.end());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Springs, damping and dry friction of joints, and actuators, against closed forms.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -218,11 +218,9 @@ TEST(Overconstrained, ATurningBennettLinkageChangesTheRowsItKeeps) {
 
 TEST(Overconstrained, GoesOnWithTheRowsOfItsCheckpoint) {
     for (const auto& [method, coordinates] : {std::pair{"hht", "maximal"}, {"dormand_prince", "joint"}}) {
-        const auto scene = [&] {
-            return parse_scene(
-                Bennett().scene(6, "linear: {start: 0, rate: 1.7}", head(method, 0.002, 4.0, "[0, 0, 0]", coordinates)),
-                "bennett");
-        };
+        const std::string text =
+            Bennett().scene(6, "linear: {start: 0, rate: 1.7}", head(method, 0.002, 4.0, "[0, 0, 0]", coordinates));
+        const auto scene = [&] { return parse_scene(text, "bennett"); };
         Running whole(scene()), resumed(scene());
         while (whole.simulation.state().t < 1.5) whole.simulation.step();
         EXPECT_NE(whole.system().kept_rows(), resumed.system().kept_rows());
