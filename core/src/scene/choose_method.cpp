@@ -6,6 +6,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace delassus::scene {
@@ -65,8 +66,8 @@ public:
             {std::sqrt(radius(&MultibodySystem::add_stiffness)), radius(&MultibodySystem::add_damping), spin});
     }
 
-    /// From now on velocities are those that joints allow. Rows that repeat each other make C M⁻¹ Cᵀ singular: its
-    /// diagonal is raised by rounding.
+    /// From now on velocities are those that joints allow, if that can be found out. Rows that repeat each other make
+    /// C M⁻¹ Cᵀ singular: its diagonal is raised by rounding.
     void hold_joints() {
         const std::int32_t m = mechanics_.m();
         C_ = assembled(m, n_, [&](MatrixAssembler& target) { mechanics_.add_constraint_jacobian(start_, 0, target); });
@@ -74,6 +75,7 @@ public:
         Matrix S = C_ * Matrix(M_.solve(columns));
         for (std::int32_t i = 0; i < m; ++i) S.coeffRef(i, i) *= 1.0 + 1e-9;
         S_.compute(S);
+        if (S_.info() != Eigen::Success) C_.resize(0, n_);  // a bound all the same: that of the bodies alone
     }
 
 private:
@@ -92,7 +94,7 @@ private:
             radius = x.norm();
             if (!(radius > 0.0) || !std::isfinite(radius)) break;
         }
-        return radius;
+        return std::isfinite(radius) ? radius : std::numeric_limits<double>::infinity();
     }
 
     const MultibodySystem& mechanics_;

@@ -165,7 +165,8 @@ private:
                 if (!held.contains(static_cast<std::int32_t>(i))) loops.push_back(system_.joints[i].name);
             keep("joint coordinates",
                  fmt::format("{}: {} velocities{}",
-                             system_.coordinates_chosen ? "joints make trees" : "the scene asks for them", joints->n(),
+                             system_.coordinates_chosen ? "the scene names none" : "the scene asks for them",
+                             joints->n(),
                              loops.empty() ? std::string(", no loops") : "; as rows stay " + some_of(loops)));
             leave(fmt::format("{} of {} velocities and {} rows", joints->body_velocities() - joints->n(),
                               joints->body_velocities(), of_trees),

@@ -148,14 +148,14 @@ void Simulation::make_method() {
     if (system_->control) {
         control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
     } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
-        // Short enough for a jump of velocities: a part across it of the size h errs by h times the jump.
+        // So short a part can pass a jump of velocities: it errs by its size times the jump.
         constexpr double shortest = 1e-6;
         const double step = system_->step;
         control_ = std::make_unique<AdaptiveStepping>(
             dynamics(), *timestepper_,
             StepControl{.absolute = limit, .initial = step, .smallest = shortest * step, .largest = step},
-            fmt::format("{} cannot follow the motion, as near a configuration in which a mechanism jams or branches; "
-                        "take another integrator, such as euler_implicit_linearized, which is the roughest",
+            fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
+                        "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
                         system_->integrator));
     }
 }
