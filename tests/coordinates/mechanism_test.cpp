@@ -120,8 +120,9 @@ struct Finished {
 class Agreement : public testing::TestWithParam<Mechanism> {};
 
 TEST_P(Agreement, OfJointAndMaximalCoordinates) {
-    const Finished joint(GetParam().text, "joint", "rk4", 1e-3, 1.0);
-    const Finished maximal(GetParam().text, "maximal", "rk4", 1e-3, 1.0);
+    const double end = GetParam().name == "planar" ? 2.0 : 5.0;  // in 5 s it magnifies rounding by 3e5
+    const Finished joint(GetParam().text, "joint", "dormand_prince", 1e-3, end);
+    const Finished maximal(GetParam().text, "maximal", "dormand_prince", 1e-3, end);
     EXPECT_LE(joint.off(maximal), 1e-9);
     EXPECT_LE(joint.simulation.totals().worst_drift, 1e-13);
     EXPECT_LT(joint.simulation.joint_coordinates()->n(), maximal.scene.systems[0].system->n());
