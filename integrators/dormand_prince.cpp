@@ -27,7 +27,8 @@ const RegisterTimestepper dormand_prince_row{
                   .minimum = std::numeric_limits<double>::min(),
                   .maximum = HUGE_VAL,
                   .unit = "m, rad",
-                  .doc = "a tolerance: a step of a fixed size is taken in as many parts as steps by tolerance would be"}},
+                  .doc =
+                      "a tolerance: a step of a fixed size is taken in as many parts as steps by tolerance would be"}},
      .constraints = true,
      .unilateral = false,
      .order = 5,

@@ -28,10 +28,11 @@ namespace delassus {
 // A method of order p with an embedded one of order p − 1 gives their difference, the error of the latter, c h^p. It
 // takes one trial in place of three. The result is that of order p, as with the sum.
 //
-// What is bounded: with the sum, the error of a step; with an embedded method likewise, by a hundredth of the tolerance;
-// without, the error of a step divided by its size. Each way the error at a fixed time is proportional to the tolerance,
-// and the estimate to h^{p+1} or h^p. The hundredth makes the error at the end of a run about the tolerance: steps of
-// order 5 are long, some hundreds a run, and mechanisms magnify errors by some ten (docs/references.md).
+// What is bounded: with the sum, the error of a step; with an embedded method likewise, by a hundredth of the
+// tolerance; without, the error of a step divided by its size. Each way the error at a fixed time is proportional to
+// the tolerance, and the estimate to h^{p+1} or h^p. The hundredth makes the error at the end of a run about the
+// tolerance: steps of order 5 are long, some hundreds a run, and mechanisms magnify errors by some ten
+// (docs/references.md).
 
 namespace {
 
