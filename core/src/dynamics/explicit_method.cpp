@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+
+#include "dynamics/return_to_constraints.hpp"
 
 namespace delassus {
 
@@ -21,7 +21,6 @@ ExplicitMethod::ExplicitMethod(DynamicalSystem& system, ButcherTableau tableau, 
     v_ = u_;
     increment_.setZero(n_);
     stage_v_.setZero(n_);
-    constraint_.resize(static_cast<std::size_t>(m_));
 }
 
 void ExplicitMethod::restart() {
@@ -106,8 +105,7 @@ void ExplicitMethod::take_step(State& state, double h, StepSolver& solver, StepR
     end_.t = state.t + h;
     require_finite(state, end_, h, tableau_.name);
     if (m_ > 0) {
-        project_positions(state, end_, h, solver, report);
-        project_velocities(end_, solver, report);
+        return_to_constraints(state, h, solver, report);
         require_finite(state, end_, h, tableau_.name);
     }
     known_ = m_ > 0 || !tableau_.error.empty();
@@ -144,47 +142,17 @@ Problem ExplicitMethod::nearest(const State& state) {
     return problem;
 }
 
-namespace {
-
-double largest(const std::vector<double>& values) {
-    double most = 0.0;
-    for (const double value : values) most = std::max(most, std::abs(value));
-    return most;
-}
-
-}  // namespace
-
-void ExplicitMethod::project_positions(const State& begin, State& end, double h, StepSolver& solver,
-                                       StepReport& report) {
-    constexpr int most_iterations = 10;
-    constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    const double rounding = 16.0 * epsilon * (1.0 + largest(end.q));
-    double last = std::numeric_limits<double>::infinity();
-    for (int i = 0;; ++i) {
-        system_.constraint(end, constraint_.data());
-        const double off = largest(constraint_);
-        // Below 1e-10 what no longer falls is rounding.
-        if (off <= rounding || (off <= 1e-10 && off > 0.25 * last)) return;
-        if (!(off < last) || i == most_iterations)
-            throw StepTooLong(fmt::format(
-                "{} cannot take the step from t = {:.9g} with h = {:.9g}: its end is too far from where the "
-                "constraints hold (off by {:.3g}); take shorter steps",
-                tableau_.name, begin.t, h, off));
-        last = off;
-        Problem problem = nearest(end);
-        problem.b = constraint_;
+void ExplicitMethod::return_to_constraints(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    const auto least = [&](const std::vector<double>& off) -> const Vector& {
+        Problem problem = nearest(end_);
+        problem.b = off;
         solution_ = solve_linear(std::move(problem), solver, report);
-        system_.increment(end.q.data(), solution_.x.data(), end.q.data());
-    }
-}
-
-void ExplicitMethod::project_velocities(State& end, StepSolver& solver, StepReport& report) {
-    Problem problem = nearest(end);
-    system_.constraint_rate(end, constraint_.data());
-    problem.D.multiply_add(1.0, end.v.data(), constraint_.data());
-    problem.b = constraint_;
-    solution_ = solve_linear(std::move(problem), solver, report);
-    for (std::int32_t i = 0; i < n_; ++i) end.v[static_cast<std::size_t>(i)] += solution_.x[i];
+        return solution_.x;
+    };
+    return_positions(system_, tableau_.name, begin, end_, h, least);
+    D_.begin(m_, n_);
+    system_.add_constraint_jacobian(end_, 0, D_);
+    return_velocities(system_, tableau_.name, begin, end_, h, D_.finish(), least);
 }
 
 }  // namespace delassus

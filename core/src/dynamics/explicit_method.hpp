@@ -64,8 +64,7 @@ public:
 private:
     void take_step(State& state, double h, StepSolver& solver, StepReport& report) override;
     void begin(const State& state, StepSolver& solver, StepReport& report);
-    void project_positions(const State& begin, State& end, double h, StepSolver& solver, StepReport& report);
-    void project_velocities(State& end, StepSolver& solver, StepReport& report);
+    void return_to_constraints(const State& begin, double h, StepSolver& solver, StepReport& report);
     /// M x − Dᵀ μ = 0, D x + b = 0 with M and D at the state; b is left to the caller.
     [[nodiscard]] Problem nearest(const State& state);
 
@@ -83,7 +82,6 @@ private:
     State stage_, end_;
     std::vector<DiagonalBlock3> blocks_;
     LinearSolution solution_;
-    std::vector<double> constraint_;
     MatrixAssembler M_, D_;
 };
 
