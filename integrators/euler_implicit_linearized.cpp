@@ -78,7 +78,7 @@ public:
 
     [[nodiscard]] int order() const override { return 1; }
     [[nodiscard]] bool damps_at_once() const override { return true; }
-    void choose_steps() override { follows_sliding_ = true; }
+    void choose_steps(double /*tolerance*/) override { follows_sliding_ = true; }
     void restart() override {
         multipliers_.clear();
         kept_.clear();

@@ -43,6 +43,22 @@ TEST(Energy, NeverGrowsWithImplicitEuler) {
             }
 }
 
+// It is algebraically stable: what contracts in a norm contracts in it (Hairer and Wanner II, sec. IV.12).
+TEST(Energy, NeverGrowsWithRadauIIA) {
+    for (const double omega : frequencies)
+        for (const auto& start : starts(omega)) {
+            LinearOscillators system(omega, 0.5 * omega, start);
+            double before = system.energy(start);
+            for (const auto& state : states("radau_iia", {{"newton_tolerance", "1e-13"}}, system, 100)) {
+                EXPECT_LE(system.energy(state), before * (1.0 + 1e-11)) << omega;
+                before = system.energy(state);
+            }
+            if (omega >= 1e2) {
+                EXPECT_LE(before, 1e-3 * system.energy(start)) << "fast modes vanish, at " << omega;
+            }
+        }
+}
+
 TEST(Energy, StaysWithTheTrapezoidalRule) {
     for (const char* method : {"trapezoidal", "trapezoidal_linearized", "newmark"})
         for (const double omega : frequencies)

@@ -88,9 +88,10 @@ TEST_P(Memory, ARestartForgets) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, Memory,
                          testing::Values(Method{"euler_explicit", {}}, Method{"rk4", {}}, Method{"dormand_prince", {}},
-                                         Method{"euler_implicit_linearized", {}}, Method{"euler_implicit", {}},
-                                         Method{"trapezoidal", {}}, Method{"trapezoidal_linearized", {}},
-                                         Method{"newmark", {}}, Method{"hht", {}}, Method{"generalized_alpha", {}},
+                                         Method{"radau_iia", {}}, Method{"euler_implicit_linearized", {}},
+                                         Method{"euler_implicit", {}}, Method{"trapezoidal", {}},
+                                         Method{"trapezoidal_linearized", {}}, Method{"newmark", {}}, Method{"hht", {}},
+                                         Method{"generalized_alpha", {}},
                                          Method{"generalized_alpha", {{"reuse", "adaptive"}}},
                                          Method{"generalized_alpha", {{"reuse", "modified"}}},
                                          Method{"moreau_jean", {}}, Method{"nonsmooth_generalized_alpha", {}},
@@ -126,7 +127,7 @@ TEST(Refusals, ExplicitEulerTakesNoConstraints) {
     const std::string others =
         " takes no constraints; the system has 1 rows of them. Can: dormand_prince, euler_implicit, "
         "euler_implicit_linearized, generalized_alpha, hht, linearly_implicit_trapezoidal, moreau_jean, newmark, "
-        "nonsmooth_generalized_alpha, rk4, trapezoidal, "
+        "nonsmooth_generalized_alpha, radau_iia, rk4, trapezoidal, "
         "trapezoidal_linearized";
     expect_refusal("euler_explicit", pendulum, {}, "euler_explicit" + others);
 }

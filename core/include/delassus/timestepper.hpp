@@ -90,6 +90,8 @@ public:
 
     /// Whether it estimates its own errors, by a method of one order less that it has in it. Default: no.
     [[nodiscard]] virtual bool has_embedded_error() const { return false; }
+    /// The order of that method: the estimate falls with this power of h and one more. Default: order() − 1.
+    [[nodiscard]] virtual int embedded_order() const { return order() - 1; }
     /// The estimate for the last step; valid until the next. Empty by default.
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
     /// The tolerance, as StepControl::absolute, by which a step of a fixed size is to be taken in parts. Infinity by
@@ -98,9 +100,10 @@ public:
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
     [[nodiscard]] virtual double reaction_growth() const { return 0.0; }
-    /// Says, before the first step, that steps of chosen sizes follow: what the method lets depend on h besides its
-    /// error, as the height at which a sliding contact of the associated law floats, has to go. Default: nothing.
-    virtual void choose_steps() {}
+    /// Says, before the first step, that steps of sizes follow that a tolerance chooses (StepControl::absolute): what
+    /// the method lets depend on h besides its error, as the height at which a sliding contact of the associated law
+    /// floats, has to go, and what it leaves of its iterations may follow the tolerance. Default: nothing.
+    virtual void choose_steps(double /*tolerance*/) {}
 
     /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
     [[nodiscard]] virtual std::vector<double> save() const;

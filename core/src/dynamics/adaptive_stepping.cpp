@@ -32,7 +32,9 @@ namespace delassus {
 // tolerance; without, the error of a step divided by its size. Each way the error at a fixed time is proportional to
 // the tolerance, and the estimate to h^{p+1} or h^p. The hundredth makes the error at the end of a run about the
 // tolerance: steps of order 5 are long, some hundreds a run, and mechanisms magnify errors by some ten
-// (docs/references.md).
+// (docs/references.md). Where the embedded method is of an order p̂ below p − 1, its error ĉ h^{p̂+1} says more than it
+// should: the error at a fixed time falls as h^p, so that the bound is the tolerance (in m and rad) to the power
+// (p̂ + 1)/p.
 
 namespace {
 
@@ -67,7 +69,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
             "with joints a \"tolerance\" needs a method in which errors of the reactions decay: in this one they "
             "oscillate for ever, and no step would be short enough; take hht, generalized_alpha or euler_implicit, or "
             "give a fixed \"step\"");
-    stepper.choose_steps();
+    stepper.choose_steps(control.absolute);
 }
 
 double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h) const {
@@ -86,11 +88,12 @@ double AdaptiveStepping::error_of(const State& begin, const State& whole, const 
 }
 
 double AdaptiveStepping::error_of(const State& begin, const State& end, const EmbeddedError& error, double h) const {
+    const double exponent = (stepper_.embedded_order() + 1.0) / stepper_.order();
     double worst = 0.0;
     for (std::size_t i = 0; i < error.positions.size(); ++i) {
         const double speed = std::max(std::abs(begin.v[i]), std::abs(end.v[i]));
-        const double ratio = std::max(std::abs(error.positions[i]), h * std::abs(error.velocities[i])) /
-                             (share_of_step * (control_.absolute + control_.relative * speed));
+        const double allowed = share_of_step * std::pow(control_.absolute + control_.relative * speed, exponent);
+        const double ratio = std::max(std::abs(error.positions[i]), h * std::abs(error.velocities[i])) / allowed;
         worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
     }
     return worst;
@@ -303,6 +306,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
 }
 
 double AdaptiveStepping::power() const {
+    if (embedded_) return stepper_.embedded_order() + 1.0;
     return stepper_.order() + (extrapolates_ ? 1.0 : 0.0);
 }
 

@@ -37,8 +37,8 @@ void require_finite(const State& begin, const State& end, double h, std::string_
                                       method, begin.t, h));
 }
 
-LinearSolution solve_linear(Problem problem, StepSolver& solver, StepReport& report) {
-    problem.name = "step";
+LinearSolution solve_linear(Problem problem, StepSolver& solver, StepReport& report, std::string_view name) {
+    problem.name = name;
     const auto n = problem.n(), m = problem.m();
     Solution solution;
     if (!solver.solve(std::move(problem), solution, false)) {

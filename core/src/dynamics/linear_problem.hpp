@@ -29,8 +29,8 @@ void require_step(const DynamicalSystem& system, const State& begin, double h, s
 /// Throws StepFailure if the end of a step holds a number that is not finite.
 void require_finite(const State& begin, const State& end, double h, std::string_view method);
 
-/// Solves, and counts it in the report.
-LinearSolution solve_linear(Problem problem, StepSolver& solver, StepReport& report);
+/// Solves, and counts it in the report. What was prepared for problems of the same name serves again.
+LinearSolution solve_linear(Problem problem, StepSolver& solver, StepReport& report, std::string_view name = "step");
 
 /// Accelerations and multipliers that fit a state: M v̇ − C_qᵀ λ = f,  C_q v̇ + (C_q v)_q v + 2 C_qt v + C_tt = 0.
 class Accelerations {

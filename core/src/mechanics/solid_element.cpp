@@ -159,6 +159,43 @@ SolidShape brick(const std::array<std::int32_t, 8>& nodes, const std::array<Vect
 //
 // Damping, for both: a stress F (2μτ Ė + λτ tr(Ė) I) with Ė = sym(Fᵀ Ḟ), which rigid motion does not feel; tr(Ė) is
 // shared out likewise. Damping by the mass adds −α m_a v_a.
+namespace {
+
+/// Σ x_a ⊗ g_a.
+Matrix3d gradient_of(const NodeColumns& x, const NodeColumns& g) {
+    Matrix3d result = Matrix3d::Zero();
+    for (Eigen::Index a = 0; a < x.cols(); ++a) result += x.col(a) * g.col(a).transpose();
+    return result;
+}
+
+// The rotation R of F = R U. Newton's method for Xᵀ X = I, X ← ½ (γ X + X⁻ᵀ/γ) with the scale γ² = ‖X⁻¹‖/‖X‖, keeps R
+// and converges quadratically, here in four or so iterations (Higham, SIAM J. Sci. Stat. Comput. 7, 1986). Of an
+// element that is nearly flat or inverted it is the nearest rotation, by singular values.
+Matrix3d rotation_of(const Matrix3d& F) {
+    constexpr double nearly_flat = 1e-3, nearly_there = 1e-9;
+    constexpr int most_iterations = 12;
+    Matrix3d X = F;
+    const double size = F.norm();
+    if (F.determinant() > nearly_flat * size * size * size) {
+        for (int i = 0; i < most_iterations; ++i) {
+            Matrix3d Y;
+            Y << X.col(1).cross(X.col(2)), X.col(2).cross(X.col(0)), X.col(0).cross(X.col(1));
+            Y /= X.col(0).dot(Y.col(0));
+            const double gamma = std::sqrt(Y.norm() / X.norm());
+            const Matrix3d next = 0.5 * gamma * X + (0.5 / gamma) * Y;
+            const double change = (next - X).norm();
+            X = next;
+            if (change <= nearly_there) return X;
+        }
+    }
+    const Eigen::JacobiSVD<Matrix3d> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Matrix3d W = svd.matrixU();
+    if (W.determinant() * svd.matrixV().determinant() < 0.0) W.col(2) *= -1.0;
+    return W * svd.matrixV().transpose();
+}
+
+}  // namespace
+
 struct ElasticSolid::Point {
     Matrix3d F, rate;
     Matrix3d R = Matrix3d::Identity();
@@ -188,15 +225,10 @@ ElasticSolid::Strain ElasticSolid::strain(const NodeColumns& x, const NodeColumn
     double theta = 0.0, swell = 0.0;  // the means
     for (std::size_t p = 0; p < shape_.points.size(); ++p) {
         Point& point = result.points[p];
-        point.F.noalias() = x * shape_.points[p].gradient.transpose();
-        point.rate.noalias() = v * shape_.points[p].gradient.transpose();
+        point.F = gradient_of(x, shape_.points[p].gradient);
+        point.rate = gradient_of(v, shape_.points[p].gradient);
         if (model_ == ElementModel::Corotational) {
-            const Eigen::JacobiSVD<Matrix3d> svd(point.F, Eigen::ComputeFullU | Eigen::ComputeFullV);
-            Matrix3d W = svd.matrixU();
-            const Matrix3d& V = svd.matrixV();
-            // An inverted element: the nearest rotation.
-            if (W.determinant() * V.determinant() < 0.0) W.col(2) *= -1.0;
-            point.R = W * V.transpose();
+            point.R = rotation_of(point.F);
             const Matrix3d U = symmetric_part(point.R.transpose() * point.F);
             const Matrix3d sum = U.trace() * Matrix3d::Identity() - U;
             if (std::abs(sum.determinant()) > 1e-12) point.turning = sum.inverse();

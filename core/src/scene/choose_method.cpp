@@ -7,25 +7,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace delassus::scene {
 namespace {
 
 // ---- Which method pays ----
 //
-// A system in which nothing can touch and nothing is stiff has smooth motions, and an explicit method of order 5 takes
-// them for the price of a few implicit steps of order 1 with errors smaller by orders. It pays as long as its steps are
-// limited by accuracy. Its stability limit is h ω ≈ 1 to 3 for the fastest motion ω, and a step beyond it is divided,
-// so that h ω says into how many parts. With joints the velocities are those with C_q v = 0: x ← P M⁻¹ A x with the
-// projection P = 1 − M⁻¹ C_qᵀ (C_q M⁻¹ C_qᵀ)⁻¹ C_q has the eigenvalues of A among them. None is above the largest of
-// the bodies without joints, as eigenvalues of a projected pencil lie between those of the whole: so the joints are
-// looked at only where the bodies alone are too fast.
+// Where nothing can touch, motions are smooth, and methods of order 5 take them for the price of a few implicit steps
+// of order 1 with errors smaller by orders. An explicit one pays as long as its steps are limited by accuracy. Its
+// stability limit is h ω ≈ 1 to 3 for the fastest motion ω, and a step beyond it is divided, so that h ω says into how
+// many parts. Beyond that an implicit one does, whose steps cost some fifteen explicit parts. With joints the
+// velocities are those with C_q v = 0: x ← P M⁻¹ A x with the projection P = 1 − M⁻¹ C_qᵀ (C_q M⁻¹ C_qᵀ)⁻¹ C_q has the
+// eigenvalues of A among them. None is above the largest of the bodies without joints, as eigenvalues of a projected
+// pencil lie between those of the whole: so the joints are looked at only where the bodies alone are too fast.
 
-/// h ω up to which an explicit step, in parts, costs a few times what the implicit one of order 1 does, or less. In
-/// trees accelerations follow from link to link: a part costs a fiftieth of an implicit step (measured:
-/// examples/scenes/governor.yaml).
-constexpr double most_rate = 50.0, most_rate_in_trees = 500.0;
+/// h ω up to which explicit parts cost less than an implicit step (measured: docs/integrators.md).
+constexpr double most_explicit_rate = 50.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
 /// m and rad.
@@ -114,28 +111,6 @@ bool can_be_in_a_tree(const SceneSystem& system, const JointParameters& joint) {
     return !row_alone && !told(joint.first) && !told(joint.second);
 }
 
-/// Whether its joints leave no row in joint coordinates: bodies and ground are trees of them.
-bool is_tree(const SceneSystem& system) {
-    const auto ground = system.bodies.size();
-    const auto node = [&](BodyIndex body) {
-        return body == world_body || system.bodies[static_cast<std::size_t>(body)].fixed
-                   ? ground
-                   : static_cast<std::size_t>(body);
-    };
-    std::vector<std::size_t> parent(ground + 1);
-    std::iota(parent.begin(), parent.end(), std::size_t{0});
-    const auto root = [&](std::size_t i) {
-        while (parent[i] != i) i = parent[i] = parent[parent[i]];
-        return i;
-    };
-    return std::all_of(system.joints.begin(), system.joints.end(), [&](const JointParameters& joint) {
-        if (!can_be_in_a_tree(system, joint)) return false;
-        const std::size_t first = root(node(joint.first)), second = root(node(joint.second));
-        parent[first] = second;
-        return first != second;
-    });
-}
-
 /// Why only the default of all systems takes it; empty: others do.
 std::string why_default(const SceneSystem& system) {
     const MultibodySystem& mechanics = *system.system;
@@ -143,12 +118,12 @@ std::string why_default(const SceneSystem& system) {
     if (!system.leave_out) return "leave_out is false";
     if (system.sleeping) return "bodies may sleep";
     if (mechanics.n() == 0) return "nothing moves";
-    if (mechanics.node_count() > 0) return "it has nodes of elastic bodies or cables";
+    if (!mechanics.cables().empty()) return "it has cables, which go slack";
     if (mechanics.detects_contacts()) return "bodies may touch";
     return {};
 }
 
-/// Why a step would be too long for a method that takes h ω up to `most`; empty: it is not.
+/// How fast forces are, for a method that takes h ω up to `most`; empty: it takes them.
 std::string why_stiff(const SceneSystem& system, double most) {
     // A tolerance chooses its steps; these are as long as its users take them.
     const double step = system.control ? std::min(system.control->largest, 0.01) : system.step;
@@ -157,7 +132,7 @@ std::string why_stiff(const SceneSystem& system, double most) {
     if (system.system->m() > 0) rates.hold_joints();
     const double rate = rates.fastest();
     if (rate * step <= most) return {};
-    return fmt::format("its forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
+    return fmt::format("forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
 }
 
 }  // namespace
@@ -167,7 +142,9 @@ void choose_method(SceneSystem& system) {
     system.integrator = "euler_implicit_linearized";
     system.method_reason = why_default(system);
     if (!system.method_reason.empty()) return;
+    // Joint coordinates take rigid bodies alone.
     const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
+                           system.system->node_count() == 0 &&
                            std::any_of(system.joints.begin(), system.joints.end(),
                                        [&](const JointParameters& joint) { return can_be_in_a_tree(system, joint); });
     const bool unilateral = system.system->has_unilateral();
@@ -175,10 +152,11 @@ void choose_method(SceneSystem& system) {
         system.method_reason = "joints have stops, dry friction or forces with limits";
         return;
     }
-    system.method_reason = why_stiff(system, unilateral                     ? most_rate_of_order_2
-                                             : in_joints && is_tree(system) ? most_rate_in_trees
-                                                                            : most_rate);
-    if (!system.method_reason.empty()) return;
+    const std::string stiff = why_stiff(system, unilateral ? most_rate_of_order_2 : most_explicit_rate);
+    if (unilateral && !stiff.empty()) {
+        system.method_reason = stiff;
+        return;
+    }
     if (in_joints) system.coordinates = Coordinates::Joint;
     if (unilateral) {
         system.integrator = "moreau_jean";
@@ -186,8 +164,8 @@ void choose_method(SceneSystem& system) {
             "nothing can touch, joints have stops, dry friction or forces with limits, and no force is stiff";
         return;
     }
-    system.integrator = "dormand_prince";
-    system.method_reason = "nothing can touch, and no force is stiff";
+    system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";
+    system.method_reason = "nothing can touch, and " + (stiff.empty() ? "no force is stiff" : stiff);
     if (!system.control) system.integrator_options.insert_or_assign("error_limit", error_limit);
 }
 
