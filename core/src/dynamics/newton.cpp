@@ -191,10 +191,11 @@ constexpr double shortest_part = 1.0 / 64.0;
 /// One step's iteration, from a guess of its end.
 class Newton::Iteration {
 public:
-    Iteration(Newton& newton, const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
-              StepSolver& solver, StepReport& report)
+    Iteration(Newton& newton, Reuse reuse, const State& begin, double h, StepSlopes slopes, StepPoint& point,
+              StepResidual& residual, StepSolver& solver, StepReport& report)
         : newton_(newton),
           settings_(newton.settings_),
+          reuse_(reuse),
           begin_(begin),
           h_(h),
           slopes_(slopes),
@@ -209,7 +210,7 @@ public:
 
     void run() {
         const Kept& kept = newton_.kept_;
-        renew_ = !(kept.valid && settings_.reuse == Reuse::Adaptive && kept.slopes.beta == slopes_.beta &&
+        renew_ = !(kept.valid && reuse_ == Reuse::Adaptive && kept.slopes.beta == slopes_.beta &&
                    kept.slopes.gamma == slopes_.gamma);
         if (!renew_) newton_.scale();
         newton_.exact_ = settings_.exact;
@@ -348,8 +349,8 @@ private:
         const double theta = trial_rho_ / rho_;
         const double rest = (theta < 0.5 ? theta / (1.0 - theta) : 1.0) * part_ * size(increment_.x);
         rho_ = trial_rho_;
-        renew_ = settings_.reuse == Reuse::Full || newton_.exact_ != settings_.exact ||
-                 theta > (settings_.reuse == Reuse::Modified ? 0.5 : 0.1);
+        renew_ = reuse_ == Reuse::Full || newton_.exact_ != settings_.exact ||
+                 theta > (reuse_ == Reuse::Modified ? 0.5 : 0.1);
         return rho_ <= threshold_ && rest <= threshold_;
     }
 
@@ -363,6 +364,7 @@ private:
 
     Newton& newton_;
     const NewtonSettings& settings_;
+    const Reuse reuse_;
     const State& begin_;
     const double h_;
     const StepSlopes slopes_;
@@ -387,7 +389,20 @@ private:
 
 void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
                    StepSolver& solver, StepReport& report) {
-    Iteration(*this, begin, h, slopes, point, residual, solver, report).run();
+    const auto run = [&](Reuse reuse) {
+        Iteration(*this, reuse, begin, h, slopes, point, residual, solver, report).run();
+    };
+    if (settings_.reuse == Reuse::Full || settings_.linearized) return run(Reuse::Full);
+    const StepPoint guess = point;
+    const StepResidual guessed = residual;
+    try {
+        run(settings_.reuse);
+    } catch (const StepFailure&) {
+        // Old matrices may lead astray where new ones do not.
+        point = guess;
+        residual = guessed;
+        run(Reuse::Full);
+    }
 }
 
 // exp is one to one for turns by less than 2π only, where T is singular: a body that turns further in a step comes to
@@ -480,7 +495,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
         jacobian_option("symmetric"),
         {.key = "reuse",
          .type = DELASSUS_OPTION_CHOICE,
-         .default_value = "full",
+         .default_value = "modified",
          .choices = {"full", "modified", "adaptive"},
          .doc = "a new matrix in every iteration, once a step, or when the residual falls too slowly"},
         {.key = "newton_tolerance",

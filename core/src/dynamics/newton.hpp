@@ -14,7 +14,8 @@
 
 namespace delassus {
 
-/// When H and D are assembled anew. The residual is exact with each of them.
+/// When H and D are assembled anew. The residual is exact with each of them, and a step that one of the latter two does
+/// not find is tried again with the first.
 enum class Reuse {
     Full,      ///< in every iteration
     Modified,  ///< once a step, and again where an iteration does not halve the residual

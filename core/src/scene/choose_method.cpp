@@ -23,6 +23,9 @@ namespace {
 
 /// h ω up to which explicit parts cost less than an implicit step (measured: docs/integrators.md).
 constexpr double most_explicit_rate = 50.0;
+/// With nodes: elements vibrate in as many ways as they have nodes, without damping, and a share of each tolerance
+/// feeds all of them where steps are near the stability limit.
+constexpr double most_explicit_rate_of_elements = 1.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
 /// m and rad.
@@ -152,7 +155,9 @@ void choose_method(SceneSystem& system) {
         system.method_reason = "joints have stops, dry friction or forces with limits";
         return;
     }
-    const std::string stiff = why_stiff(system, unilateral ? most_rate_of_order_2 : most_explicit_rate);
+    const std::string stiff = why_stiff(system, unilateral                        ? most_rate_of_order_2
+                                                : system.system->node_count() > 0 ? most_explicit_rate_of_elements
+                                                                                  : most_explicit_rate);
     if (unilateral && !stiff.empty()) {
         system.method_reason = stiff;
         return;
