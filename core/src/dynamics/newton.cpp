@@ -495,7 +495,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
         jacobian_option("symmetric"),
         {.key = "reuse",
          .type = DELASSUS_OPTION_CHOICE,
-         .default_value = "modified",
+         .default_value = "full",
          .choices = {"full", "modified", "adaptive"},
          .doc = "a new matrix in every iteration, once a step, or when the residual falls too slowly"},
         {.key = "newton_tolerance",
