@@ -141,7 +141,8 @@ void Newton::assemble(const StepPoint& point, StepSlopes slopes) {
 //
 //     ρ ≤ tolerance · σ + 10 ε ‖q‖_∞ ‖√diag H‖    and    min(1, θ/(1 − θ)) ‖x‖ ≤ the same
 //
-// where the second term is the change of an increment by the last digits of the positions.
+// where the second term is the change of an increment by the last digits of the positions; or if ρ ≤ 4 ε σ, which no
+// iteration lowers, however far its increments go (a chain of 1000 links has a matrix of a condition of 1e12).
 
 void Newton::scale() {
     root_.setZero(n_);
@@ -304,6 +305,7 @@ private:
                                                    q.lpNorm<Eigen::Infinity>() * newton_.root_.norm()
                                              : 0.0;
         threshold_ = settings_.tolerance * sigma + digits;
+        rounding_ = 4.0 * std::numeric_limits<double>::epsilon() * sigma;
     }
 
     /// One iteration is all: its error is measured instead.
@@ -351,7 +353,7 @@ private:
         rho_ = trial_rho_;
         renew_ = reuse_ == Reuse::Full || newton_.exact_ != settings_.exact ||
                  theta > (reuse_ == Reuse::Modified ? 0.5 : 0.1);
-        return rho_ <= threshold_ && rest <= threshold_;
+        return (rho_ <= threshold_ && rest <= threshold_) || rho_ <= rounding_;
     }
 
     /// What a solver says of an increment is settled by Newton's own convergence. Constraints that repeat each other,
@@ -384,7 +386,7 @@ private:
     StepPoint trial_;
     StepResidual trial_residual_;
     double part_ = 1.0;  // of the increment in the trial
-    double rho_ = 0.0, trial_rho_ = 0.0, threshold_ = 0.0;
+    double rho_ = 0.0, trial_rho_ = 0.0, threshold_ = 0.0, rounding_ = 0.0;
 };
 
 void Newton::solve(const State& begin, double h, StepSlopes slopes, StepPoint& point, StepResidual& residual,
