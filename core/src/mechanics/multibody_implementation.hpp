@@ -8,6 +8,7 @@
 #include "mechanics/beam.hpp"
 #include "mechanics/cable.hpp"
 #include "mechanics/linkage.hpp"
+#include "mechanics/mesh_contacts.hpp"
 #include "mechanics/model.hpp"
 #include "mechanics/solid_element.hpp"
 
@@ -69,7 +70,9 @@ struct MultibodySystem::Implementation {
     double load_factor = 1.0;           // of weight and loads
     double size = 0.0;                  // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
-    bool leaves_out = true;  ///< what no contact needs
+    std::unique_ptr<mechanics::MeshContacts> mesh_contacts;  // null: no two meshes can meet
+    std::vector<std::int32_t> shape_of_node;                 // its sphere among the shapes, −1: none; with meshes only
+    bool leaves_out = true;                                  ///< what no contact needs
 
     // ---- Work space of the call that runs ----
     mutable mechanics::Placements at;
@@ -77,6 +80,8 @@ struct MultibodySystem::Implementation {
     mutable mechanics::RowMatrix hessian;
     std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
     std::vector<BodyDisplacement> displacements;  // of the same; fixed ones have none
+    std::vector<mechanics::Vector3d> node_x, node_way;
+    std::vector<mechanics::MeshContact> mesh_touching;
 
     void must_be_finished() const;
     void must_not_be_finished() const;
@@ -199,6 +204,9 @@ struct MultibodySystem::Implementation {
     /// displacements ← of a step of length h (s).
     void predict_displacements(double h, const State& state);
     void make_detector();
+    void make_mesh_contacts();
+    [[nodiscard]] const NodeContact& node_contact_of(std::int32_t node) const;
+    [[nodiscard]] static std::uint64_t mesh_contact_key(bool of_edges, const std::array<std::uint64_t, 3>& feature);
     void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;
@@ -206,6 +214,8 @@ struct MultibodySystem::Implementation {
     void collect_motors(double t, UnilateralRows& rows) const;
     void collect_actuators(double t, double h, UnilateralRows& rows) const;
     void collect_contacts(UnilateralRows& rows);
+    /// Appends the contacts between meshes, and their rows.
+    void collect_mesh_contacts(const State& state, double h, UnilateralRows& rows);
 };
 
 }  // namespace delassus

@@ -1,0 +1,431 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mechanics/mesh_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace delassus::mechanics {
+
+// ---- What touches between two meshes ----
+//
+// A surface that touches has a layer of the thickness r about it (its radius), so that two surfaces touch at the
+// distance R = r_a + r_b and every contact has a direction: that of the shortest way between two features. As with
+// terrain (collision/terrain_contacts.cpp), only local minima of the distance become contacts:
+//
+//   vertex over triangle   along the triangle's normal, the foot inside it
+//   vertex over ridge      along the shortest way n, where n lies in the cone of the ridge (n · t ≤ 0 for both
+//                          directions t from the ridge into its triangles; about a vertex n · e ≤ 0 for its edges e)
+//   edge across edge       along their common normal, where it lies in the cones of both; of sharp edges only
+//
+// in two passes, the vertices of each over the other. The cone of a flat or hollow edge holds no leaning direction, so
+// a node that slides over the borders of triangles is not caught there. Both sides have a cone: where the ridge is
+// sharp, −n must lie in that of the vertex too. Without this test a corner that bulges over the rim of its support
+// would be pushed outward by the rim, though what rests there is the rim under the face.
+//
+// Why nodes over triangles in two passes, and not an integral over the surfaces (mortar): a contact bounds the gap
+// where it is, so that corners and rims hold as well as faces, and each is a point with a cone of its own. The price is
+// the patch test: uniform pressure needs nodal impulses that the contacts can give. With linear sides they can, to the
+// last digit, where the diagonals of both faces run alike, and to 3 % where they cross. With quadratic sides the corner
+// nodes take no part of a uniform pressure (∫N = 0), and the contacts can give it to 10 % of a node's share (2 cells
+// against 3; 2 % with 3 against 4). docs/finite-elements.md has what this does to the stress.
+//
+// Nodes that meet nodes (matching meshes) would be two contacts, one of each pass: one of them is left out.
+//
+// A contact acts on the surface where it is: on a quadratic side by its shape functions, of which those of corners are
+// negative in its middle. So the work of a contact is that of the gap that it bounds.
+//
+// What is fast is looked for on its way, as bodies are (collision/swept_pair.hpp): each feature is moved with the
+// velocities of the beginning and the weight until the gap is in the envelope. The points of that place are carried
+// back, and the gap is what they have to go along the normal of the meeting.
+
+namespace {
+
+constexpr double inside_tolerance = 1e-6;  // barycentric: rims that coincide but for rounding
+constexpr double rounding_angle = 1e-9;
+constexpr double flat_angle = 1e-3;    // directions this near to a face's normal are of the face
+constexpr double same_angle = 0.05;    // contacts of one vertex that differ by less are one
+constexpr double same_vertex = 1e-3;   // barycentric: a foot this near to a vertex is there
+constexpr double facing_cosine = 0.05;
+constexpr double parallel_sine = 1e-2;
+constexpr double depth_share = 0.25;   // of an edge: how far behind a surface a vertex is still pushed out
+
+constexpr std::uint64_t ridge_flag = 0x800, patch_bits = 0x7ff;
+
+Vector3d barycentric(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& p) {
+    const Vector3d to_b = b - a, to_c = c - a, normal = to_b.cross(to_c);
+    const double scale = 1.0 / normal.squaredNorm();
+    const double l_b = (p - a).cross(to_c).dot(normal) * scale, l_c = to_b.cross(p - a).dot(normal) * scale;
+    return {1.0 - l_b - l_c, l_b, l_c};
+}
+
+Box3d around(const Vector3d& from, const Vector3d& way, double more) {
+    Box3d box(from);
+    box.extend(Vector3d(from + way));
+    box.min().array() -= more;
+    box.max().array() += more;
+    return box;
+}
+
+Box3d enlarged(Box3d box, double more) {
+    box.min().array() -= more;
+    box.max().array() += more;
+    return box;
+}
+
+void make_unique(std::vector<std::int32_t>& numbers) {
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+}
+
+struct GapAndRate {
+    double gap = 0.0, rate = 0.0;
+};
+
+}  // namespace
+
+void MeshContacts::add(std::span<const ElementSide> sides, const std::vector<Vector3d>& position, double radius,
+                       std::int32_t material) {
+    std::int32_t first_edge = 0;
+    if (!surfaces_.empty())
+        first_edge =
+            surfaces_.back().first_edge + static_cast<std::int32_t>(surfaces_.back().surface.edges().size());
+    surfaces_.push_back({MeshSurface(sides, position), radius, material, first_edge});
+}
+
+void MeshContacts::find(std::span<const Vector3d> x, std::span<const Vector3d> way, double envelope,
+                        std::vector<MeshContact>& contacts) {
+    contacts.clear();
+    for (Surface& one : surfaces_) one.surface.place(x, way);
+    find_near_pairs(envelope);
+    has_normals_.assign(surfaces_.size(), 0);
+    for (const auto& [a, b] : pairs_) {
+        for (const auto one : {a, b}) {
+            if (has_normals_[to_index(one)]) continue;
+            surfaces_[to_index(one)].surface.find_normals();
+            has_normals_[to_index(one)] = 1;
+        }
+        touch(a, b, envelope, contacts);
+    }
+    std::sort(contacts.begin(), contacts.end(), [](const MeshContact& a, const MeshContact& b) {
+        const auto key = [](const MeshContact& one) {
+            return std::tuple(one.vertex < 0, one.vertex < 0 ? one.surface_a : one.vertex, one.surface_b, one.feature);
+        };
+        return key(a) < key(b);
+    });
+}
+
+// Sorted by their least x, boxes are compared with those that begin before they end.
+void MeshContacts::find_near_pairs(double envelope) {
+    pairs_.clear();
+    order_.resize(surfaces_.size());
+    for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<std::int32_t>(i);
+    const auto box = [&](std::int32_t i) -> const Box3d& { return surfaces_[to_index(i)].surface.box(); };
+    std::sort(order_.begin(), order_.end(), [&](std::int32_t a, std::int32_t b) {
+        return std::pair(box(a).min().x(), a) < std::pair(box(b).min().x(), b);
+    });
+    double thickest = 0.0;
+    for (const Surface& one : surfaces_) thickest = std::max(thickest, one.radius);
+    for (std::size_t i = 0; i < order_.size(); ++i)
+        for (std::size_t j = i + 1; j < order_.size(); ++j) {
+            const std::int32_t a = order_[i], b = order_[j];
+            if (box(b).min().x() > box(a).max().x() + 2.0 * thickest + envelope) break;
+            const double reach = surfaces_[to_index(a)].radius + surfaces_[to_index(b)].radius + envelope;
+            if (enlarged(box(a), reach).intersects(box(b))) pairs_.emplace_back(std::min(a, b), std::max(a, b));
+        }
+    std::sort(pairs_.begin(), pairs_.end());
+}
+
+void MeshContacts::touch(std::int32_t a, std::int32_t b, double envelope, std::vector<MeshContact>& contacts) {
+    const Surface &one = surfaces_[to_index(a)], &other = surfaces_[to_index(b)];
+    radii_ = one.radius + other.radius;
+    envelope_ = envelope;
+    still_ = one.surface.longest_way() + other.surface.longest_way() <= envelope;
+    met_.clear();
+    for (auto& vertices : touching_) vertices.clear();
+    vertices_on_surface(a, b, false, contacts);
+    std::sort(met_.begin(), met_.end());
+    vertices_on_surface(b, a, true, contacts);
+    crossing_edges(a, b, contacts);
+}
+
+void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool second,
+                                       std::vector<MeshContact>& contacts) {
+    a_ = &surfaces_[to_index(a)].surface;
+    b_ = &surfaces_[to_index(b)].surface;
+    depth_ = depth_share * b_->edge_length();
+    const double margin = radii_ + std::max(envelope_, depth_);
+    const Box3d region = enlarged(b_->box(), margin);
+    for (std::int32_t vertex = 0; vertex < static_cast<std::int32_t>(a_->nodes().size()); ++vertex) {
+        const Box3d box = around(a_->at(vertex), a_->way(vertex), 0.0);
+        if (!region.intersects(box)) continue;
+        b_->near(enlarged(box, margin), triangles_);
+        if (triangles_.empty()) continue;
+        candidates_.clear();
+        near_edges_.clear();
+        near_vertices_.clear();
+        for (const std::int32_t t : triangles_) {
+            const MeshSurface::Triangle& triangle = b_->triangles()[to_index(t)];
+            on_triangle(vertex, triangle);
+            near_edges_.insert(near_edges_.end(), triangle.edges.begin(), triangle.edges.end());
+        }
+        make_unique(near_edges_);
+        for (const std::int32_t e : near_edges_) on_edge(vertex, b_->edges()[to_index(e)]);
+        for (const std::int32_t t : triangles_)
+            for (const std::int32_t corner : b_->triangles()[to_index(t)].corners) {
+                if (std::find(near_vertices_.begin(), near_vertices_.end(), corner) != near_vertices_.end()) continue;
+                near_vertices_.push_back(corner);
+                on_vertex(vertex, corner, b_->triangles()[to_index(t)].patch);
+            }
+        leave_out_copies();
+        for (const Candidate& candidate : candidates_) {
+            touching_[second ? 1 : 0].push_back(vertex);
+            const bool on_node = candidate.foot_vertex >= 0;
+            if (on_node && second &&
+                std::binary_search(met_.begin(), met_.end(), std::pair(candidate.foot_vertex, vertex)))
+                continue;
+            MeshContact contact;
+            contact.a = a_->vertex_point(vertex);
+            contact.b = candidate.foot;
+            if (held_together(contact.a, contact.b)) continue;
+            if (on_node && !second) met_.emplace_back(vertex, candidate.foot_vertex);
+            contact.surface_a = a;
+            contact.surface_b = b;
+            contact.vertex = a_->nodes()[to_index(vertex)];
+            contact.normal = -candidate.normal;
+            contact.gap = candidate.gap;
+            contact.feature = {static_cast<std::uint64_t>(contact.vertex), static_cast<std::uint64_t>(b),
+                               static_cast<std::uint64_t>(candidate.patch)};
+            contacts.push_back(contact);
+        }
+    }
+}
+
+template <class Gap>
+double MeshContacts::meeting(Gap&& gap) const {
+    constexpr double never = -1.0;
+    constexpr int most_advances = 32;
+    double share = 0.0;
+    for (int i = 0; i < most_advances; ++i) {
+        const GapAndRate now = gap(share);
+        if (now.gap < envelope_) return share;
+        if (still_ || !(now.rate < 0.0)) return never;
+        share += (now.gap - 0.5 * envelope_) / -now.rate;
+        if (share > 1.0) return never;
+    }
+    return never;
+}
+
+bool MeshContacts::faces(std::int32_t vertex, const Vector3d& normal, bool sharp, double share) const {
+    if (normal.dot(a_->normal(vertex)) > -facing_cosine) return false;
+    return !sharp || a_->is_top(vertex, -normal, flat_angle, share);
+}
+
+void MeshContacts::on_triangle(std::int32_t vertex, const MeshSurface::Triangle& triangle) {
+    Vector3d normal, foot;
+    double height = 0.0;
+    const auto measure = [&](double share) -> GapAndRate {
+        normal = share == 0.0 ? triangle.normal : b_->normal_at(triangle, share);
+        const Vector3d p = a_->at(vertex, share), a = b_->at(triangle.corners[0], share);
+        height = normal.dot(p - a);
+        foot = barycentric(a, b_->at(triangle.corners[1], share), b_->at(triangle.corners[2], share),
+                           p - height * normal);
+        Vector3d way = a_->way(vertex);
+        for (std::size_t k = 0; k < 3; ++k)
+            way -= std::clamp(foot[static_cast<Eigen::Index>(k)], 0.0, 1.0) * b_->way(triangle.corners[k]);
+        return {height - radii_, normal.dot(way)};
+    };
+    const double share = meeting(measure);
+    if (share < 0.0 || height < -depth_ || foot.minCoeff() < -inside_tolerance) return;
+    if (!faces(vertex, normal, false, share)) return;
+    Candidate candidate;
+    candidate.foot = b_->project(triangle, foot, a_->at(vertex, share), share, normal);
+    candidate.normal = normal;
+    candidate.gap = normal.dot(a_->at(vertex) - b_->place_of(candidate.foot)) - radii_;
+    candidate.patch = triangle.patch & static_cast<std::int32_t>(patch_bits);
+    Eigen::Index nearest = 0;
+    if (foot.maxCoeff(&nearest) > 1.0 - same_vertex)
+        candidate.foot_vertex = triangle.corners[static_cast<std::size_t>(nearest)];
+    candidates_.push_back(candidate);
+}
+
+void MeshContacts::on_edge(std::int32_t vertex, const MeshSurface::Edge& edge) {
+    Vector3d normal;
+    double along = 0.0;
+    const auto measure = [&](double share) -> GapAndRate {
+        const Vector3d p = a_->at(vertex, share), tail = b_->at(edge.tail, share),
+                       span = b_->at(edge.head, share) - tail;
+        along = (p - tail).dot(span) / span.squaredNorm();
+        const double inside = std::clamp(along, 0.0, 1.0);
+        normal = p - tail - inside * span;
+        const double distance = normal.norm();
+        normal /= std::max(distance, 1e-300);
+        const Vector3d way = a_->way(vertex) - (1.0 - inside) * b_->way(edge.tail) - inside * b_->way(edge.head);
+        return {distance - radii_, normal.dot(way)};
+    };
+    const double share = meeting(measure);
+    if (share < 0.0 || along <= 0.0 || along >= 1.0) return;
+    for (const auto t : edge.triangles)
+        if (t >= 0 && normal.dot(b_->inward(b_->triangles()[to_index(t)], edge, share)) > rounding_angle) return;
+    if (!faces(vertex, normal, edge.sharp, share)) return;
+    const MeshSurface::Triangle& triangle = b_->triangles()[to_index(edge.triangles[0])];
+    Vector3d coordinates = Vector3d::Zero();
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        const auto corner = triangle.corners[static_cast<std::size_t>(k)];
+        if (corner == edge.tail) coordinates[k] = 1.0 - along;
+        if (corner == edge.head) coordinates[k] = along;
+    }
+    Candidate candidate;
+    candidate.foot = b_->point_of(triangle, coordinates);
+    candidate.normal = normal;
+    candidate.gap = normal.dot(a_->at(vertex) - b_->place_of(candidate.foot)) - radii_;
+    candidate.patch = triangle.patch & static_cast<std::int32_t>(patch_bits);
+    if (edge.sharp) candidate.patch |= static_cast<std::int32_t>(ridge_flag);
+    if (along < same_vertex) candidate.foot_vertex = edge.tail;
+    if (along > 1.0 - same_vertex) candidate.foot_vertex = edge.head;
+    candidates_.push_back(candidate);
+}
+
+void MeshContacts::on_vertex(std::int32_t vertex, std::int32_t other, std::int32_t patch) {
+    Vector3d normal;
+    const auto measure = [&](double share) -> GapAndRate {
+        normal = a_->at(vertex, share) - b_->at(other, share);
+        const double distance = normal.norm();
+        normal /= std::max(distance, 1e-300);
+        return {distance - radii_, normal.dot(a_->way(vertex) - b_->way(other))};
+    };
+    const double share = meeting(measure);
+    if (share < 0.0 || !b_->is_top(other, normal, rounding_angle, share)) return;
+    const bool sharp = b_->has_sharp_edge(other);
+    if (!faces(vertex, normal, sharp, share)) return;
+    Candidate candidate;
+    candidate.foot = b_->vertex_point(other);
+    candidate.normal = normal;
+    candidate.gap = normal.dot(a_->at(vertex) - b_->at(other)) - radii_;
+    candidate.patch = patch & static_cast<std::int32_t>(patch_bits);
+    if (sharp) candidate.patch |= static_cast<std::int32_t>(ridge_flag);
+    candidate.foot_vertex = other;
+    candidates_.push_back(candidate);
+}
+
+// Of candidates along nearly one direction the nearest stays, of equals the first: triangles come before edges, edges
+// before vertices. What is behind several triangles leaves through the nearest.
+void MeshContacts::leave_out_copies() {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+        const Candidate candidate = candidates_[i];
+        const auto end = candidates_.begin() + static_cast<std::ptrdiff_t>(kept);
+        const auto copy = std::find_if(candidates_.begin(), end, [&](const Candidate& other) {
+            const bool behind = candidate.gap < -radii_ && other.gap < -radii_;
+            return behind || (candidate.normal - other.normal).norm() <= same_angle;
+        });
+        if (copy == end) {
+            candidates_[kept++] = candidate;
+            continue;
+        }
+        const bool behind = candidate.gap < -radii_ && copy->gap < -radii_;
+        const double less = copy->gap - candidate.gap;
+        if (behind ? less < 0.0 : less > 1e-9 * radii_) *copy = candidate;
+    }
+    candidates_.resize(kept);
+}
+
+void MeshContacts::crossing_edges(std::int32_t a, std::int32_t b, std::vector<MeshContact>& contacts) {
+    a_ = &surfaces_[to_index(a)].surface;
+    b_ = &surfaces_[to_index(b)].surface;
+    depth_ = depth_share * std::min(a_->edge_length(), b_->edge_length());
+    const double margin = radii_ + std::max(envelope_, depth_);
+    const Box3d region = enlarged(b_->box(), margin);
+    for (const std::int32_t of_a : a_->sharp_edges()) {
+        const MeshSurface::Edge& edge = a_->edges()[to_index(of_a)];
+        Box3d box = around(a_->at(edge.tail), a_->way(edge.tail), margin);
+        box.extend(around(a_->at(edge.head), a_->way(edge.head), margin));
+        if (!region.intersects(box)) continue;
+        b_->near(box, triangles_);
+        near_edges_.clear();
+        for (const std::int32_t t : triangles_)
+            for (const std::int32_t of_b : b_->triangles()[to_index(t)].edges)
+                if (b_->edges()[to_index(of_b)].sharp) near_edges_.push_back(of_b);
+        make_unique(near_edges_);
+        for (const std::int32_t of_b : near_edges_) edge_on_edge(a, b, of_a, of_b, contacts);
+    }
+}
+
+void MeshContacts::edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_a, std::int32_t of_b,
+                                std::vector<MeshContact>& contacts) {
+    const MeshSurface::Edge &one = a_->edges()[to_index(of_a)], &other = b_->edges()[to_index(of_b)];
+    const auto outward = [](const MeshSurface& surface, const MeshSurface::Edge& edge) {
+        Vector3d sum = Vector3d::Zero();
+        for (const auto t : edge.triangles)
+            if (t >= 0) sum += surface.triangles()[to_index(t)].normal;
+        return sum;
+    };
+    const Vector3d out_of_a = outward(*a_, one), out_of_b = outward(*b_, other);
+    Vector3d normal = Vector3d::Zero();  // from b to a
+    double on_a = -1.0, on_b = -1.0;
+    bool crosses = true;
+    const auto measure = [&](double share) -> GapAndRate {
+        const Vector3d p = a_->at(one.tail, share), u = a_->at(one.head, share) - p;
+        const Vector3d q = b_->at(other.tail, share), w = b_->at(other.head, share) - q;
+        normal = u.cross(w);
+        const double area = normal.norm();
+        crosses = area > parallel_sine * u.norm() * w.norm();
+        if (!crosses) return {HUGE_VAL, 0.0};
+        normal /= normal.dot(out_of_b) < 0.0 ? -area : area;
+        crosses = normal.dot(out_of_b) > 0.0 && normal.dot(out_of_a) < 0.0;
+        if (!crosses) return {HUGE_VAL, 0.0};
+        // p + s u and q + t w, nearest: (s, t) from p − q + s u − t w ∥ u × w.
+        const Vector3d between = q - p, across = u.cross(w) / (area * area);
+        on_a = between.cross(w).dot(across);
+        on_b = between.cross(u).dot(across);
+        const double s = std::clamp(on_a, 0.0, 1.0), t = std::clamp(on_b, 0.0, 1.0);
+        const Vector3d way = (1.0 - s) * a_->way(one.tail) + s * a_->way(one.head) - (1.0 - t) * b_->way(other.tail) -
+                             t * b_->way(other.head);
+        return {normal.dot(p + on_a * u - q - on_b * w) - radii_, normal.dot(way)};
+    };
+    const double share = meeting(measure);
+    if (share < 0.0 || on_a < 0.0 || on_a > 1.0 || on_b < 0.0 || on_b > 1.0) return;
+    for (const auto t : one.triangles)
+        if (t >= 0 && -normal.dot(a_->inward(a_->triangles()[to_index(t)], one, share)) > flat_angle) return;
+    for (const auto t : other.triangles)
+        if (t >= 0 && normal.dot(b_->inward(b_->triangles()[to_index(t)], other, share)) > flat_angle) return;
+    // A vertex at the crossing has its own contact.
+    const auto at_touching = [](const MeshSurface::Edge& edge, double along, const std::vector<std::int32_t>& vertices) {
+        if (along > same_vertex && along < 1.0 - same_vertex) return false;
+        return std::binary_search(vertices.begin(), vertices.end(), along < 0.5 ? edge.tail : edge.head);
+    };
+    if (at_touching(one, on_a, touching_[0]) || at_touching(other, on_b, touching_[1])) return;
+    const auto point_on = [](const MeshSurface& surface, const MeshSurface::Edge& edge, double along) {
+        const MeshSurface::Triangle& triangle = surface.triangles()[to_index(edge.triangles[0])];
+        Vector3d coordinates = Vector3d::Zero();
+        for (Eigen::Index k = 0; k < 3; ++k) {
+            const auto corner = triangle.corners[static_cast<std::size_t>(k)];
+            if (corner == edge.tail) coordinates[k] = 1.0 - along;
+            if (corner == edge.head) coordinates[k] = along;
+        }
+        return surface.point_of(triangle, coordinates);
+    };
+    MeshContact contact;
+    contact.a = point_on(*a_, one, on_a);
+    contact.b = point_on(*b_, other, on_b);
+    if (held_together(contact.a, contact.b)) return;
+    contact.surface_a = a;
+    contact.surface_b = b;
+    contact.normal = -normal;
+    contact.gap = normal.dot(a_->place_of(contact.a) - b_->place_of(contact.b)) - radii_;
+    if (contact.gap < -radii_ - depth_) return;
+    contact.feature = {static_cast<std::uint64_t>(surfaces_[to_index(a)].first_edge + of_a),
+                       static_cast<std::uint64_t>(surfaces_[to_index(b)].first_edge + of_b), 0};
+    contacts.push_back(contact);
+}
+
+bool MeshContacts::held_together(const CarriedPoint& a, const CarriedPoint& b) const {
+    const std::int32_t hold = holds_[to_index(a.nodes[0])];
+    if (hold == free) return false;
+    for (const CarriedPoint* point : {&a, &b})
+        for (std::size_t k = 0; k < point->count; ++k)
+            if (std::abs(point->weights[k]) > 1e-12 && holds_[to_index(point->nodes[k])] != hold) return false;
+    return true;
+}
+
+}  // namespace delassus::mechanics

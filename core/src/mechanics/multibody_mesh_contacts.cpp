@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Contacts between meshes of a multibody system (mesh_contacts.hpp).
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "mechanics/multibody_implementation.hpp"
+#include "support/frames.hpp"
+
+namespace delassus {
+
+using mechanics::MeshContact;
+using mechanics::MeshContacts;
+using mechanics::vector;
+using mechanics::Vector3d;
+
+namespace {
+
+/// Disjoint sets of nodes; the root of a set is its least node.
+class NodeSets {
+public:
+    explicit NodeSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+    std::int32_t root(std::int32_t node) {
+        auto& parent = parent_[static_cast<std::size_t>(node)];
+        if (parent != node) parent = root(parent);
+        return parent;
+    }
+    void join(std::int32_t a, std::int32_t b) {
+        a = root(a);
+        b = root(b);
+        parent_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    }
+
+private:
+    std::vector<std::int32_t> parent_;
+};
+
+}  // namespace
+
+// Elements that share nodes are one mesh. Its surface has the largest radius of its nodes and the material of the
+// first.
+void MultibodySystem::Implementation::make_mesh_contacts() {
+    if (node_contacts.empty() || element_sides.empty()) return;
+    NodeSets meshes(nodes.size());
+    const auto join_all = [&](const auto& elements) {
+        for (const auto& element : elements)
+            for (const auto node : element.nodes()) meshes.join(element.nodes()[0], node);
+    };
+    join_all(linear_tetrahedra);
+    join_all(quadratic_tetrahedra);
+    join_all(bricks);
+    shape_of_node.assign(nodes.size(), -1);
+    for (std::size_t k = 0; k < node_contacts.size(); ++k)
+        shape_of_node[static_cast<std::size_t>(node_contacts[k].node)] = static_cast<std::int32_t>(shapes.size() + k);
+    std::map<std::int32_t, std::vector<mechanics::ElementSide>> surfaces;
+    for (const auto& side : mechanics::outer_sides(element_sides)) {
+        bool touches = true;
+        side.for_each_node([&](std::int32_t node) {
+            touches = touches && shape_of_node[static_cast<std::size_t>(node)] >= 0;
+        });
+        if (touches) surfaces[meshes.root(side.corners[0])].push_back(side);
+    }
+    const auto moves = [&](std::int32_t node) { return nodes[static_cast<std::size_t>(node)].column >= 0; };
+    bool any_moves = false;
+    for (const auto& [root, sides] : surfaces)
+        for (const auto& side : sides) side.for_each_node([&](std::int32_t node) { any_moves |= moves(node); });
+    if (surfaces.size() < 2 || !any_moves) return;
+    mesh_contacts = std::make_unique<MeshContacts>();
+    node_x.clear();
+    for (const auto& node : nodes) node_x.push_back(vector(node.parameters.position));
+    for (const auto& [root, sides] : surfaces) {
+        double radius = 0.0;
+        std::int32_t first = sides[0].corners[0];
+        for (const auto& side : sides)
+            side.for_each_node([&](std::int32_t node) {
+                radius = std::max(radius, node_contact_of(node).radius);
+                first = std::min(first, node);
+            });
+        mesh_contacts->add(sides, node_x, radius, node_contact_of(first).material);
+    }
+    std::vector<std::int32_t> holds(nodes.size(), MeshContacts::free);
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+        if (nodes[k].column < 0) holds[k] = MeshContacts::immovable;
+    for (const auto& one : attachments)
+        holds[static_cast<std::size_t>(one.node)] =
+            bodies[static_cast<std::size_t>(one.body)].prescribed ? MeshContacts::immovable : one.body;
+    mesh_contacts->set_holds(std::move(holds));
+}
+
+const MultibodySystem::Implementation::NodeContact& MultibodySystem::Implementation::node_contact_of(
+    std::int32_t node) const {
+    return node_contacts[static_cast<std::size_t>(shape_of_node[static_cast<std::size_t>(node)]) - shapes.size()];
+}
+
+// Nodes move on as in predict_displacements().
+void MultibodySystem::Implementation::collect_mesh_contacts(const State& state, double h, UnilateralRows& rows) {
+    const Vector3d fall = h * load_factor * vector(gravity);
+    node_x.resize(nodes.size());
+    node_way.resize(nodes.size());
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+        const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data());
+        node_x[k] = node.x;
+        node_way[k] = node.column < 0 ? Vector3d::Zero() : Vector3d(h * (node.v + fall));
+    }
+    mesh_contacts->find(node_x, node_way, envelope, mesh_touching);
+    const auto first_surface = static_cast<std::int32_t>(shapes.size() + node_contacts.size());
+    const auto shapes_of = [&](const MeshContact& contact) {
+        return std::pair(contact.vertex < 0 ? first_surface + contact.surface_a
+                                            : shape_of_node[static_cast<std::size_t>(contact.vertex)],
+                         first_surface + contact.surface_b);
+    };
+    const auto by_shapes = [&](const MeshContact& a, const MeshContact& b) { return shapes_of(a) < shapes_of(b); };
+    if (!std::is_sorted(mesh_touching.begin(), mesh_touching.end(), by_shapes))
+        std::stable_sort(mesh_touching.begin(), mesh_touching.end(), by_shapes);
+    std::uint32_t place = 0;  // among those of the same shapes
+    std::pair<std::int32_t, std::int32_t> last{-1, -1};
+    for (const MeshContact& contact : mesh_touching) {
+        const auto pair = shapes_of(contact);
+        place = pair == last ? place + 1 : 0;
+        last = pair;
+        const auto& a = mesh_contacts->surfaces()[static_cast<std::size_t>(contact.surface_a)];
+        const auto& b = mesh_contacts->surfaces()[static_cast<std::size_t>(contact.surface_b)];
+        ContactPoint& point = rows.contacts().emplace_back();
+        point.shape_a = pair.first;
+        point.shape_b = pair.second;
+        point.point_a = mechanics::array(a.surface.place_of(contact.a) + a.radius * contact.normal);
+        point.point_b = mechanics::array(b.surface.place_of(contact.b) - b.radius * contact.normal);
+        point.normal = mechanics::array(contact.normal);
+        point.gap = contact.gap;
+        point.feature = place;
+        const auto put = [&](const mechanics::CarriedPoint& carried, const Vector3d& direction, double sign) {
+            for (std::size_t k = 0; k < carried.count; ++k) {
+                const std::int32_t column = nodes[static_cast<std::size_t>(carried.nodes[k])].column;
+                const double weight = sign * carried.weights[k];
+                if (column < 0 || weight == 0.0) continue;
+                rows.entries(column, std::array{weight * direction[0], weight * direction[1], weight * direction[2]});
+            }
+        };
+        const auto put_row = [&](const Vector3d& direction, double gap) {
+            put(contact.a, direction, -1.0);
+            put(contact.b, direction, 1.0);
+            rows.end_row(gap);
+        };
+        const ContactMaterial material = material_between(a.material, b.material);
+        const auto key = mesh_contact_key(contact.vertex < 0, contact.feature);
+        put_row(contact.normal, contact.gap);
+        if (material.friction == 0.0 && leaves_out) {
+            rows.end_block(Cone::nonnegative(1), key, material.restitution);
+            continue;
+        }
+        const mechanics::Matrix3d frame = contact_frame(contact.normal);
+        for (int k = 1; k < 3; ++k) put_row(frame.col(k), 0.0);
+        rows.end_block(Cone::friction(material.friction), key, material.restitution);
+    }
+}
+
+}  // namespace delassus
