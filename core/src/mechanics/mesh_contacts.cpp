@@ -27,10 +27,12 @@ namespace delassus::mechanics {
 // where it is, so that corners and rims hold as well as faces, and each is a point with a cone of its own. The price is
 // the patch test: uniform pressure needs nodal impulses that the contacts can give. With linear sides they can, to the
 // last digit, where the diagonals of both faces run alike, and to 3 % where they cross. With quadratic sides the corner
-// nodes take no part of a uniform pressure (∫N = 0), and the contacts can give it to 10 % of a node's share (2 cells
-// against 3; 2 % with 3 against 4). docs/finite-elements.md has what this does to the stress.
+// nodes take no part of a uniform pressure (∫N = 0), and nodes alone can give it to 10 % only (2 cells against 3). With
+// the middle of each side as one more point it is 0.5 to 2 %, and with three points of integration in each side in
+// place of its middle it would be exact, for twice as many contacts. docs/finite-elements.md has the stress.
 //
-// Nodes that meet nodes (matching meshes) would be two contacts, one of each pass: one of them is left out.
+// Nodes that meet nodes (matching meshes) would be two contacts, one of each pass: one of them is left out. Where all
+// the middles of a side's edges meet nodes, the middle of the side adds nothing and is left out as well.
 //
 // A contact acts on the surface where it is: on a quadratic side by its shape functions, of which those of corners are
 // negative in its middle. So the work of a contact is that of the gap that it bounds.
@@ -86,11 +88,13 @@ struct GapAndRate {
 
 void MeshContacts::add(std::span<const ElementSide> sides, const std::vector<Vector3d>& position, double radius,
                        std::int32_t material) {
-    std::int32_t first_edge = 0;
-    if (!surfaces_.empty())
-        first_edge =
-            surfaces_.back().first_edge + static_cast<std::int32_t>(surfaces_.back().surface.edges().size());
-    surfaces_.push_back({MeshSurface(sides, position), radius, material, first_edge});
+    Surface one{MeshSurface(sides, position), radius, material};
+    if (!surfaces_.empty()) {
+        const Surface& last = surfaces_.back();
+        one.first_edge = last.first_edge + static_cast<std::int32_t>(last.surface.edges().size());
+        one.first_side = last.first_side + static_cast<std::int32_t>(last.surface.sides().size());
+    }
+    surfaces_.push_back(std::move(one));
 }
 
 void MeshContacts::find(std::span<const Vector3d> x, std::span<const Vector3d> way, double envelope,
@@ -109,7 +113,8 @@ void MeshContacts::find(std::span<const Vector3d> x, std::span<const Vector3d> w
     }
     std::sort(contacts.begin(), contacts.end(), [](const MeshContact& a, const MeshContact& b) {
         const auto key = [](const MeshContact& one) {
-            return std::tuple(one.vertex < 0, one.vertex < 0 ? one.surface_a : one.vertex, one.surface_b, one.feature);
+            const bool vertex = one.kind == MeshContact::Kind::Vertex;
+            return std::tuple(!vertex, vertex ? one.a.nodes[0] : one.surface_a, one.surface_b, one.kind, one.feature);
         };
         return key(a) < key(b);
     });
@@ -143,9 +148,12 @@ void MeshContacts::touch(std::int32_t a, std::int32_t b, double envelope, std::v
     still_ = one.surface.longest_way() + other.surface.longest_way() <= envelope;
     met_.clear();
     for (auto& vertices : touching_) vertices.clear();
+    for (auto& vertices : on_nodes_) vertices.clear();
     vertices_on_surface(a, b, false, contacts);
     std::sort(met_.begin(), met_.end());
     vertices_on_surface(b, a, true, contacts);
+    sides_on_surface(a, b, false, contacts);
+    sides_on_surface(b, a, true, contacts);
     crossing_edges(a, b, contacts);
 }
 
@@ -166,7 +174,7 @@ void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool seco
         near_vertices_.clear();
         for (const std::int32_t t : triangles_) {
             const MeshSurface::Triangle& triangle = b_->triangles()[to_index(t)];
-            on_triangle(vertex, triangle);
+            on_triangle(a_->vertex_point(vertex), a_->normal(vertex), triangle);
             near_edges_.insert(near_edges_.end(), triangle.edges.begin(), triangle.edges.end());
         }
         make_unique(near_edges_);
@@ -181,6 +189,7 @@ void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool seco
         for (const Candidate& candidate : candidates_) {
             touching_[second ? 1 : 0].push_back(vertex);
             const bool on_node = candidate.foot_vertex >= 0;
+            if (on_node) on_nodes_[second ? 1 : 0].push_back(vertex);
             if (on_node && second &&
                 std::binary_search(met_.begin(), met_.end(), std::pair(candidate.foot_vertex, vertex)))
                 continue;
@@ -191,11 +200,48 @@ void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool seco
             if (on_node && !second) met_.emplace_back(vertex, candidate.foot_vertex);
             contact.surface_a = a;
             contact.surface_b = b;
-            contact.vertex = a_->nodes()[to_index(vertex)];
             contact.normal = -candidate.normal;
             contact.gap = candidate.gap;
-            contact.feature = {static_cast<std::uint64_t>(contact.vertex), static_cast<std::uint64_t>(b),
+            contact.feature = {static_cast<std::uint64_t>(contact.a.nodes[0]), static_cast<std::uint64_t>(b),
                                static_cast<std::uint64_t>(candidate.patch)};
+            contacts.push_back(contact);
+        }
+    }
+}
+
+// Over triangles only: at edges the nodes about it hold.
+void MeshContacts::sides_on_surface(std::int32_t a, std::int32_t b, bool second, std::vector<MeshContact>& contacts) {
+    a_ = &surfaces_[to_index(a)].surface;
+    b_ = &surfaces_[to_index(b)].surface;
+    depth_ = depth_share * b_->edge_length();
+    const auto& on_nodes = on_nodes_[second ? 1 : 0];
+    const double margin = radii_ + std::max(envelope_, depth_);
+    const Box3d region = enlarged(b_->box(), margin);
+    for (const MeshSurface::Triangle& middle : a_->triangles()) {
+        if (middle.part != 3) continue;
+        const CarriedPoint point = a_->point_of(middle, Vector3d::Constant(1.0 / 3.0));
+        const Box3d box = around(a_->place_of(point), a_->way_of(point), 0.0);
+        if (!region.intersects(box)) continue;
+        if (std::all_of(middle.corners.begin(), middle.corners.end(), [&](std::int32_t vertex) {
+                return std::binary_search(on_nodes.begin(), on_nodes.end(), vertex);
+            }))
+            continue;
+        b_->near(enlarged(box, margin), triangles_);
+        candidates_.clear();
+        for (const std::int32_t t : triangles_) on_triangle(point, middle.normal, b_->triangles()[to_index(t)]);
+        leave_out_copies();
+        for (const Candidate& candidate : candidates_) {
+            if (held_together(point, candidate.foot)) continue;
+            MeshContact contact;
+            contact.kind = MeshContact::Kind::Side;
+            contact.a = second ? candidate.foot : point;
+            contact.b = second ? point : candidate.foot;
+            contact.surface_a = second ? b : a;
+            contact.surface_b = second ? a : b;
+            contact.normal = second ? candidate.normal : Vector3d(-candidate.normal);
+            contact.gap = candidate.gap;
+            contact.feature = {static_cast<std::uint64_t>(surfaces_[to_index(a)].first_side + middle.side),
+                               static_cast<std::uint64_t>(b), static_cast<std::uint64_t>(candidate.patch)};
             contacts.push_back(contact);
         }
     }
@@ -217,31 +263,33 @@ double MeshContacts::meeting(Gap&& gap) const {
 }
 
 bool MeshContacts::faces(std::int32_t vertex, const Vector3d& normal, bool sharp, double share) const {
-    if (normal.dot(a_->normal(vertex)) > -facing_cosine) return false;
+    if (normal.dot(a_->normal(vertex)) > -facing_cosine) return false;  // as on_triangle()
     return !sharp || a_->is_top(vertex, -normal, flat_angle, share);
 }
 
-void MeshContacts::on_triangle(std::int32_t vertex, const MeshSurface::Triangle& triangle) {
+void MeshContacts::on_triangle(const CarriedPoint& point, const Vector3d& outward,
+                               const MeshSurface::Triangle& triangle) {
+    const Vector3d begin = a_->place_of(point), own_way = a_->way_of(point);
     Vector3d normal, foot;
     double height = 0.0;
     const auto measure = [&](double share) -> GapAndRate {
         normal = share == 0.0 ? triangle.normal : b_->normal_at(triangle, share);
-        const Vector3d p = a_->at(vertex, share), a = b_->at(triangle.corners[0], share);
+        const Vector3d p = begin + share * own_way, a = b_->at(triangle.corners[0], share);
         height = normal.dot(p - a);
         foot = barycentric(a, b_->at(triangle.corners[1], share), b_->at(triangle.corners[2], share),
                            p - height * normal);
-        Vector3d way = a_->way(vertex);
+        Vector3d way = own_way;
         for (std::size_t k = 0; k < 3; ++k)
             way -= std::clamp(foot[static_cast<Eigen::Index>(k)], 0.0, 1.0) * b_->way(triangle.corners[k]);
         return {height - radii_, normal.dot(way)};
     };
     const double share = meeting(measure);
     if (share < 0.0 || height < -depth_ || foot.minCoeff() < -inside_tolerance) return;
-    if (!faces(vertex, normal, false, share)) return;
+    if (normal.dot(outward) > -facing_cosine) return;
     Candidate candidate;
-    candidate.foot = b_->project(triangle, foot, a_->at(vertex, share), share, normal);
+    candidate.foot = b_->project(triangle, foot, begin + share * own_way, share, normal);
     candidate.normal = normal;
-    candidate.gap = normal.dot(a_->at(vertex) - b_->place_of(candidate.foot)) - radii_;
+    candidate.gap = normal.dot(begin - b_->place_of(candidate.foot)) - radii_;
     candidate.patch = triangle.patch & static_cast<std::int32_t>(patch_bits);
     Eigen::Index nearest = 0;
     if (foot.maxCoeff(&nearest) > 1.0 - same_vertex)
@@ -406,6 +454,7 @@ void MeshContacts::edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_
         return surface.point_of(triangle, coordinates);
     };
     MeshContact contact;
+    contact.kind = MeshContact::Kind::Edges;
     contact.a = point_on(*a_, one, on_a);
     contact.b = point_on(*b_, other, on_b);
     if (held_together(contact.a, contact.b)) return;

@@ -10,12 +10,17 @@ namespace delassus::mechanics {
 
 /// Where two meshes touch or could within the step: their surfaces are offset by a radius each.
 struct MeshContact {
-    CarriedPoint a, b;                       ///< on the surfaces themselves, without the radii
+    enum class Kind : std::uint8_t {
+        Vertex,  ///< a is a node
+        Side,    ///< one of the two is the middle of a quadratic side; surface_a < surface_b
+        Edges    ///< two edges cross; surface_a < surface_b
+    };
+    Kind kind = Kind::Vertex;
+    CarriedPoint a, b;  ///< on the surfaces themselves, without the radii
     std::int32_t surface_a = 0, surface_b = 0;
-    std::int32_t vertex = -1;                ///< the node that a is, or −1 where two edges cross (surface_a < surface_b)
     Vector3d normal = Vector3d::Zero();      ///< unit, from a to b
     double gap = 0.0;                        ///< normal · (b − a) less both radii, at the beginning of the step, m
-    std::array<std::uint64_t, 3> feature{};  ///< the same from step to step: two numbers below 2²⁴, one below 2¹²
+    std::array<std::uint64_t, 3> feature{};  ///< with the kind, the same from step to step: below 2²⁴, 2²⁴ and 2¹²
 };
 
 /// Finds contacts among a fixed set of surfaces.
@@ -25,7 +30,7 @@ public:
         MeshSurface surface;
         double radius = 0.0;  ///< m
         std::int32_t material = 0;
-        std::int32_t first_edge = 0;  ///< number of its first edge among all surfaces'
+        std::int32_t first_edge = 0, first_side = 0;  ///< their numbers among those of all surfaces
     };
     /// What moves a node otherwise than freely: −1 nothing, a number ≥ 0 for each body that carries nodes, −2 for what
     /// nothing moves. Points that the same thing moves do not touch.
@@ -39,16 +44,16 @@ public:
     [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; }
 
     /// contacts ← those nearer than envelope (m), or that the way of the step brings so near. x: positions of all nodes
-    /// of the system; way: how they would move in the step if nothing touched them. Ordered by surface for edges, by
-    /// vertex for the rest, and then by feature.
+    /// of the system; way: how they would move in the step if nothing touched them. First those of vertices, by their
+    /// nodes, then the others by their surfaces.
     void find(std::span<const Vector3d> x, std::span<const Vector3d> way, double envelope,
               std::vector<MeshContact>& contacts);
 
 private:
-    /// A vertex of a over the surface b.
+    /// A point of a over the surface b.
     struct Candidate {
         CarriedPoint foot;
-        Vector3d normal = Vector3d::Zero();  ///< from b to the vertex
+        Vector3d normal = Vector3d::Zero();  ///< from b to the point
         double gap = 0.0;
         std::int32_t patch = 0;
         std::int32_t foot_vertex = -1;  ///< of b, where the foot is one
@@ -56,7 +61,8 @@ private:
     void find_near_pairs(double envelope);
     void touch(std::int32_t a, std::int32_t b, double envelope, std::vector<MeshContact>& contacts);
     void vertices_on_surface(std::int32_t a, std::int32_t b, bool second, std::vector<MeshContact>& contacts);
-    void on_triangle(std::int32_t vertex, const MeshSurface::Triangle& triangle);
+    void sides_on_surface(std::int32_t a, std::int32_t b, bool second, std::vector<MeshContact>& contacts);
+    void on_triangle(const CarriedPoint& point, const Vector3d& outward, const MeshSurface::Triangle& triangle);
     void on_edge(std::int32_t vertex, const MeshSurface::Edge& edge);
     void on_vertex(std::int32_t vertex, std::int32_t other, std::int32_t patch);
     /// Whether the vertex of a may be pushed along a direction by a feature of b.
@@ -81,6 +87,7 @@ private:
     std::vector<std::int32_t> triangles_, near_edges_, near_vertices_;
     std::vector<std::pair<std::int32_t, std::int32_t>> met_;     // vertices of the first over those of the second
     std::array<std::vector<std::int32_t>, 2> touching_;          // vertices of each, ascending
+    std::array<std::vector<std::int32_t>, 2> on_nodes_;          // those of them that are over vertices of the other
     std::vector<std::pair<std::int32_t, std::int32_t>> pairs_;   // of surfaces
     std::vector<std::int32_t> order_;
     std::vector<char> has_normals_;

@@ -57,6 +57,7 @@ public:
 
     [[nodiscard]] const std::vector<Triangle>& triangles() const { return triangles_; }
     [[nodiscard]] const std::vector<Edge>& edges() const { return edges_; }
+    [[nodiscard]] const std::vector<ElementSide>& sides() const { return sides_; }
     [[nodiscard]] const std::vector<std::int32_t>& sharp_edges() const { return sharp_edges_; }
     /// The node of each vertex, ascending.
     [[nodiscard]] const std::vector<std::int32_t>& nodes() const { return nodes_; }

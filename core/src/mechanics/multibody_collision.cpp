@@ -50,7 +50,7 @@ std::int32_t MultibodySystem::Implementation::owner_of(std::int32_t shape) const
     const auto count = static_cast<std::int32_t>(bodies.size());
     const std::size_t node = index - shapes.size();
     if (node < node_contacts.size()) return count + node_contacts[node].node;
-    return count + mesh_contacts->surfaces()[node - node_contacts.size()].surface.nodes()[0];
+    return count + first_node_of_surface(node - node_contacts.size());
 }
 
 // Bodies whose motion is prescribed do not touch one another, nor fixed ones.
@@ -80,7 +80,7 @@ void MultibodySystem::Implementation::make_detector() {
     });
     if (moves) make_mesh_contacts();
     const bool bodies_touch = moves && !shapes.empty() && setup.shapes.size() >= 2;
-    if (bodies_touch || mesh_contacts) {
+    if (bodies_touch || mesh_touching) {
         size = median_size(setup.shapes);
         if (envelope == 0.0) envelope = 0.05 * size;
     }

@@ -8,7 +8,6 @@
 #include "mechanics/beam.hpp"
 #include "mechanics/cable.hpp"
 #include "mechanics/linkage.hpp"
-#include "mechanics/mesh_contacts.hpp"
 #include "mechanics/model.hpp"
 #include "mechanics/solid_element.hpp"
 
@@ -70,9 +69,9 @@ struct MultibodySystem::Implementation {
     double load_factor = 1.0;           // of weight and loads
     double size = 0.0;                  // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
-    std::unique_ptr<mechanics::MeshContacts> mesh_contacts;  // null: no two meshes can meet
-    std::vector<std::int32_t> shape_of_node;                 // its sphere among the shapes, −1: none; with meshes only
-    bool leaves_out = true;                                  ///< what no contact needs
+    struct MeshTouching;
+    std::shared_ptr<MeshTouching> mesh_touching;  // null: no two meshes can meet
+    bool leaves_out = true;                       ///< what no contact needs
 
     // ---- Work space of the call that runs ----
     mutable mechanics::Placements at;
@@ -80,8 +79,6 @@ struct MultibodySystem::Implementation {
     mutable mechanics::RowMatrix hessian;
     std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
     std::vector<BodyDisplacement> displacements;  // of the same; fixed ones have none
-    std::vector<mechanics::Vector3d> node_x, node_way;
-    std::vector<mechanics::MeshContact> mesh_touching;
 
     void must_be_finished() const;
     void must_not_be_finished() const;
@@ -205,8 +202,10 @@ struct MultibodySystem::Implementation {
     void predict_displacements(double h, const State& state);
     void make_detector();
     void make_mesh_contacts();
-    [[nodiscard]] const NodeContact& node_contact_of(std::int32_t node) const;
-    [[nodiscard]] static std::uint64_t mesh_contact_key(bool of_edges, const std::array<std::uint64_t, 3>& feature);
+    /// The first node of a surface that touches other meshes.
+    [[nodiscard]] std::int32_t first_node_of_surface(std::size_t surface) const;
+    /// kind: 0, 1, … as MeshContact::Kind.
+    [[nodiscard]] static std::uint64_t mesh_contact_key(int kind, const std::array<std::uint64_t, 3>& feature);
     void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;

@@ -4,6 +4,7 @@
 #include <map>
 #include <numeric>
 
+#include "mechanics/mesh_contacts.hpp"
 #include "mechanics/multibody_implementation.hpp"
 #include "support/frames.hpp"
 
@@ -37,6 +38,18 @@ private:
 
 }  // namespace
 
+struct MultibodySystem::Implementation::MeshTouching {
+    MeshContacts finder;
+    std::vector<std::int32_t> shape_of_node;  ///< its sphere among the shapes, −1: none
+    // Work space of a step.
+    std::vector<Vector3d> x, way;
+    std::vector<MeshContact> contacts;
+};
+
+std::int32_t MultibodySystem::Implementation::first_node_of_surface(std::size_t surface) const {
+    return mesh_touching->finder.surfaces()[surface].surface.nodes()[0];
+}
+
 // Elements that share nodes are one mesh. Its surface has the largest radius of its nodes and the material of the
 // first.
 void MultibodySystem::Implementation::make_mesh_contacts() {
@@ -49,7 +62,7 @@ void MultibodySystem::Implementation::make_mesh_contacts() {
     join_all(linear_tetrahedra);
     join_all(quadratic_tetrahedra);
     join_all(bricks);
-    shape_of_node.assign(nodes.size(), -1);
+    std::vector<std::int32_t> shape_of_node(nodes.size(), -1);
     for (std::size_t k = 0; k < node_contacts.size(); ++k)
         shape_of_node[static_cast<std::size_t>(node_contacts[k].node)] = static_cast<std::int32_t>(shapes.size() + k);
     std::map<std::int32_t, std::vector<mechanics::ElementSide>> surfaces;
@@ -65,61 +78,62 @@ void MultibodySystem::Implementation::make_mesh_contacts() {
     for (const auto& [root, sides] : surfaces)
         for (const auto& side : sides) side.for_each_node([&](std::int32_t node) { any_moves |= moves(node); });
     if (surfaces.size() < 2 || !any_moves) return;
-    mesh_contacts = std::make_unique<MeshContacts>();
-    node_x.clear();
-    for (const auto& node : nodes) node_x.push_back(vector(node.parameters.position));
+    mesh_touching = std::make_shared<MeshTouching>();
+    auto& [finder, node_shapes, x, way, contacts] = *mesh_touching;
+    for (const auto& node : nodes) x.push_back(vector(node.parameters.position));
+    const auto contact_of = [&](std::int32_t node) -> const NodeContact& {
+        return node_contacts[static_cast<std::size_t>(shape_of_node[static_cast<std::size_t>(node)]) - shapes.size()];
+    };
     for (const auto& [root, sides] : surfaces) {
         double radius = 0.0;
         std::int32_t first = sides[0].corners[0];
         for (const auto& side : sides)
             side.for_each_node([&](std::int32_t node) {
-                radius = std::max(radius, node_contact_of(node).radius);
+                radius = std::max(radius, contact_of(node).radius);
                 first = std::min(first, node);
             });
-        mesh_contacts->add(sides, node_x, radius, node_contact_of(first).material);
+        finder.add(sides, x, radius, contact_of(first).material);
     }
+    node_shapes = std::move(shape_of_node);
     std::vector<std::int32_t> holds(nodes.size(), MeshContacts::free);
     for (std::size_t k = 0; k < nodes.size(); ++k)
         if (nodes[k].column < 0) holds[k] = MeshContacts::immovable;
     for (const auto& one : attachments)
         holds[static_cast<std::size_t>(one.node)] =
             bodies[static_cast<std::size_t>(one.body)].prescribed ? MeshContacts::immovable : one.body;
-    mesh_contacts->set_holds(std::move(holds));
-}
-
-const MultibodySystem::Implementation::NodeContact& MultibodySystem::Implementation::node_contact_of(
-    std::int32_t node) const {
-    return node_contacts[static_cast<std::size_t>(shape_of_node[static_cast<std::size_t>(node)]) - shapes.size()];
+    finder.set_holds(std::move(holds));
 }
 
 // Nodes move on as in predict_displacements().
 void MultibodySystem::Implementation::collect_mesh_contacts(const State& state, double h, UnilateralRows& rows) {
+    auto& [finder, shape_of_node, x, way, contacts] = *mesh_touching;
     const Vector3d fall = h * load_factor * vector(gravity);
-    node_x.resize(nodes.size());
-    node_way.resize(nodes.size());
+    x.resize(nodes.size());
+    way.resize(nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k) {
         const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data());
-        node_x[k] = node.x;
-        node_way[k] = node.column < 0 ? Vector3d::Zero() : Vector3d(h * (node.v + fall));
+        x[k] = node.x;
+        way[k] = node.column < 0 ? Vector3d::Zero() : Vector3d(h * (node.v + fall));
     }
-    mesh_contacts->find(node_x, node_way, envelope, mesh_touching);
+    finder.find(x, way, envelope, contacts);
     const auto first_surface = static_cast<std::int32_t>(shapes.size() + node_contacts.size());
-    const auto shapes_of = [&](const MeshContact& contact) {
-        return std::pair(contact.vertex < 0 ? first_surface + contact.surface_a
-                                            : shape_of_node[static_cast<std::size_t>(contact.vertex)],
+    const auto shapes_of = [&, &shape_of = shape_of_node](const MeshContact& contact) {
+        return std::pair(contact.kind == MeshContact::Kind::Vertex
+                             ? shape_of[static_cast<std::size_t>(contact.a.nodes[0])]
+                             : first_surface + contact.surface_a,
                          first_surface + contact.surface_b);
     };
     const auto by_shapes = [&](const MeshContact& a, const MeshContact& b) { return shapes_of(a) < shapes_of(b); };
-    if (!std::is_sorted(mesh_touching.begin(), mesh_touching.end(), by_shapes))
-        std::stable_sort(mesh_touching.begin(), mesh_touching.end(), by_shapes);
+    if (!std::is_sorted(contacts.begin(), contacts.end(), by_shapes))
+        std::stable_sort(contacts.begin(), contacts.end(), by_shapes);
     std::uint32_t place = 0;  // among those of the same shapes
     std::pair<std::int32_t, std::int32_t> last{-1, -1};
-    for (const MeshContact& contact : mesh_touching) {
+    for (const MeshContact& contact : contacts) {
         const auto pair = shapes_of(contact);
         place = pair == last ? place + 1 : 0;
         last = pair;
-        const auto& a = mesh_contacts->surfaces()[static_cast<std::size_t>(contact.surface_a)];
-        const auto& b = mesh_contacts->surfaces()[static_cast<std::size_t>(contact.surface_b)];
+        const auto& a = mesh_touching->finder.surfaces()[static_cast<std::size_t>(contact.surface_a)];
+        const auto& b = mesh_touching->finder.surfaces()[static_cast<std::size_t>(contact.surface_b)];
         ContactPoint& point = rows.contacts().emplace_back();
         point.shape_a = pair.first;
         point.shape_b = pair.second;
@@ -142,7 +156,7 @@ void MultibodySystem::Implementation::collect_mesh_contacts(const State& state, 
             rows.end_row(gap);
         };
         const ContactMaterial material = material_between(a.material, b.material);
-        const auto key = mesh_contact_key(contact.vertex < 0, contact.feature);
+        const auto key = mesh_contact_key(static_cast<int>(contact.kind), contact.feature);
         put_row(contact.normal, contact.gap);
         if (material.friction == 0.0 && leaves_out) {
             rows.end_block(Cone::nonnegative(1), key, material.restitution);

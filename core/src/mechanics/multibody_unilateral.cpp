@@ -15,7 +15,7 @@ using mechanics::Vector3d;
 namespace {
 
 /// Keys of blocks: what kind, then which one.
-enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4, Friction = 5, Actuator = 6, Mesh = 7, MeshEdges = 8 };
+enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4, Friction = 5, Actuator = 6, MeshVertex = 7, MeshSide = 8, MeshEdges = 9 };
 
 std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0, std::uint64_t third = 0) {
     // 4 + 24 + 24 + 12 bits.
@@ -39,14 +39,15 @@ std::uint64_t key_of(const ContactPoint& contact) {
 
 }  // namespace
 
-std::uint64_t MultibodySystem::Implementation::mesh_contact_key(bool of_edges,
+std::uint64_t MultibodySystem::Implementation::mesh_contact_key(int kind,
                                                                 const std::array<std::uint64_t, 3>& feature) {
-    return key_of(of_edges ? KeyKind::MeshEdges : KeyKind::Mesh, feature[0], feature[1], feature[2]);
+    constexpr std::array kinds = {KeyKind::MeshVertex, KeyKind::MeshSide, KeyKind::MeshEdges};
+    return key_of(kinds[static_cast<std::size_t>(kind)], feature[0], feature[1], feature[2]);
 }
 
 bool MultibodySystem::detects_contacts() const {
     implementation_->must_be_finished();
-    return implementation_->detector || implementation_->mesh_contacts;
+    return implementation_->detector || implementation_->mesh_touching;
 }
 
 bool MultibodySystem::has_unilateral() const {
@@ -78,7 +79,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
             });
         self.collect_contacts(rows);
     }
-    if (self.mesh_contacts) self.collect_mesh_contacts(state, h, rows);
+    if (self.mesh_touching) self.collect_mesh_contacts(state, h, rows);
 }
 
 void MultibodySystem::Implementation::place_shapes(const State& state) {
