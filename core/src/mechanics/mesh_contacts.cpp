@@ -45,7 +45,8 @@ namespace {
 
 constexpr double inside_tolerance = 1e-6;  // barycentric: rims that coincide but for rounding
 constexpr double rounding_angle = 1e-9;
-constexpr double flat_angle = 1e-3;    // directions this near to a face's normal are of the face
+constexpr double flat_angle = 1e-5;    // directions this near to a face's normal are of the face
+constexpr double edge_angle = 1e-3;    // likewise of crossing edges, whose normal leans to neither
 constexpr double same_angle = 0.05;    // contacts of one vertex that differ by less are one
 constexpr double same_vertex = 1e-3;   // barycentric: a foot this near to a vertex is there
 constexpr double facing_cosine = 0.05;
@@ -162,6 +163,8 @@ void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool seco
     a_ = &surfaces_[to_index(a)].surface;
     b_ = &surfaces_[to_index(b)].surface;
     depth_ = depth_share * b_->edge_length();
+    edge_seen_.assign(b_->edges().size(), -1);
+    vertex_seen_.assign(b_->nodes().size(), -1);
     const double margin = radii_ + std::max(envelope_, depth_);
     const Box3d region = enlarged(b_->box(), margin);
     for (std::int32_t vertex = 0; vertex < static_cast<std::int32_t>(a_->nodes().size()); ++vertex) {
@@ -170,21 +173,17 @@ void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool seco
         b_->near(enlarged(box, margin), triangles_);
         if (triangles_.empty()) continue;
         candidates_.clear();
-        near_edges_.clear();
-        near_vertices_.clear();
-        for (const std::int32_t t : triangles_) {
-            const MeshSurface::Triangle& triangle = b_->triangles()[to_index(t)];
-            on_triangle(a_->vertex_point(vertex), a_->normal(vertex), triangle);
-            near_edges_.insert(near_edges_.end(), triangle.edges.begin(), triangle.edges.end());
-        }
-        make_unique(near_edges_);
-        for (const std::int32_t e : near_edges_) on_edge(vertex, b_->edges()[to_index(e)]);
         for (const std::int32_t t : triangles_)
-            for (const std::int32_t corner : b_->triangles()[to_index(t)].corners) {
-                if (std::find(near_vertices_.begin(), near_vertices_.end(), corner) != near_vertices_.end()) continue;
-                near_vertices_.push_back(corner);
-                on_vertex(vertex, corner, b_->triangles()[to_index(t)].patch);
+            on_triangle(a_->vertex_point(vertex), a_->normal(vertex), b_->triangles()[to_index(t)]);
+        for (const std::int32_t t : triangles_)
+            for (const std::int32_t e : b_->triangles()[to_index(t)].edges) {
+                const MeshSurface::Edge& edge = b_->edges()[to_index(e)];
+                if (edge.convex && std::exchange(edge_seen_[to_index(e)], vertex) != vertex) on_edge(vertex, edge);
             }
+        for (const std::int32_t t : triangles_)
+            for (const std::int32_t corner : b_->triangles()[to_index(t)].corners)
+                if (b_->has_convex_edge(corner) && std::exchange(vertex_seen_[to_index(corner)], vertex) != vertex)
+                    on_vertex(vertex, corner, b_->triangles()[to_index(t)].patch);
         leave_out_copies();
         for (const Candidate& candidate : candidates_) {
             touching_[second ? 1 : 0].push_back(vertex);
@@ -434,9 +433,9 @@ void MeshContacts::edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_
     const double share = meeting(measure);
     if (share < 0.0 || on_a < 0.0 || on_a > 1.0 || on_b < 0.0 || on_b > 1.0) return;
     for (const auto t : one.triangles)
-        if (t >= 0 && -normal.dot(a_->inward(a_->triangles()[to_index(t)], one, share)) > flat_angle) return;
+        if (t >= 0 && -normal.dot(a_->inward(a_->triangles()[to_index(t)], one, share)) > edge_angle) return;
     for (const auto t : other.triangles)
-        if (t >= 0 && normal.dot(b_->inward(b_->triangles()[to_index(t)], other, share)) > flat_angle) return;
+        if (t >= 0 && normal.dot(b_->inward(b_->triangles()[to_index(t)], other, share)) > edge_angle) return;
     // A vertex at the crossing has its own contact.
     const auto at_touching = [](const MeshSurface::Edge& edge, double along, const std::vector<std::int32_t>& vertices) {
         if (along > same_vertex && along < 1.0 - same_vertex) return false;

@@ -84,7 +84,8 @@ private:
     double radii_ = 0.0, envelope_ = 0.0, depth_ = 0.0;
     bool still_ = true;  ///< its features cannot come nearer by more than the envelope
     std::vector<Candidate> candidates_;
-    std::vector<std::int32_t> triangles_, near_edges_, near_vertices_;
+    std::vector<std::int32_t> triangles_, near_edges_;
+    std::vector<std::int32_t> edge_seen_, vertex_seen_;  // of b: the last point that looked at it
     std::vector<std::pair<std::int32_t, std::int32_t>> met_;     // vertices of the first over those of the second
     std::array<std::vector<std::int32_t>, 2> touching_;          // vertices of each, ascending
     std::array<std::vector<std::int32_t>, 2> on_nodes_;          // those of them that are over vertices of the other

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::int32_t leaf_triangles = 4;
 const double sharp_sine = std::sin(20.0 * M_PI / 180.0);
+constexpr double flat_sine = 1e-7;  // the gap that such an edge leaves between its triangles is rounding
 
 /// The barycentric coordinates, in a quadratic side, of its corners and middles.
 const std::array<Vector3d, 6> side_places = {Vector3d(1, 0, 0),       Vector3d(0, 1, 0),       Vector3d(0, 0, 1),
@@ -180,6 +181,15 @@ void MeshSurface::find_normals() {
         for (const auto corner : triangle.corners) normals_[to_index(corner)] += twice_area;
     }
     for (Vector3d& normal : normals_) normal.normalize();
+    convex_vertex_.assign(nodes_.size(), 0);
+    for (Edge& edge : edges_) {
+        edge.convex = edge.triangles[1] < 0;
+        if (!edge.convex) {
+            const Triangle &one = triangles_[to_index(edge.triangles[0])], &other = triangles_[to_index(edge.triangles[1])];
+            edge.convex = one.normal.dot(inward(other, edge, 0.0)) < -flat_sine || one.normal.dot(other.normal) < 0.0;
+        }
+        if (edge.convex) convex_vertex_[to_index(edge.tail)] = convex_vertex_[to_index(edge.head)] = 1;
+    }
     // Children come after their parents.
     for (auto node = tree_.rbegin(); node != tree_.rend(); ++node) {
         node->box.setEmpty();

@@ -43,7 +43,8 @@ public:
     struct Edge {
         std::int32_t tail = 0, head = 0;                ///< vertices
         std::array<std::int32_t, 2> triangles{-1, -1};  ///< the second is −1 at a rim
-        bool sharp = false;  ///< convex by more than 20° at t = 0, or a rim: crossing ones may touch
+        bool sharp = false;   ///< convex by more than 20° at t = 0, or a rim: crossing ones may touch
+        bool convex = false;  ///< now, by more than rounding, or a rim
     };
 
     /// sides: of nodes of the system, at these positions.
@@ -52,7 +53,7 @@ public:
     /// x: positions of all nodes of the system; way: how they would move in the step, or empty. Both must outlive the
     /// use of the surface. Finds box() and the longest way; find_normals() is needed for all the rest.
     void place(std::span<const Vector3d> x, std::span<const Vector3d> way);
-    /// Normals, and the boxes that near() searches. Linear in the size of the surface.
+    /// Normals, which edges are convex, and the boxes that near() searches. Linear in the size of the surface.
     void find_normals();
 
     [[nodiscard]] const std::vector<Triangle>& triangles() const { return triangles_; }
@@ -86,9 +87,8 @@ public:
     [[nodiscard]] Vector3d inward(const Triangle& triangle, const Edge& edge, double share) const;
     /// Whether no point of the surface about a vertex lies further along a direction, up to an angle (rad).
     [[nodiscard]] bool is_top(std::int32_t vertex, const Vector3d& direction, double angle, double share) const;
-    [[nodiscard]] bool has_sharp_edge(std::int32_t vertex) const {
-        return sharp_vertex_[static_cast<std::size_t>(vertex)] != 0;
-    }
+    [[nodiscard]] bool has_sharp_edge(std::int32_t vertex) const { return sharp_vertex_[to_index(vertex)] != 0; }
+    [[nodiscard]] bool has_convex_edge(std::int32_t vertex) const { return convex_vertex_[to_index(vertex)] != 0; }
 
     /// Triangles whose boxes (around their way) meet a box, ascending.
     void near(const Box3d& box, std::vector<std::int32_t>& triangles) const;
@@ -121,7 +121,7 @@ private:
     std::vector<Edge> edges_;
     std::vector<std::int32_t> sharp_edges_;
     std::vector<std::int32_t> first_neighbour_, neighbour_;  // of vertices: those that edges join them to
-    std::vector<char> sharp_vertex_;
+    std::vector<char> sharp_vertex_, convex_vertex_;
     std::vector<Vector3d> normals_;
     std::vector<TreeNode> tree_;
     std::vector<std::int32_t> order_;
