@@ -16,12 +16,13 @@ namespace delassus::mechanics {
 //   vertex over triangle   along the triangle's normal, the foot inside it
 //   vertex over ridge      along the shortest way n, where n lies in the cone of the ridge (n · t ≤ 0 for both
 //                          directions t from the ridge into its triangles; about a vertex n · e ≤ 0 for its edges e)
-//   edge across edge       along their common normal, where it lies in the cones of both; of sharp edges only
+//   edge across edge       along their common normal, where it lies in the cones of both; one of them at least is sharp
 //
 // in two passes, the vertices of each over the other. The cone of a flat or hollow edge holds no leaning direction, so
 // a node that slides over the borders of triangles is not caught there. Both sides have a cone: where the ridge is
 // sharp, −n must lie in that of the vertex too. Without this test a corner that bulges over the rim of its support
-// would be pushed outward by the rim, though what rests there is the rim under the face.
+// would be pushed outward by the rim, though what rests there is the rim under the face: its vertices, and its crossings
+// with the edges of the face, which hold a node that hangs over by little.
 //
 // Why nodes over triangles in two passes, and not an integral over the surfaces (mortar): a contact bounds the gap
 // where it is, so that corners and rims hold as well as faces, and each is a point with a cone of its own. The price is
@@ -46,7 +47,8 @@ namespace {
 constexpr double inside_tolerance = 1e-6;  // barycentric: rims that coincide but for rounding
 constexpr double rounding_angle = 1e-9;
 constexpr double flat_angle = 1e-5;    // directions this near to a face's normal are of the face
-constexpr double edge_angle = 1e-3;    // likewise of crossing edges, whose normal leans to neither
+constexpr double edge_angle = 0.05;    // likewise of crossing edges: faces that are pressed together are not flat
+constexpr double same_crossing = 0.02; // share of an edge: crossings this near to a vertex are at it
 constexpr double same_angle = 0.05;    // contacts of one vertex that differ by less are one
 constexpr double same_vertex = 1e-3;   // barycentric: a foot this near to a vertex is there
 constexpr double facing_cosine = 0.05;
@@ -382,20 +384,29 @@ void MeshContacts::crossing_edges(std::int32_t a, std::int32_t b, std::vector<Me
     b_ = &surfaces_[to_index(b)].surface;
     depth_ = depth_share * std::min(a_->edge_length(), b_->edge_length());
     const double margin = radii_ + std::max(envelope_, depth_);
-    const Box3d region = enlarged(b_->box(), margin);
-    for (const std::int32_t of_a : a_->sharp_edges()) {
-        const MeshSurface::Edge& edge = a_->edges()[to_index(of_a)];
-        Box3d box = around(a_->at(edge.tail), a_->way(edge.tail), margin);
-        box.extend(around(a_->at(edge.head), a_->way(edge.head), margin));
-        if (!region.intersects(box)) continue;
-        b_->near(box, triangles_);
-        near_edges_.clear();
-        for (const std::int32_t t : triangles_)
-            for (const std::int32_t of_b : b_->triangles()[to_index(t)].edges)
-                if (b_->edges()[to_index(of_b)].sharp) near_edges_.push_back(of_b);
-        make_unique(near_edges_);
-        for (const std::int32_t of_b : near_edges_) edge_on_edge(a, b, of_a, of_b, contacts);
-    }
+    for (auto& vertices : crossed_) vertices.clear();
+    // The edges near a sharp edge of one surface that are of the other.
+    const auto for_each_sharp_edge = [&](const MeshSurface& one, const MeshSurface& other, auto&& visit) {
+        const Box3d region = enlarged(other.box(), margin);
+        for (const std::int32_t sharp : one.sharp_edges()) {
+            const MeshSurface::Edge& edge = one.edges()[to_index(sharp)];
+            Box3d box = around(one.at(edge.tail), one.way(edge.tail), margin);
+            box.extend(around(one.at(edge.head), one.way(edge.head), margin));
+            if (!region.intersects(box)) continue;
+            other.near(box, triangles_);
+            near_edges_.clear();
+            for (const std::int32_t t : triangles_)
+                for (const std::int32_t e : other.triangles()[to_index(t)].edges) near_edges_.push_back(e);
+            make_unique(near_edges_);
+            for (const std::int32_t e : near_edges_) visit(sharp, e);
+        }
+    };
+    for_each_sharp_edge(*a_, *b_, [&](std::int32_t of_a, std::int32_t of_b) {
+        edge_on_edge(a, b, of_a, of_b, contacts);
+    });
+    for_each_sharp_edge(*b_, *a_, [&](std::int32_t of_b, std::int32_t of_a) {
+        if (!a_->edges()[to_index(of_a)].sharp) edge_on_edge(a, b, of_a, of_b, contacts);
+    });
 }
 
 void MeshContacts::edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_a, std::int32_t of_b,
@@ -432,16 +443,29 @@ void MeshContacts::edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_
     };
     const double share = meeting(measure);
     if (share < 0.0 || on_a < 0.0 || on_a > 1.0 || on_b < 0.0 || on_b > 1.0) return;
-    for (const auto t : one.triangles)
-        if (t >= 0 && -normal.dot(a_->inward(a_->triangles()[to_index(t)], one, share)) > edge_angle) return;
-    for (const auto t : other.triangles)
-        if (t >= 0 && normal.dot(b_->inward(b_->triangles()[to_index(t)], other, share)) > edge_angle) return;
-    // A vertex at the crossing has its own contact.
-    const auto at_touching = [](const MeshSurface::Edge& edge, double along, const std::vector<std::int32_t>& vertices) {
-        if (along > same_vertex && along < 1.0 - same_vertex) return false;
-        return std::binary_search(vertices.begin(), vertices.end(), along < 0.5 ? edge.tail : edge.head);
+    // An edge that is not sharp may be hollow: then directions between its normals are let pass.
+    const auto in_cone = [&](const MeshSurface& surface, const MeshSurface::Edge& edge, double sign) {
+        double angle = edge_angle;
+        if (!edge.sharp)
+            angle += surface.triangles()[to_index(edge.triangles[0])]
+                         .normal.cross(surface.triangles()[to_index(edge.triangles[1])].normal)
+                         .norm();
+        return std::all_of(edge.triangles.begin(), edge.triangles.end(), [&](std::int32_t t) {
+            return t < 0 || sign * normal.dot(surface.inward(surface.triangles()[to_index(t)], edge, share)) <= angle;
+        });
     };
-    if (at_touching(one, on_a, touching_[0]) || at_touching(other, on_b, touching_[1])) return;
+    if (!in_cone(*a_, one, -1.0) || !in_cone(*b_, other, 1.0)) return;
+    // A vertex at the crossing has its own contact, or the first of the crossings there.
+    const auto taken = [](const MeshSurface::Edge& edge, double along, const std::vector<std::int32_t>& touching,
+                          std::vector<std::int32_t>& crossed) {
+        if (along > same_crossing && along < 1.0 - same_crossing) return false;
+        const std::int32_t vertex = along < 0.5 ? edge.tail : edge.head;
+        if (std::binary_search(touching.begin(), touching.end(), vertex)) return true;
+        if (std::find(crossed.begin(), crossed.end(), vertex) != crossed.end()) return true;
+        crossed.push_back(vertex);
+        return false;
+    };
+    if (taken(one, on_a, touching_[0], crossed_[0]) || taken(other, on_b, touching_[1], crossed_[1])) return;
     const auto point_on = [](const MeshSurface& surface, const MeshSurface::Edge& edge, double along) {
         const MeshSurface::Triangle& triangle = surface.triangles()[to_index(edge.triangles[0])];
         Vector3d coordinates = Vector3d::Zero();

@@ -89,6 +89,7 @@ private:
     std::vector<std::pair<std::int32_t, std::int32_t>> met_;     // vertices of the first over those of the second
     std::array<std::vector<std::int32_t>, 2> touching_;          // vertices of each, ascending
     std::array<std::vector<std::int32_t>, 2> on_nodes_;          // those of them that are over vertices of the other
+    std::array<std::vector<std::int32_t>, 2> crossed_;           // vertices at which edges cross
     std::vector<std::pair<std::int32_t, std::int32_t>> pairs_;   // of surfaces
     std::vector<std::int32_t> order_;
     std::vector<char> has_normals_;
