@@ -106,7 +106,7 @@ TEST(MeshContact, RowsAreDerivativesOfGaps) {
         for (int trial = 0; trial < 6; ++trial) {
             // The upper one lies across the lower one, a little shifted: rims cross.
             Blocks blocks({block({-0.2, -0.05, 0.0}, {0.4, 0.1, 0.05}, {4, 2, 1}, order),
-                           block({-0.0512345, -0.2, 0.05 + 2 * radius}, {0.1, 0.4, 0.05}, {2, 3, 1}, order)});
+                           block({-0.0612345, -0.2, 0.05 + 2 * radius}, {0.1, 0.4, 0.05}, {2, 3, 1}, order)});
             State state = blocks.system.initial_state();
             for (double& q : state.q) q += 2e-4 * noise(engine);
             std::vector<double> way(state.q.size());
@@ -130,8 +130,7 @@ TEST(MeshContact, RowsAreDerivativesOfGaps) {
                 const auto b = before.find(one.key), a = after.find(one.key);
                 if (b != before.end() && a != after.end()) {
                     // On curved sides the normal is exact inside; at borders, ridges and crossings it is of the chords.
-                    const double error =
-                        std::abs(blocks.speed(row, way) - (a->second - b->second) / (2.0 * step));
+                    const double error = std::abs(blocks.speed(row, way) - (a->second - b->second) / (2.0 * step));
                     EXPECT_LT(error, order == 2 ? 3e-2 : 1e-5) << one.key;
                     const bool edges = one.key >> 60 == 9;
                     of_edges += edges ? 1U : 0U;
@@ -188,9 +187,9 @@ TEST(MeshContact, NodesKeepTheirNamesWhileTheySlide) {
 TEST(MeshContact, ARimThatHangsOverIsNotPushedOutward) {
     for (const int order : {1, 2})
         for (const double over : {1e-9, 1e-6, 1e-4, 1e-3, 1e-2}) {
-            Blocks blocks({block({0.0, 0.0, 0.0}, {0.2, 0.2, 0.1}, {2, 2, 1}, order),
-                           block({-over, -over, 0.1 + 2 * radius}, {0.2 + 2 * over, 0.2 + 2 * over, 0.1}, {3, 3, 1},
-                                 order)});
+            Blocks blocks(
+                {block({0.0, 0.0, 0.0}, {0.2, 0.2, 0.1}, {2, 2, 1}, order),
+                 block({-over, -over, 0.1 + 2 * radius}, {0.2 + 2 * over, 0.2 + 2 * over, 0.1}, {3, 3, 1}, order)});
             const auto& rows = blocks.collect(blocks.system.initial_state());
             std::size_t corners = 0;
             for (const auto& contact : rows.contacts()) {

@@ -253,8 +253,8 @@ TEST(MeshContactScene, AFastBlockDoesNotGoThroughAThinOne) {
 // ---- The rest of the program ----
 
 TEST(MeshContactScene, WorksWithEveryMethodThatTakesContacts) {
-    for (const std::string method : {"euler_implicit_linearized", "moreau_jean", "linearly_implicit_trapezoidal",
-                                     "nonsmooth_generalized_alpha"}) {
+    for (const std::string method :
+         {"euler_implicit_linearized", "moreau_jean", "linearly_implicit_trapezoidal", "nonsmooth_generalized_alpha"}) {
         Running run(parse_scene(
             "step: 0.002\nend: 0.2\nintegrator: " + method +
                 "\nmaterials: {m: {friction: 0.4}}\nelastic_blocks:\n"

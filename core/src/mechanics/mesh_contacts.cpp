@@ -21,8 +21,11 @@ namespace delassus::mechanics {
 // in two passes, the vertices of each over the other. The cone of a flat or hollow edge holds no leaning direction, so
 // a node that slides over the borders of triangles is not caught there. Both sides have a cone: where the ridge is
 // sharp, −n must lie in that of the vertex too. Without this test a corner that bulges over the rim of its support
-// would be pushed outward by the rim, though what rests there is the rim under the face: its vertices, and its crossings
-// with the edges of the face, which hold a node that hangs over by little.
+// would be pushed outward by the rim, though what rests there is the rim under the face: its vertices, and its
+// crossings with the edges of the face. That test alone would be too strict where faces are pressed together and are
+// not quite flat any more: which of two rims one over the other touches is then a matter of rounding, and a node that
+// is let go for one step springs up by its share of the compression. So a face goes on beyond its rim by R/2 for what
+// faces it, with its own normal, and with the gap of the distance to the rim.
 //
 // Why nodes over triangles in two passes, and not an integral over the surfaces (mortar): a contact bounds the gap
 // where it is, so that corners and rims hold as well as faces, and each is a point with a cone of its own. The price is
@@ -41,19 +44,24 @@ namespace delassus::mechanics {
 // What is fast is looked for on its way, as bodies are (collision/swept_pair.hpp): each feature is moved with the
 // velocities of the beginning and the weight until the gap is in the envelope. The points of that place are carried
 // back, and the gap is what they have to go along the normal of the meeting.
+//
+// That foresees no elastic forces, and those of a node that has just been let go move it far in a step: its share of
+// the compression, whatever the step. So the envelope is as wide as the layers are thick unless a scene says otherwise.
 
 namespace {
 
 constexpr double inside_tolerance = 1e-6;  // barycentric: rims that coincide but for rounding
 constexpr double rounding_angle = 1e-9;
-constexpr double flat_angle = 1e-5;    // directions this near to a face's normal are of the face
-constexpr double edge_angle = 0.05;    // likewise of crossing edges: faces that are pressed together are not flat
-constexpr double same_crossing = 0.02; // share of an edge: crossings this near to a vertex are at it
-constexpr double same_angle = 0.05;    // contacts of one vertex that differ by less are one
-constexpr double same_vertex = 1e-3;   // barycentric: a foot this near to a vertex is there
+constexpr double flat_angle = 1e-5;     // directions this near to a face's normal are of the face
+constexpr double edge_angle = 0.05;     // likewise of crossing edges: faces that are pressed together are not flat
+constexpr double same_crossing = 0.02;  // share of an edge: crossings this near to a vertex are at it
+constexpr double same_angle = 0.05;     // contacts of one vertex that differ by less are one
+constexpr double same_vertex = 1e-3;    // barycentric: a foot this near to a vertex is there
 constexpr double facing_cosine = 0.05;
 constexpr double parallel_sine = 1e-2;
-constexpr double depth_share = 0.25;   // of an edge: how far behind a surface a vertex is still pushed out
+constexpr double rim_share = 0.5;     // of the sum of the radii: how far a face goes on beyond its rim
+constexpr double rim_angle = 0.1;     // for what faces it up to this angle
+constexpr double depth_share = 0.25;  // of an edge: how far behind a surface a vertex is still pushed out
 
 constexpr std::uint64_t ridge_flag = 0x800, patch_bits = 0x7ff;
 
@@ -78,7 +86,7 @@ Box3d enlarged(Box3d box, double more) {
     return box;
 }
 
-void make_unique(std::vector<std::int32_t>& numbers) {
+void sort_unique(std::vector<std::int32_t>& numbers) {
     std::sort(numbers.begin(), numbers.end());
     numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
 }
@@ -137,8 +145,9 @@ void MeshContacts::find_near_pairs(double envelope) {
     for (std::size_t i = 0; i < order_.size(); ++i)
         for (std::size_t j = i + 1; j < order_.size(); ++j) {
             const std::int32_t a = order_[i], b = order_[j];
-            if (box(b).min().x() > box(a).max().x() + 2.0 * thickest + envelope) break;
-            const double reach = surfaces_[to_index(a)].radius + surfaces_[to_index(b)].radius + envelope;
+            if (box(b).min().x() > box(a).max().x() + 2.0 * thickest + std::max(envelope, 2.0 * thickest)) break;
+            const double reach =
+                surfaces_[to_index(a)].radius + surfaces_[to_index(b)].radius + std::max(envelope, 2.0 * thickest);
             if (enlarged(box(a), reach).intersects(box(b))) pairs_.emplace_back(std::min(a, b), std::max(a, b));
         }
     std::sort(pairs_.begin(), pairs_.end());
@@ -147,8 +156,8 @@ void MeshContacts::find_near_pairs(double envelope) {
 void MeshContacts::touch(std::int32_t a, std::int32_t b, double envelope, std::vector<MeshContact>& contacts) {
     const Surface &one = surfaces_[to_index(a)], &other = surfaces_[to_index(b)];
     radii_ = one.radius + other.radius;
-    envelope_ = envelope;
-    still_ = one.surface.longest_way() + other.surface.longest_way() <= envelope;
+    envelope_ = envelope > 0.0 ? envelope : radii_;
+    still_ = one.surface.longest_way() + other.surface.longest_way() <= envelope_;
     met_.clear();
     for (auto& vertices : touching_) vertices.clear();
     for (auto& vertices : on_nodes_) vertices.clear();
@@ -176,7 +185,7 @@ void MeshContacts::vertices_on_surface(std::int32_t a, std::int32_t b, bool seco
         if (triangles_.empty()) continue;
         candidates_.clear();
         for (const std::int32_t t : triangles_)
-            on_triangle(a_->vertex_point(vertex), a_->normal(vertex), b_->triangles()[to_index(t)]);
+            on_triangle(a_->vertex_point(vertex), a_->normal(vertex), vertex, b_->triangles()[to_index(t)]);
         for (const std::int32_t t : triangles_)
             for (const std::int32_t e : b_->triangles()[to_index(t)].edges) {
                 const MeshSurface::Edge& edge = b_->edges()[to_index(e)];
@@ -229,7 +238,7 @@ void MeshContacts::sides_on_surface(std::int32_t a, std::int32_t b, bool second,
             continue;
         b_->near(enlarged(box, margin), triangles_);
         candidates_.clear();
-        for (const std::int32_t t : triangles_) on_triangle(point, middle.normal, b_->triangles()[to_index(t)]);
+        for (const std::int32_t t : triangles_) on_triangle(point, middle.normal, -1, b_->triangles()[to_index(t)]);
         leave_out_copies();
         for (const Candidate& candidate : candidates_) {
             if (held_together(point, candidate.foot)) continue;
@@ -268,7 +277,21 @@ bool MeshContacts::faces(std::int32_t vertex, const Vector3d& normal, bool sharp
     return !sharp || a_->is_top(vertex, -normal, flat_angle, share);
 }
 
-void MeshContacts::on_triangle(const CarriedPoint& point, const Vector3d& outward,
+// How far a foot lies beyond the sharp edges of a triangle; more than that if it is beyond another edge.
+double MeshContacts::beyond_rim(const MeshSurface::Triangle& triangle, const Vector3d& foot, double share) const {
+    double beyond = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const double l = foot[static_cast<Eigen::Index>((k + 2) % 3)];  // 0 at the edge from corner k to k + 1
+        if (l >= -inside_tolerance) continue;
+        const MeshSurface::Edge& edge = b_->edges()[to_index(triangle.edges[k])];
+        if (!edge.sharp) return HUGE_VAL;
+        const Vector3d third = b_->at(triangle.corners[(k + 2) % 3], share) - b_->at(edge.tail, share);
+        beyond = std::hypot(beyond, -l * third.dot(b_->inward(triangle, edge, share)));
+    }
+    return beyond;
+}
+
+void MeshContacts::on_triangle(const CarriedPoint& point, const Vector3d& outward, std::int32_t vertex,
                                const MeshSurface::Triangle& triangle) {
     const Vector3d begin = a_->place_of(point), own_way = a_->way_of(point);
     Vector3d normal, foot;
@@ -277,20 +300,28 @@ void MeshContacts::on_triangle(const CarriedPoint& point, const Vector3d& outwar
         normal = share == 0.0 ? triangle.normal : b_->normal_at(triangle, share);
         const Vector3d p = begin + share * own_way, a = b_->at(triangle.corners[0], share);
         height = normal.dot(p - a);
-        foot = barycentric(a, b_->at(triangle.corners[1], share), b_->at(triangle.corners[2], share),
-                           p - height * normal);
+        foot =
+            barycentric(a, b_->at(triangle.corners[1], share), b_->at(triangle.corners[2], share), p - height * normal);
         Vector3d way = own_way;
         for (std::size_t k = 0; k < 3; ++k)
             way -= std::clamp(foot[static_cast<Eigen::Index>(k)], 0.0, 1.0) * b_->way(triangle.corners[k]);
         return {height - radii_, normal.dot(way)};
     };
     const double share = meeting(measure);
-    if (share < 0.0 || height < -depth_ || foot.minCoeff() < -inside_tolerance) return;
-    if (normal.dot(outward) > -facing_cosine) return;
+    if (share < 0.0 || height < -depth_ || normal.dot(outward) > -facing_cosine) return;
+    double beyond = 0.0;
+    if (foot.minCoeff() < -inside_tolerance) {
+        if (vertex < 0 || height <= 0.0) return;
+        beyond = beyond_rim(triangle, foot, share);
+        if (beyond > rim_share * radii_ || !a_->is_top(vertex, -normal, rim_angle, share)) return;
+        foot = foot.cwiseMax(0.0);
+        foot /= foot.sum();
+    }
     Candidate candidate;
     candidate.foot = b_->project(triangle, foot, begin + share * own_way, share, normal);
     candidate.normal = normal;
     candidate.gap = normal.dot(begin - b_->place_of(candidate.foot)) - radii_;
+    if (beyond > 0.0) candidate.gap += std::hypot(height, beyond) - height;
     candidate.patch = triangle.patch & static_cast<std::int32_t>(patch_bits);
     Eigen::Index nearest = 0;
     if (foot.maxCoeff(&nearest) > 1.0 - same_vertex)
@@ -396,14 +427,14 @@ void MeshContacts::crossing_edges(std::int32_t a, std::int32_t b, std::vector<Me
             other.near(box, triangles_);
             near_edges_.clear();
             for (const std::int32_t t : triangles_)
-                for (const std::int32_t e : other.triangles()[to_index(t)].edges) near_edges_.push_back(e);
-            make_unique(near_edges_);
+                for (const std::int32_t e : other.triangles()[to_index(t)].edges)
+                    if (!other.edges()[to_index(e)].inner) near_edges_.push_back(e);
+            sort_unique(near_edges_);
             for (const std::int32_t e : near_edges_) visit(sharp, e);
         }
     };
-    for_each_sharp_edge(*a_, *b_, [&](std::int32_t of_a, std::int32_t of_b) {
-        edge_on_edge(a, b, of_a, of_b, contacts);
-    });
+    for_each_sharp_edge(*a_, *b_,
+                        [&](std::int32_t of_a, std::int32_t of_b) { edge_on_edge(a, b, of_a, of_b, contacts); });
     for_each_sharp_edge(*b_, *a_, [&](std::int32_t of_b, std::int32_t of_a) {
         if (!a_->edges()[to_index(of_a)].sharp) edge_on_edge(a, b, of_a, of_b, contacts);
     });

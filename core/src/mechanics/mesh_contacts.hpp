@@ -43,9 +43,9 @@ public:
     void set_holds(std::vector<std::int32_t> holds) { holds_ = std::move(holds); }
     [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; }
 
-    /// contacts ← those nearer than envelope (m), or that the way of the step brings so near. x: positions of all nodes
-    /// of the system; way: how they would move in the step if nothing touched them. First those of vertices, by their
-    /// nodes, then the others by their surfaces.
+    /// contacts ← those whose gap is below the envelope (m; 0: the sum of both radii), or that the way of the step
+    /// brings so near. x: positions of all nodes of the system; way: how they would move in the step if nothing touched
+    /// them. First those of vertices, by their nodes, then the others by their surfaces.
     void find(std::span<const Vector3d> x, std::span<const Vector3d> way, double envelope,
               std::vector<MeshContact>& contacts);
 
@@ -62,7 +62,10 @@ private:
     void touch(std::int32_t a, std::int32_t b, double envelope, std::vector<MeshContact>& contacts);
     void vertices_on_surface(std::int32_t a, std::int32_t b, bool second, std::vector<MeshContact>& contacts);
     void sides_on_surface(std::int32_t a, std::int32_t b, bool second, std::vector<MeshContact>& contacts);
-    void on_triangle(const CarriedPoint& point, const Vector3d& outward, const MeshSurface::Triangle& triangle);
+    /// vertex: the point's, or −1.
+    void on_triangle(const CarriedPoint& point, const Vector3d& outward, std::int32_t vertex,
+                     const MeshSurface::Triangle& triangle);
+    [[nodiscard]] double beyond_rim(const MeshSurface::Triangle& triangle, const Vector3d& foot, double share) const;
     void on_edge(std::int32_t vertex, const MeshSurface::Edge& edge);
     void on_vertex(std::int32_t vertex, std::int32_t other, std::int32_t patch);
     /// Whether the vertex of a may be pushed along a direction by a feature of b.
@@ -85,12 +88,12 @@ private:
     bool still_ = true;  ///< its features cannot come nearer by more than the envelope
     std::vector<Candidate> candidates_;
     std::vector<std::int32_t> triangles_, near_edges_;
-    std::vector<std::int32_t> edge_seen_, vertex_seen_;  // of b: the last point that looked at it
-    std::vector<std::pair<std::int32_t, std::int32_t>> met_;     // vertices of the first over those of the second
-    std::array<std::vector<std::int32_t>, 2> touching_;          // vertices of each, ascending
-    std::array<std::vector<std::int32_t>, 2> on_nodes_;          // those of them that are over vertices of the other
-    std::array<std::vector<std::int32_t>, 2> crossed_;           // vertices at which edges cross
-    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_;   // of surfaces
+    std::vector<std::int32_t> edge_seen_, vertex_seen_;         // of b: the last point that looked at it
+    std::vector<std::pair<std::int32_t, std::int32_t>> met_;    // vertices of the first over those of the second
+    std::array<std::vector<std::int32_t>, 2> touching_;         // vertices of each, ascending
+    std::array<std::vector<std::int32_t>, 2> on_nodes_;         // those of them that are over vertices of the other
+    std::array<std::vector<std::int32_t>, 2> crossed_;          // vertices at which edges cross
+    std::vector<std::pair<std::int32_t, std::int32_t>> pairs_;  // of surfaces
     std::vector<std::int32_t> order_;
     std::vector<char> has_normals_;
 };

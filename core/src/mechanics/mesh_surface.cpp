@@ -86,7 +86,9 @@ void MeshSurface::find_edges() {
             edge.triangles[j] = halves[i + j].triangle;
             triangles_[to_index(halves[i + j].triangle)].edges[to_index(halves[i + j].place)] = number;
         }
-        edge.sharp = !pair || one.normal.dot(inward(triangles_[to_index(edge.triangles[1])], edge, 0.0)) < -sharp_sine ||
+        edge.inner = pair && one.side == triangles_[to_index(edge.triangles[1])].side;
+        edge.sharp = !pair ||
+                     one.normal.dot(inward(triangles_[to_index(edge.triangles[1])], edge, 0.0)) < -sharp_sine ||
                      one.normal.dot(triangles_[to_index(edge.triangles[1])].normal) < -0.5;
         if (edge.sharp) {
             sharp_edges_.push_back(number);
@@ -185,7 +187,8 @@ void MeshSurface::find_normals() {
     for (Edge& edge : edges_) {
         edge.convex = edge.triangles[1] < 0;
         if (!edge.convex) {
-            const Triangle &one = triangles_[to_index(edge.triangles[0])], &other = triangles_[to_index(edge.triangles[1])];
+            const Triangle &one = triangles_[to_index(edge.triangles[0])],
+                           &other = triangles_[to_index(edge.triangles[1])];
             edge.convex = one.normal.dot(inward(other, edge, 0.0)) < -flat_sine || one.normal.dot(other.normal) < 0.0;
         }
         if (edge.convex) convex_vertex_[to_index(edge.tail)] = convex_vertex_[to_index(edge.head)] = 1;

@@ -45,6 +45,7 @@ public:
         std::array<std::int32_t, 2> triangles{-1, -1};  ///< the second is −1 at a rim
         bool sharp = false;   ///< convex by more than 20° at t = 0, or a rim: crossing ones may touch
         bool convex = false;  ///< now, by more than rounding, or a rim
+        bool inner = false;   ///< inside a quadratic side
     };
 
     /// sides: of nodes of the system, at these positions.

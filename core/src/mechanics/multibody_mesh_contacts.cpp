@@ -41,6 +41,7 @@ private:
 struct MultibodySystem::Implementation::MeshTouching {
     MeshContacts finder;
     std::vector<std::int32_t> shape_of_node;  ///< its sphere among the shapes, −1: none
+    double envelope = 0.0;                    ///< as the user gave it; 0: by the radii
     // Work space of a step.
     std::vector<Vector3d> x, way;
     std::vector<MeshContact> contacts;
@@ -68,9 +69,8 @@ void MultibodySystem::Implementation::make_mesh_contacts() {
     std::map<std::int32_t, std::vector<mechanics::ElementSide>> surfaces;
     for (const auto& side : mechanics::outer_sides(element_sides)) {
         bool touches = true;
-        side.for_each_node([&](std::int32_t node) {
-            touches = touches && shape_of_node[static_cast<std::size_t>(node)] >= 0;
-        });
+        side.for_each_node(
+            [&](std::int32_t node) { touches = touches && shape_of_node[static_cast<std::size_t>(node)] >= 0; });
         if (touches) surfaces[meshes.root(side.corners[0])].push_back(side);
     }
     const auto moves = [&](std::int32_t node) { return nodes[static_cast<std::size_t>(node)].column >= 0; };
@@ -79,7 +79,8 @@ void MultibodySystem::Implementation::make_mesh_contacts() {
         for (const auto& side : sides) side.for_each_node([&](std::int32_t node) { any_moves |= moves(node); });
     if (surfaces.size() < 2 || !any_moves) return;
     mesh_touching = std::make_shared<MeshTouching>();
-    auto& [finder, node_shapes, x, way, contacts] = *mesh_touching;
+    auto& [finder, node_shapes, given_envelope, x, way, contacts] = *mesh_touching;
+    given_envelope = envelope;
     for (const auto& node : nodes) x.push_back(vector(node.parameters.position));
     const auto contact_of = [&](std::int32_t node) -> const NodeContact& {
         return node_contacts[static_cast<std::size_t>(shape_of_node[static_cast<std::size_t>(node)]) - shapes.size()];
@@ -106,7 +107,7 @@ void MultibodySystem::Implementation::make_mesh_contacts() {
 
 // Nodes move on as in predict_displacements().
 void MultibodySystem::Implementation::collect_mesh_contacts(const State& state, double h, UnilateralRows& rows) {
-    auto& [finder, shape_of_node, x, way, contacts] = *mesh_touching;
+    auto& [finder, shape_of_node, given_envelope, x, way, contacts] = *mesh_touching;
     const Vector3d fall = h * load_factor * vector(gravity);
     x.resize(nodes.size());
     way.resize(nodes.size());
@@ -115,7 +116,7 @@ void MultibodySystem::Implementation::collect_mesh_contacts(const State& state, 
         x[k] = node.x;
         way[k] = node.column < 0 ? Vector3d::Zero() : Vector3d(h * (node.v + fall));
     }
-    finder.find(x, way, envelope, contacts);
+    finder.find(x, way, given_envelope, contacts);
     const auto first_surface = static_cast<std::int32_t>(shapes.size() + node_contacts.size());
     const auto shapes_of = [&, &shape_of = shape_of_node](const MeshContact& contact) {
         return std::pair(contact.kind == MeshContact::Kind::Vertex

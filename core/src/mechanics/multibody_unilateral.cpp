@@ -15,7 +15,17 @@ using mechanics::Vector3d;
 namespace {
 
 /// Keys of blocks: what kind, then which one.
-enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4, Friction = 5, Actuator = 6, MeshVertex = 7, MeshSide = 8, MeshEdges = 9 };
+enum class KeyKind : std::uint64_t {
+    Lower = 1,
+    Upper = 2,
+    Motor = 3,
+    Contact = 4,
+    Friction = 5,
+    Actuator = 6,
+    MeshVertex = 7,
+    MeshSide = 8,
+    MeshEdges = 9
+};
 
 std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0, std::uint64_t third = 0) {
     // 4 + 24 + 24 + 12 bits.
@@ -39,8 +49,7 @@ std::uint64_t key_of(const ContactPoint& contact) {
 
 }  // namespace
 
-std::uint64_t MultibodySystem::Implementation::mesh_contact_key(int kind,
-                                                                const std::array<std::uint64_t, 3>& feature) {
+std::uint64_t MultibodySystem::Implementation::mesh_contact_key(int kind, const std::array<std::uint64_t, 3>& feature) {
     constexpr std::array kinds = {KeyKind::MeshVertex, KeyKind::MeshSide, KeyKind::MeshEdges};
     return key_of(kinds[static_cast<std::size_t>(kind)], feature[0], feature[1], feature[2]);
 }

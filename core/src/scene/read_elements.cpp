@@ -191,7 +191,8 @@ void SystemReader::read_initial_velocity(const YAML::Node& item, const Copy& cop
               {"velocity", [&](const YAML::Node& n) { velocity = vector3(source_, n, "velocity"); }},
               {"repeat", [](const YAML::Node&) {}}});
     if (!sides.elastic.IsDefined() || !velocity)
-        source_.refuse(item, fmt::format("an initial velocity lacks the key \"{}\"", velocity ? "elastic" : "velocity"));
+        source_.refuse(item,
+                       fmt::format("an initial velocity lacks the key \"{}\"", velocity ? "elastic" : "velocity"));
     const Elastic& elastic = elastic_of(sides, copy);
     const AlignedBox box = box_named(item, elastic, sides, "initial velocity");
     const auto nodes = result_.system->nodes_in(elastic.first, elastic.nodes, box);
