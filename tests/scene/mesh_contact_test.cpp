@@ -155,6 +155,36 @@ TEST(MeshContactScene, ABlockSlidesDownASlopeAsARigidOne) {
     }
 }
 
+// ---- examples/scenes/elastic_contact.yaml ----
+
+TEST(MeshContactScene, ThreePressedBlocksShrinkByTheirLoads) {
+    Running run(read_scene(example_scene("elastic_contact")), 0);
+    const auto start = run.simulation.state();
+    run.finish();
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0) << run.simulation.totals().first_unsolved;
+    double top = 0.0;
+    int nodes = 0;
+    for (std::int32_t node = 0; node < run.system().node_count(); ++node) {
+        const double z = run.system().node_position(start, node)[2];
+        if (z < 0.3079) continue;
+        top += run.system().node_position(run.simulation.state(), node)[2] - z;
+        ++nodes;
+    }
+    EXPECT_EQ(nodes, 16);
+    EXPECT_NEAR(top / nodes, -2.001e-3, 1e-3 * 2e-3);
+    EXPECT_NEAR(vertical_force(run), 2 * 400.0, 1e-3 * 400.0) << "through each of two interfaces";
+    EXPECT_LT(run.simulation.totals().worst_penetration, 1e-6);
+}
+
+TEST(MeshContactScene, TheExampleOfASlopeSlides) {
+    if (!has_collision) GTEST_SKIP() << "this build has no collision";
+    Running run(read_scene(example_scene("elastic_contact")), 1);
+    while (run.simulation.state().t < 0.2 - 1e-9) run.simulation.step();
+    const double before = run.simulation.record().momentum[0];
+    run.finish();
+    EXPECT_NEAR((run.simulation.record().momentum[0] - before) / (0.2 * 0.42), 1.1095, 0.01 * 1.1095);
+}
+
 // ---- Impacts ----
 
 // Corner first, off-centre, nothing else about: momentum is kept to rounding, energy never grows.
