@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "delassus/plan.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::tests::mesh_contact_test {
@@ -313,6 +314,18 @@ TEST(MeshContactScene, PilesFallAsleepAsOnePart) {
     run.finish();
     EXPECT_EQ(run.simulation.record().sleeping, 4 + 8) << "all nodes that move";
     EXPECT_GT(run.simulation.totals().resting_parts, 0);
+}
+
+TEST(MeshContactScene, ThePlanKnowsThem) {
+    Scene scene = read_scene(example_scene("elastic_contact"));
+    const SystemPlan plan = make_plan(scene, registry()).at(0);
+    const auto named = [](const std::vector<PlanLine>& lines, const std::string& what) {
+        return std::any_of(lines.begin(), lines.end(), [&](const PlanLine& line) { return line.what == what; });
+    };
+    EXPECT_TRUE(named(plan.kept, "contacts between meshes"));
+    EXPECT_TRUE(named(plan.left_out, "collision detection")) << "no body has a shape";
+    EXPECT_EQ(std::count(plan.libraries.begin(), plan.libraries.end(), "delassus_collision.so"), 0);
+    EXPECT_FALSE(plan.solvers.empty());
 }
 
 TEST(MeshContactScene, InitialVelocitiesOfFacesAndBoxes) {
