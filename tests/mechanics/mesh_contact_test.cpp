@@ -223,6 +223,21 @@ TEST(MeshContact, IsFoundOnTheWay) {
     EXPECT_TRUE(past.collect(past.system.initial_state(), 0.0051).contacts().empty());
 }
 
+// It begins a millimetre above the plane of the lower block and 50 mm beside it, and comes over it within the step.
+TEST(MeshContact, IsFoundWhereANodeComesOverAFaceWithinTheStep) {
+    auto blocks = pile(1, 1, 1);
+    blocks[1].corner[0] -= 0.25;
+    blocks[1].corner[2] += 0.001;
+    blocks[1].velocity = {100.0, 0.0, -1.0};
+    Blocks system(blocks);
+    const auto& contacts = system.collect(system.system.initial_state(), 0.0015).contacts();
+    ASSERT_FALSE(contacts.empty());
+    for (const auto& contact : contacts) {
+        EXPECT_NEAR(contact.gap, 0.001, 1e-12);
+        EXPECT_NEAR(std::abs(contact.normal[2]), 1.0, 1e-12);
+    }
+}
+
 TEST(MeshContact, MeshesThatOneBodyCarriesDoNotTouchWhereItHoldsThem) {
     for (const bool fixed : {true, false}) {
         MultibodySystem system;

@@ -42,7 +42,7 @@ namespace delassus::mechanics {
 // negative in its middle. So the work of a contact is that of the gap that it bounds.
 //
 // What is fast is looked for on its way, as bodies are (collision/swept_pair.hpp): each feature is moved with the
-// velocities of the beginning and the weight until the gap is in the envelope. The points of that place are carried
+// velocities of the beginning and the weight until the gap closes. The points of that place are carried
 // back, and the gap is what they have to go along the normal of the meeting.
 //
 // That foresees no elastic forces, and those of a node that has just been let go move it far in a step: its share of
@@ -257,23 +257,26 @@ void MeshContacts::sides_on_surface(std::int32_t a, std::int32_t b, bool second,
     }
 }
 
+// What is in the envelope counts where it is. But what moves fast past a ridge would be held up by the leaning normal
+// that the ridge has now: there, as of all that is farther away, the gap has to close.
 template <class Gap>
-double MeshContacts::meeting(Gap&& gap) const {
+double MeshContacts::meeting(bool over_face, Gap&& gap) const {
     constexpr double never = -1.0;
     constexpr int most_advances = 32;
+    const double closed = 0.05 * envelope_;
     double share = 0.0;
     for (int i = 0; i < most_advances; ++i) {
         const GapAndRate now = gap(share);
-        if (now.gap < envelope_) return share;
+        if (now.gap < (i == 0 && (over_face || still_) ? envelope_ : closed)) return share;
         if (still_ || !(now.rate < 0.0)) return never;
-        share += (now.gap - 0.5 * envelope_) / -now.rate;
+        share += (now.gap - 0.5 * closed) / -now.rate;
         if (share > 1.0) return never;
     }
     return never;
 }
 
 bool MeshContacts::faces(std::int32_t vertex, const Vector3d& normal, bool sharp, double share) const {
-    if (normal.dot(a_->normal(vertex)) > -facing_cosine) return false;  // as on_triangle()
+    if (normal.dot(a_->normal(vertex)) > -facing_cosine) return false;
     return !sharp || a_->is_top(vertex, -normal, flat_angle, share);
 }
 
@@ -307,8 +310,17 @@ void MeshContacts::on_triangle(const CarriedPoint& point, const Vector3d& outwar
             way -= std::clamp(foot[static_cast<Eigen::Index>(k)], 0.0, 1.0) * b_->way(triangle.corners[k]);
         return {height - radii_, normal.dot(way)};
     };
-    const double share = meeting(measure);
-    if (share < 0.0 || height < -depth_ || normal.dot(outward) > -facing_cosine) return;
+    double share = meeting(true, measure);
+    if (share < 0.0) return;
+    // Near its plane already and beside it, it may still come over the triangle before it touches.
+    if (!still_ && foot.minCoeff() < -inside_tolerance) {
+        const GapAndRate now = measure(share);
+        if (now.gap > 0.0 && now.gap < -now.rate * (1.0 - share)) {
+            share += now.gap / -now.rate;
+            measure(share);
+        }
+    }
+    if (height < -depth_ || normal.dot(outward) > -facing_cosine) return;
     double beyond = 0.0;
     if (foot.minCoeff() < -inside_tolerance) {
         if (vertex < 0 || height <= 0.0) return;
@@ -343,7 +355,7 @@ void MeshContacts::on_edge(std::int32_t vertex, const MeshSurface::Edge& edge) {
         const Vector3d way = a_->way(vertex) - (1.0 - inside) * b_->way(edge.tail) - inside * b_->way(edge.head);
         return {distance - radii_, normal.dot(way)};
     };
-    const double share = meeting(measure);
+    const double share = meeting(false, measure);
     if (share < 0.0 || along <= 0.0 || along >= 1.0) return;
     for (const auto t : edge.triangles)
         if (t >= 0 && normal.dot(b_->inward(b_->triangles()[to_index(t)], edge, share)) > rounding_angle) return;
@@ -374,7 +386,7 @@ void MeshContacts::on_vertex(std::int32_t vertex, std::int32_t other, std::int32
         normal /= std::max(distance, 1e-300);
         return {distance - radii_, normal.dot(a_->way(vertex) - b_->way(other))};
     };
-    const double share = meeting(measure);
+    const double share = meeting(false, measure);
     if (share < 0.0 || !b_->is_top(other, normal, rounding_angle, share)) return;
     const bool sharp = b_->has_sharp_edge(other);
     if (!faces(vertex, normal, sharp, share)) return;
@@ -472,7 +484,7 @@ void MeshContacts::edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_
                              t * b_->way(other.head);
         return {normal.dot(p + on_a * u - q - on_b * w) - radii_, normal.dot(way)};
     };
-    const double share = meeting(measure);
+    const double share = meeting(false, measure);
     if (share < 0.0 || on_a < 0.0 || on_a > 1.0 || on_b < 0.0 || on_b > 1.0) return;
     // An edge that is not sharp may be hollow: then directions between its normals are let pass.
     const auto in_cone = [&](const MeshSurface& surface, const MeshSurface::Edge& edge, double sign) {
