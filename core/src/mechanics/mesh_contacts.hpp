@@ -75,8 +75,8 @@ private:
     void edge_on_edge(std::int32_t a, std::int32_t b, std::int32_t of_a, std::int32_t of_b,
                       std::vector<MeshContact>& contacts);
     [[nodiscard]] bool held_together(const CarriedPoint& a, const CarriedPoint& b) const;
-    /// The share of the way after which a gap is in the envelope, or closed; gap(share) gives it and its rate. Negative:
-    /// never.
+    /// The share of the way after which a gap is in the envelope, or closed; gap(share) gives it and its rate.
+    /// Negative: never.
     template <class Gap>
     [[nodiscard]] double meeting(bool over_face, Gap&& gap) const;
 
