@@ -96,6 +96,7 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["limits"] = "limits: {@}";
     scenes["joint_spring"] = ball + "joints: [{spring: {@}}]";
     scenes["coordinate"] = ball + "joints: [{slide: {@}}]";
+    scenes["initial_velocity"] = ball + "initial_velocities: [{@}]";
     scenes["actuator"] = ball + "actuators: [{@}]";
     scenes["body_motion"] = "step: 1\nend: 1\nbodies: [{motion: {@}}]";
     scenes["rotation"] = "step: 1\nend: 1\nbodies: [{motion: {rotation: {@}}}]";

@@ -235,7 +235,9 @@ struct ElasticBlock {
     ElementOrder order = ElementOrder::Quadratic;
     std::array<bool, 6> fixed_faces{};  ///< x_min, x_max, y_min, y_max, z_min, z_max: their nodes do not move
     Vector3 velocity{};                 ///< m/s
-    double contact_radius = 0.0;  ///< m; nodes of the surface touch bodies as spheres of this radius; 0: not at all
+    /// m; nodes of the surface touch bodies as spheres of this radius, and surfaces of two meshes touch at the sum of
+    /// their radii; 0: not at all.
+    double contact_radius = 0.0;
     std::int32_t contact_material = -1;
 };
 
@@ -370,7 +372,9 @@ public:
     BodyIndex add_elastic_beam(const ElasticBeamParameters& beam);
     /// shape.body names the body; material indexes what add_material() returned.
     void add_shape(const Shape& shape, std::int32_t material);
-    /// A node touches shapes of bodies as a small sphere; nodes do not touch one another. radius: m, > 0.
+    /// A node touches shapes of bodies as a small sphere. radius: m, > 0. The outer sides of tetrahedra whose nodes all
+    /// touch are surfaces that touch those of other meshes, where the distance is the sum of the radii; elements that
+    /// share nodes are one mesh, and a mesh does not touch itself. Nodes touch no nodes.
     void add_node_contact(std::int32_t node, double radius, std::int32_t material);
     std::int32_t add_material(const ContactMaterial& material);
     /// Contacts of these two materials. Unless set: the geometric mean of μ, the larger restitution.
@@ -406,6 +410,9 @@ public:
     /// Those of the nodes first … first + count − 1 that lie in the box at t = 0, ascending.
     [[nodiscard]] std::vector<std::int32_t> nodes_in(std::int32_t first, std::int32_t count,
                                                      const AlignedBox& box) const;
+    /// Replaces the velocity at t = 0 of those of these nodes that are not fixed (m/s); before finish(). Throws
+    /// InputError if all of them are fixed.
+    void set_initial_velocity(const std::vector<std::int32_t>& nodes, const Vector3& velocity);
     /// Nodes that no tetrahedron holds, ascending.
     [[nodiscard]] std::vector<std::int32_t> loose_nodes() const;
     /// The two nodes of each cable.
@@ -471,9 +478,10 @@ public:
     /// Names of the joints that have rows that are left out, ascending by joint.
     [[nodiscard]] std::vector<std::string> joints_with_rows_left_out() const;
 
-    /// The spheres of nodes have the numbers from shapes().size() on, in the order of add_node_contact().
-    /// The bodies of a contact's first and its second shape, or body_count() + number of a node; world_body for the
-    /// world.
+    /// The spheres of nodes have the numbers from shapes().size() on, in the order of add_node_contact(); after them
+    /// come the surfaces of meshes, in the order of their first nodes.
+    /// The bodies of a contact's first and its second shape, or body_count() + number of a node: of a surface its first
+    /// node. world_body for the world.
     [[nodiscard]] std::array<std::int32_t, 2> contact_bodies(const ContactPoint& contact) const;
     [[nodiscard]] double kinetic_energy(const State& state) const;
     /// Linear momentum (kg m/s), and angular momentum about the origin (kg m²/s), world frame.

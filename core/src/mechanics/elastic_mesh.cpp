@@ -49,6 +49,21 @@ std::vector<std::int32_t> MultibodySystem::nodes_in(std::int32_t first, std::int
     return result;
 }
 
+void MultibodySystem::set_initial_velocity(const std::vector<std::int32_t>& nodes, const Vector3& velocity) {
+    auto& self = *implementation_;
+    self.must_not_be_finished();
+    if (!finite(velocity)) throw InputError("an initial velocity is not finite");
+    bool any = false;
+    for (const auto number : nodes) {
+        self.check_node(number, "an initial velocity");
+        auto& node = self.nodes[static_cast<std::size_t>(number)].parameters;
+        if (node.fixed) continue;
+        node.velocity = velocity;
+        any = true;
+    }
+    if (!any) throw InputError("an initial velocity has no node that moves");
+}
+
 // ∫ N_a over a side of area A: A/3 for each corner with linear displacements; with quadratic ones A/3 for each middle
 // and nothing for the corners.
 std::vector<NodeShare> MultibodySystem::spread_over_sides(std::int32_t first, std::int32_t count,

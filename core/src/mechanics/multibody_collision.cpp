@@ -47,7 +47,10 @@ double median_size(const std::vector<Shape>& shapes) {
 std::int32_t MultibodySystem::Implementation::owner_of(std::int32_t shape) const {
     const auto index = static_cast<std::size_t>(shape);
     if (index < shapes.size()) return shapes[index].body;
-    return static_cast<std::int32_t>(bodies.size()) + node_contacts[index - shapes.size()].node;
+    const auto count = static_cast<std::int32_t>(bodies.size());
+    const std::size_t node = index - shapes.size();
+    if (node < node_contacts.size()) return count + node_contacts[node].node;
+    return count + first_node_of_surface(node - node_contacts.size());
 }
 
 // Bodies whose motion is prescribed do not touch one another, nor fixed ones.
@@ -75,12 +78,16 @@ void MultibodySystem::Implementation::make_detector() {
         const auto body = static_cast<std::size_t>(shape.body);
         return shape.body >= 0 && !setup.fixed[body] && (body >= bodies.size() || !bodies[body].prescribed);
     });
-    if (!moves || setup.shapes.size() < 2) {
+    if (moves) make_mesh_contacts();
+    const bool bodies_touch = moves && !shapes.empty() && setup.shapes.size() >= 2;
+    if (bodies_touch || mesh_touching) {
+        size = median_size(setup.shapes);
+        if (envelope == 0.0) envelope = 0.05 * size;
+    }
+    if (!bodies_touch) {
         if (!leaves_out) static_cast<void>(make_collision_detector({}));
         return;
     }
-    size = median_size(setup.shapes);
-    if (envelope == 0.0) envelope = 0.05 * size;
     poses.resize(bodies.size() + nodes.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) poses[k] = bodies[k].parameters.pose;
     detector = make_collision_detector(std::move(setup));

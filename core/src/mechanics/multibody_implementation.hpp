@@ -69,7 +69,9 @@ struct MultibodySystem::Implementation {
     double load_factor = 1.0;           // of weight and loads
     double size = 0.0;                  // the median of the shapes that collide
     std::unique_ptr<CollisionDetector> detector;
-    bool leaves_out = true;  ///< what no contact needs
+    struct MeshTouching;
+    std::shared_ptr<MeshTouching> mesh_touching;  // null: no two meshes can meet
+    bool leaves_out = true;                       ///< what no contact needs
 
     // ---- Work space of the call that runs ----
     mutable mechanics::Placements at;
@@ -199,6 +201,11 @@ struct MultibodySystem::Implementation {
     /// displacements ← of a step of length h (s).
     void predict_displacements(double h, const State& state);
     void make_detector();
+    void make_mesh_contacts();
+    /// The first node of a surface that touches other meshes.
+    [[nodiscard]] std::int32_t first_node_of_surface(std::size_t surface) const;
+    /// kind: 0, 1, … as MeshContact::Kind.
+    [[nodiscard]] static std::uint64_t mesh_contact_key(int kind, const std::array<std::uint64_t, 3>& feature);
     void find_bodies_alone(const MultibodySystem& system);
 
     void collect_limits(double h, UnilateralRows& rows) const;
@@ -206,6 +213,8 @@ struct MultibodySystem::Implementation {
     void collect_motors(double t, UnilateralRows& rows) const;
     void collect_actuators(double t, double h, UnilateralRows& rows) const;
     void collect_contacts(UnilateralRows& rows);
+    /// Appends the contacts between meshes, and their rows.
+    void collect_mesh_contacts(const State& state, double h, UnilateralRows& rows);
 };
 
 }  // namespace delassus

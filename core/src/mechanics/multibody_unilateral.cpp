@@ -15,7 +15,17 @@ using mechanics::Vector3d;
 namespace {
 
 /// Keys of blocks: what kind, then which one.
-enum class KeyKind : std::uint64_t { Lower = 1, Upper = 2, Motor = 3, Contact = 4, Friction = 5, Actuator = 6 };
+enum class KeyKind : std::uint64_t {
+    Lower = 1,
+    Upper = 2,
+    Motor = 3,
+    Contact = 4,
+    Friction = 5,
+    Actuator = 6,
+    MeshVertex = 7,
+    MeshSide = 8,
+    MeshEdges = 9
+};
 
 std::uint64_t key_of(KeyKind kind, std::uint64_t first, std::uint64_t second = 0, std::uint64_t third = 0) {
     // 4 + 24 + 24 + 12 bits.
@@ -39,9 +49,14 @@ std::uint64_t key_of(const ContactPoint& contact) {
 
 }  // namespace
 
+std::uint64_t MultibodySystem::Implementation::mesh_contact_key(int kind, const std::array<std::uint64_t, 3>& feature) {
+    constexpr std::array kinds = {KeyKind::MeshVertex, KeyKind::MeshSide, KeyKind::MeshEdges};
+    return key_of(kinds[static_cast<std::size_t>(kind)], feature[0], feature[1], feature[2]);
+}
+
 bool MultibodySystem::detects_contacts() const {
     implementation_->must_be_finished();
-    return implementation_->detector != nullptr;
+    return implementation_->detector || implementation_->mesh_touching;
 }
 
 bool MultibodySystem::has_unilateral() const {
@@ -62,16 +77,18 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     self.collect_motors(state.t + h, rows);
     self.collect_frictions(rows);
     self.collect_actuators(state.t, h, rows);
-    if (!self.detector) return;
-    self.place_shapes(state);
-    self.predict_displacements(h, state);
-    self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
-    if (!self.prescribed.empty())
-        std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
-            return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&
-                   self.point_of(self.owner_of(contact.shape_b), {}).column < 0;
-        });
-    self.collect_contacts(rows);
+    if (self.detector) {
+        self.place_shapes(state);
+        self.predict_displacements(h, state);
+        self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
+        if (!self.prescribed.empty())
+            std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
+                return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&
+                       self.point_of(self.owner_of(contact.shape_b), {}).column < 0;
+            });
+        self.collect_contacts(rows);
+    }
+    if (self.mesh_touching) self.collect_mesh_contacts(state, h, rows);
 }
 
 void MultibodySystem::Implementation::place_shapes(const State& state) {

@@ -180,6 +180,26 @@ void SystemReader::read_attachment(const YAML::Node& item, const Copy& copy) {
     result_.attachments.push_back(std::move(attachment));
 }
 
+// initial_velocities: {elastic, face or box, velocity}
+void SystemReader::read_initial_velocity(const YAML::Node& item, const Copy& copy) {
+    SideKeys sides;
+    std::optional<Vector3> velocity;
+    read_map(source_, item, "an initial velocity",
+             {{"elastic", [&](const YAML::Node& n) { sides.elastic.reset(n); }},
+              {"face", [&](const YAML::Node& n) { sides.face.reset(n); }},
+              {"box", [&](const YAML::Node& n) { sides.box.reset(n); }},
+              {"velocity", [&](const YAML::Node& n) { velocity = vector3(source_, n, "velocity"); }},
+              {"repeat", [](const YAML::Node&) {}}});
+    if (!sides.elastic.IsDefined() || !velocity)
+        source_.refuse(item,
+                       fmt::format("an initial velocity lacks the key \"{}\"", velocity ? "elastic" : "velocity"));
+    const Elastic& elastic = elastic_of(sides, copy);
+    const AlignedBox box = box_named(item, elastic, sides, "initial velocity");
+    const auto nodes = result_.system->nodes_in(elastic.first, elastic.nodes, box);
+    if (nodes.empty()) source_.refuse(item, "an initial velocity holds no node: none lies in its box");
+    at(item, [&] { result_.system->set_initial_velocity(nodes, *velocity); });
+}
+
 void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
     ElasticMeshParameters body;
     body.pose.position = copy.offset;

@@ -31,9 +31,9 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
          [this](const YAML::Node& n) { result_.leave_out = value<bool>(source_, n, "leave_out", "true or false"); }},
         {"limits", [this](const YAML::Node& n) { read_limits(n); }},
         {"envelope", [this](const YAML::Node& n) { envelope_ = positive_number(source_, n, "envelope"); }}};
-    for (const char* list :
-         {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes", "cables", "beams",
-          "joints", "motors", "actuators", "springs", "bushings", "loads", "attachments", "keep_apart"})
+    for (const char* list : {"materials", "material_pairs", "bodies", "nodes", "elastic_blocks", "elastic_meshes",
+                             "cables", "beams", "joints", "motors", "actuators", "springs", "bushings", "loads",
+                             "attachments", "initial_velocities", "keep_apart"})
         all.emplace_back(list, [this, list](const YAML::Node& n) { lists_.insert_or_assign(list, n); });
     return all;
 }
@@ -66,6 +66,7 @@ void SystemReader::build(const YAML::Node& place) {
     read_items("springs", &SystemReader::read_spring);
     read_items("bushings", &SystemReader::read_bushing);
     read_items("loads", &SystemReader::read_load);
+    read_items("initial_velocities", &SystemReader::read_initial_velocity);
     read_items("attachments", &SystemReader::read_attachment);
     if (const auto found = lists_.find("keep_apart"); found != lists_.end()) read_keep_apart(found->second);
     if (!result_.leave_out) result_.system->leave_nothing_out();

@@ -54,6 +54,7 @@ private:
     void read_bushing(const YAML::Node& item, const Copy& copy);
     void read_load(const YAML::Node& item, const Copy& copy);
     void read_attachment(const YAML::Node& item, const Copy& copy);
+    void read_initial_velocity(const YAML::Node& item, const Copy& copy);
     void read_keep_apart(const YAML::Node& node);
 
     /// Reads each item of the list, each of its copies.

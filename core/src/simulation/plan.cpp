@@ -230,6 +230,8 @@ private:
             leave("collision detection",
                   system_.system->shapes().empty() ? "no body has a shape" : "no two shapes could ever meet");
         }
+        if (touching_.meshes() > 1)
+            keep("contacts between meshes", fmt::format("the surfaces of {} meshes touch", touching_.meshes()));
         const bool friction = touching_.friction() || (!touching_.pairs().empty() && !system_.leave_out);
         for (const auto& pair : touching_.pairs()) {
             const auto& first = system_.materials[static_cast<std::size_t>(pair.first)].name;

@@ -13,10 +13,10 @@ Touching::Touching(const SceneSystem& system) : system_(system), apart_(system.a
     // Shapes by material and body: equal ones behave equally.
     std::map<std::int32_t, std::set<BodyIndex>> bodies;
     for (std::size_t i = 0; i < shapes.size(); ++i) bodies[system.shape_material[i]].insert(shapes[i].body);
-    // Nodes do not touch one another: all of them are as one more body.
+    // A mesh does not touch itself: each is as one more body.
     for (const auto material : system.node_contact_material) {
         nodes_touch_ = shape_moves_ = true;
-        bodies[material].insert(static_cast<BodyIndex>(system.bodies.size()));
+        bodies[material].insert(static_cast<BodyIndex>(system.bodies.size()) + meshes_++);
     }
     for (auto first = bodies.begin(); first != bodies.end(); ++first)
         for (auto second = first; second != bodies.end(); ++second)
@@ -29,7 +29,8 @@ bool Touching::friction() const {
 }
 
 bool Touching::detects() const {
-    return shape_moves_ && (nodes_touch_ || system_.system->shapes().size() >= 2);
+    const std::size_t shapes = system_.system->shapes().size();
+    return shape_moves_ && (shapes >= 2 || (nodes_touch_ && shapes > 0));
 }
 
 bool Touching::moves(BodyIndex body) const {

@@ -26,8 +26,10 @@ public:
     [[nodiscard]] bool friction() const;
     /// Whether the system makes a collision detector: see MultibodySystem::finish().
     [[nodiscard]] bool detects() const;
-    /// Whether nodes of blocks, meshes or cables are among what touches.
+    /// Whether nodes of blocks or meshes are among what touches.
     [[nodiscard]] bool nodes_touch() const { return nodes_touch_; }
+    /// How many elastic blocks and meshes touch.
+    [[nodiscard]] std::int32_t meshes() const { return meshes_; }
 
 private:
     [[nodiscard]] bool moves(BodyIndex body) const;
@@ -37,6 +39,7 @@ private:
     const SceneSystem& system_;
     std::set<std::array<BodyIndex, 2>> apart_;
     bool shape_moves_ = false, nodes_touch_ = false;
+    std::int32_t meshes_ = 0;
     std::vector<Pair> pairs_;
 };
 
