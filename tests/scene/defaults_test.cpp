@@ -361,5 +361,23 @@ TEST(Defaults, MethodsWhoseReactionsDoNotDecayAreRefused) {
     EXPECT_EQ(refusal("step: 0.01\nend: 1\nintegrator: trapezoidal\n" + pendulum), "");
 }
 
+// A soft block hits the ground at 8 m/s: elements are pressed so far that M + h² K is indefinite at h = 4 ms.
+TEST(Defaults, ASoftBlockHitsTheGroundHard) {
+    Running run(parse_scene(
+        "step: 0.004\nend: 0.4\nbodies: [{name: ground, fixed: true, shapes: [{plane: {}, material: m}]}]\n"
+        "materials: {m: {friction: 0.5}}\n"
+        "elastic_blocks: [{name: jelly, corner: [0.01, 0.02, 0.512345], edges: [0.2, 0.2, 0.2], cells: [2, 2, 2], "
+        "young: "
+        "2.0e+4, poisson: 0.4, density: 1000, velocity: [0.3, 0, -8], contact: {radius: 0.004, material: m}}]\n",
+        "test"));
+    run.finish();
+    const auto& totals = run.simulation.totals();
+    EXPECT_GT(totals.most_parts, 1);
+    EXPECT_LE(totals.energy, totals.start_energy);
+    EXPECT_EQ(totals.unsolved_steps, 0);
+    for (std::int32_t node = 0; node < run.system().node_count(); ++node)
+        EXPECT_GE(run.system().node_position(run.simulation.state(), node)[2], 0.004 - 1e-4);
+}
+
 }  // namespace
 }  // namespace delassus::tests::defaults_test

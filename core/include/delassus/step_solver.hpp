@@ -35,6 +35,13 @@ struct SolverEffort {
     std::string unsolved;        ///< the first message of a solve that did not end solved; empty if none
 };
 
+/// No solver takes a problem with cones whose H is indefinite, as strong pressure in elements makes it in a long step:
+/// H = M + h R + h² K is definite in a short one.
+class DELASSUS_API IndefiniteStep : public Unsupported {
+public:
+    using Unsupported::Unsupported;
+};
+
 /// The answer of StepSolver::cancelled was yes.
 class DELASSUS_API StepInterrupted : public Error {
 public:
@@ -77,9 +84,9 @@ public:
     [[nodiscard]] DELASSUS_API bool leaves_out() const;
 
     /// Solves the problem of a step. solution: the start if warm_start, then the result. Throws Unsupported if the
-    /// configured solver cannot take the problem, InputError if the problem is not valid. A solve by a configured
-    /// solver that misses its tolerance is repeated by `auto`. One that misses it still is counted in effort() and in
-    /// the answer; the best iterate is in solution.
+    /// configured solver cannot take the problem (IndefiniteStep where H is indefinite beside cones), InputError if the
+    /// problem is not valid. A solve by a configured solver that misses its tolerance is repeated by `auto`. One that
+    /// misses it still is counted in effort() and in the answer; the best iterate is in solution.
     DELASSUS_API bool solve(const Problem& problem, Solution& solution, bool warm_start);
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
     DELASSUS_API bool solve(Problem&& problem, Solution& solution, bool warm_start);

@@ -334,7 +334,16 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
     if (may_repeat && part_settings.warm_start) by.before = solution;
-    SolveReport report = solver.solve(prepared, solution, part_settings);
+    SolveReport report;
+    try {
+        report = solver.solve(prepared, solution, part_settings);
+    } catch (const Unsupported& refusal) {
+        // Of linear problems others may take such an H; the refusal names them.
+        const auto& cones = prepared.problem().cones;
+        const bool linear = std::ranges::all_of(cones, [](const Cone& cone) { return cone.kind == ConeKind::Free; });
+        if (linear || (prepared.needs() & DELASSUS_CAN_H_INDEFINITE) == 0) throw;
+        throw IndefiniteStep(refusal.what());
+    }
     if (settings.cancelled && report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
     ++spent.plugin_solves;
     by.count(report, spent);

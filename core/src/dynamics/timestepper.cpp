@@ -52,13 +52,20 @@ void StepReport::follow(const StepReport& before) {
 
 StepReport Timestepper::step(State& state, double h, StepSolver& solver) {
     StepReport report;
-    take_step(state, h, solver, report);
+    step(state, h, solver, report);
     return report;
 }
 
 void Timestepper::step(State& state, double h, StepSolver& solver, StepReport& report) {
     report.clear();
-    take_step(state, h, solver, report);
+    try {
+        take_step(state, h, solver, report);
+    } catch (const IndefiniteStep& refusal) {
+        throw StepTooLong(fmt::format(
+            "the step from t = {:.9g} with h = {:.9g} is too long: M + h R + h² K is indefinite, as elements "
+            "under strong pressure make it; take shorter steps ({})",
+            state.t, h, refusal.what()));
+    }
 }
 
 std::vector<double> Timestepper::save() const {
