@@ -55,7 +55,7 @@ namespace delassus {
 // The new tangent is the solution for the right-hand side (0, 0, 1): then ⟨t_old, t_new⟩ > 0, and the path does not
 // turn back. The matrix is regular at limit points (Keller, 1977) and singular at bifurcations alone.
 //
-// K has σ M added, σ = 1e-12 of the largest K_ii/M_ii: what nothing holds and no load turns (a link that spins about
+// K has σ M added, σ = 1e-12 of the largest K_ii/M_ii at the start: what nothing holds and no load turns (a link that spins about
 // its own axis) stays where it is. r has nothing of it, so the solution is the same.
 
 struct LoadPath::Implementation {
@@ -125,10 +125,12 @@ struct LoadPath::Implementation {
             return std::all_of(A.value.begin(), A.value.end(), [](double value) { return std::isfinite(value); });
         };
         if (!finite(stiffness) || !finite(jacobian)) return false;
-        constexpr double share = 1e-12;
         const Vector masses = diagonal_of(mass), stiffnesses = diagonal_of(stiffness);
-        for (std::int32_t i = 0; i < n; ++i) shift = std::max(shift, share * std::abs(stiffnesses[i]) / masses[i]);
-        if (shift == 0.0) shift = share;
+        if (shift == 0.0) {
+            constexpr double share = 1e-12;
+            for (std::int32_t i = 0; i < n; ++i) shift = std::max(shift, share * std::abs(stiffnesses[i]) / masses[i]);
+            if (shift == 0.0) shift = share;
+        }
         scale(masses, stiffnesses);
         return true;
     }
@@ -228,6 +230,7 @@ bool LoadPath::begin(LoadPathPoint& start) {
     at.lambda = start.lambda;
     at.load = start.load;
     self.evaluate(start.state, at);
+    self.shift = 0.0;
     if (!self.assemble(start.state, start.lambda, start.load)) return false;
     self.unit = 1.0;
     // δμ = 1: the answer to the whole loads.
@@ -238,7 +241,7 @@ bool LoadPath::begin(LoadPathPoint& start) {
     const double square = answer.dot(M_answer);
     Vector K_answer = Vector::Zero(self.n);
     self.stiffness.multiply_add(1.0, answer.data(), K_answer.data());
-    constexpr double held = 1e4;
+    constexpr double held = 10.0;
     if (square > 0.0 && std::abs(answer.dot(K_answer)) < held * self.shift * square) return false;
     if (square > 0.0) self.unit = std::sqrt(square);
     const double length = square > 0.0 ? std::sqrt(2.0) : 1.0;

@@ -21,7 +21,7 @@ namespace delassus {
 
 namespace {
 
-constexpr double largest_turn = 0.5, wanted_turn = 0.15, wanted_iterations = 4.0;
+constexpr double largest_turn = 0.5, wanted_turn = 0.15, wanted_iterations = 6.0;
 
 /// Of a step, when a root counts as found.
 constexpr double share_of_step = 1e-13;
