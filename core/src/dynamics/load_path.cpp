@@ -33,7 +33,8 @@ namespace delassus {
 //     ds² = ‖dq‖²_M/D² + dμ²
 //
 // Lengths are pure numbers: at the start both parts are equal, and s = √2 where a linear system would have its whole
-// loads. (Without motion at the start, D = 1.)
+// loads. (Where the loads move next to nothing at the start, D is a motion of all coordinates by 1e-6 of the largest
+// position.)
 //
 // ---- A step ----
 //
@@ -52,11 +53,13 @@ namespace delassus {
 // lets it fall, the whole of it is taken, as Newton's method without a search would. Norms and the test of convergence
 // are those of dynamics/newton.cpp, rows scaled by 1/√K_ii.
 //
+// The start is found likewise, at its own μ: with t = 0, t_μ = 1 and ℓ = 0.
+//
 // The new tangent is the solution for the right-hand side (0, 0, 1): then ⟨t_old, t_new⟩ > 0, and the path does not
 // turn back. The matrix is regular at limit points (Keller, 1977) and singular at bifurcations alone.
 //
-// K has σ M added, σ = 1e-12 of the largest K_ii/M_ii at the start: what nothing holds and no load turns (a link that spins about
-// its own axis) stays where it is. r has nothing of it, so the solution is the same.
+// K has σ M added, σ = 1e-12 of the largest K_ii/M_ii at the start: what nothing holds and no load turns (a link that
+// spins about its own axis) stays where it is. r has nothing of it, so the solution is the same.
 
 struct LoadPath::Implementation {
     Implementation(DynamicalSystem& of, std::function<void(double)> setter, LoadPathSettings chosen)
@@ -224,33 +227,34 @@ LoadPath::~LoadPath() = default;
 
 bool LoadPath::begin(LoadPathPoint& start) {
     auto& self = *implementation_;
-    Implementation::Trial at;
-    at.state = start.state;
-    at.delta.setZero(self.n);
-    at.lambda = start.lambda;
-    at.load = start.load;
-    self.evaluate(start.state, at);
     self.shift = 0.0;
-    if (!self.assemble(start.state, start.lambda, start.load)) return false;
     self.unit = 1.0;
-    // δμ = 1: the answer to the whole loads.
-    if (!self.find_tangent(Vector::Zero(self.n), 1.0, start)) return false;
+    LoadPathPoint given = start;
+    given.direction.setZero(self.n);
+    given.lambda_rate.setZero(self.m);
+    given.load_rate = 1.0;
+    if (!find(given, 0.0, start)) return false;
     if (!(start.load_rate > 0.0)) return false;
     const Vector answer = start.direction / start.load_rate;
     const Vector M_answer = self.weighed(answer);
     const double square = answer.dot(M_answer);
     Vector K_answer = Vector::Zero(self.n);
     self.stiffness.multiply_add(1.0, answer.data(), K_answer.data());
-    constexpr double held = 10.0;
-    if (square > 0.0 && std::abs(answer.dot(K_answer)) < held * self.shift * square) return false;
-    if (square > 0.0) self.unit = std::sqrt(square);
-    const double length = square > 0.0 ? std::sqrt(2.0) : 1.0;
+    double largest = 0.0;
+    for (const double value : start.state.q) largest = std::max(largest, std::abs(value));
+    const Vector ones = Vector::Ones(self.n);
+    const double size = largest * std::sqrt(ones.dot(self.weighed(ones)));
+    // Far away, and σ alone holds it.
+    constexpr double held = 10.0, far = 1e3, least = 1e-6;
+    if (std::sqrt(square) > far * size && std::abs(answer.dot(K_answer)) < held * self.shift * square) return false;
+    self.unit = std::max(std::sqrt(square), least * size);
+    if (!(self.unit > 0.0)) self.unit = 1.0;
+    const double length = std::hypot(std::sqrt(square) / self.unit, 1.0);
     start.direction = answer / length;
     start.lambda_rate /= start.load_rate * length;
     start.load_rate = 1.0 / length;
     start.step = 0.0;
-    start.newton_iterations = 0;
-    self.judge(start, at);
+    start.turn = 0.0;
     return true;
 }
 
@@ -319,7 +323,7 @@ bool LoadPath::find(const LoadPathPoint& from, double length, LoadPathPoint& to)
     Vector M_delta = Vector::Zero(self.n);
     self.system.multiply_mass(from.state, 1.0 / unit2, now.delta.data(), M_delta.data());
     to.step = std::hypot(std::sqrt(std::max(0.0, now.delta.dot(M_delta))), to.load - from.load);
-    if (to.step > farthest * std::abs(length)) return false;
+    if (length != 0.0 && to.step > farthest * std::abs(length)) return false;
     if (!self.find_tangent(self.pulled_back(now.delta, weight), from.load_rate, to)) return false;
     const double cosine = self.pulled_back(now.delta, weight).dot(to.direction) + from.load_rate * to.load_rate;
     to.turn = std::acos(std::clamp(cosine, -1.0, 1.0));

@@ -41,7 +41,7 @@ public:
     LoadPath(const LoadPath&) = delete;
     LoadPath& operator=(const LoadPath&) = delete;
 
-    /// start: state, lambda and load of an equilibrium are given, the rest is found; the tangent is that along which μ
+    /// start: state, lambda and load of what is nearly an equilibrium are given, the rest is found; the tangent is that along which μ
     /// grows. The unit of length of the path is set here. False where the tangent is not determined: the loads move
     /// something that nothing holds there.
     bool begin(LoadPathPoint& start);

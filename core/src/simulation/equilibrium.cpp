@@ -161,7 +161,7 @@ private:
         LoadPathPoint start;
         start.lambda = Vector::Zero(mechanics_.m());
         start.state = found.state;
-        for (const double part : {0.0, 0.1 / rule_.load_steps}) {
+        for (const double part : {0.0, 1.0 / rule_.load_steps}) {
             mechanics_.set_load_factor(part);
             try {
                 relaxation_.run(start.state, start.lambda, solver_);
