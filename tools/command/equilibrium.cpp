@@ -36,12 +36,11 @@ struct EquilibriumArguments {
     bool json = false;
 };
 
-/// A body or a node of a system by its name, and where it was at the path's start.
+/// A body or a node of a system by its name.
 struct Watched {
     std::string name;
     BodyIndex body = world_body;
     std::int32_t node = -1;
-    Vector3 start{};
 
     [[nodiscard]] Vector3 place(const MultibodySystem& mechanics, const State& state) const {
         return node >= 0 ? mechanics.node_position(state, node) : mechanics.pose(state, body).position;
@@ -243,8 +242,7 @@ WatchedPath path_of(SceneSystem& system, const Registry& registry, const Equilib
         write(point.arc, state);
         for (std::size_t k = 0; k < found.watched.size(); ++k) {
             const Vector3 now = found.watched[k].place(mechanics, state);
-            if (found.displacements[k].empty()) found.watched[k].start = now;
-            const Vector3& start = found.watched[k].start;
+            const Vector3 start = found.watched[k].place(mechanics, mechanics.initial_state());
             found.displacements[k].push_back({now[0] - start[0], now[1] - start[1], now[2] - start[2]});
         }
     };

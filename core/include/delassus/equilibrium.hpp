@@ -61,7 +61,7 @@ struct PathPoint {
     /// The arc length ds² = ‖dq‖²_M/D² + dload², D the way that the linear answer to the whole loads goes (1); by
     /// chords.
     double arc = 0.0;
-    double displacement = 0.0;              ///< the largest of a body's mass centre or a node, m, from the path's start
+    double displacement = 0.0;              ///< the largest of a body's mass centre or a node, m, from the system's start
     double energy = 0.0;                    ///< potential energy, J
     std::int32_t negative_eigenvalues = 0;  ///< 0: stable; −1: not known
     std::int64_t newton_iterations = 0;     ///< of the step that led here
@@ -69,7 +69,7 @@ struct PathPoint {
     PathMark mark = PathMark::None;
 };
 
-/// Where a displacement from the path's start has a value.
+/// Where a displacement from the system's start has a value.
 struct PathDisplacement {
     BodyIndex body = world_body;  ///< its mass centre; or
     std::int32_t node = -1;

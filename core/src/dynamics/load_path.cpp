@@ -33,8 +33,7 @@ namespace delassus {
 //     ds² = ‖dq‖²_M/D² + dμ²
 //
 // Lengths are pure numbers: at the start both parts are equal, and s = √2 where a linear system would have its whole
-// loads. (Where the loads move next to nothing at the start, D is a motion of all coordinates by 1e-6 of the largest
-// position.)
+// loads. (D is at least a motion of all coordinates by 1e-3 of the largest position: what moves less is no way.)
 //
 // ---- A step ----
 //
@@ -148,6 +147,8 @@ struct LoadPath::Implementation {
     }
 
     void scale(const Vector& masses, const Vector& stiffnesses) {
+        // Rows that no stiffness holds, by 1e-6 of the largest.
+        constexpr double soft = 1e6;
         root.resize(n);
         for (std::int32_t i = 0; i < n; ++i) {
             double largest = 0.0;
@@ -155,7 +156,7 @@ struct LoadPath::Implementation {
                  e < stiffness.row_start[static_cast<std::size_t>(i) + 1]; ++e)
                 largest = std::max(largest, std::abs(stiffness.value[static_cast<std::size_t>(e)]));
             const double diagonal = std::abs(stiffnesses[i]);
-            root[i] = std::sqrt((diagonal > 1e-8 * largest ? diagonal : largest) + shift * masses[i]);
+            root[i] = std::sqrt(std::max(diagonal > 1e-8 * largest ? diagonal : largest, soft * shift * masses[i]));
         }
         row_scale.setOnes(m);
         for (std::int32_t j = 0; j < m; ++j) {
@@ -245,7 +246,7 @@ bool LoadPath::begin(LoadPathPoint& start) {
     const Vector ones = Vector::Ones(self.n);
     const double size = largest * std::sqrt(ones.dot(self.weighed(ones)));
     // Far away, and σ alone holds it.
-    constexpr double held = 10.0, far = 1e3, least = 1e-6;
+    constexpr double held = 10.0, far = 1e3, least = 1e-3;
     if (std::sqrt(square) > far * size && std::abs(answer.dot(K_answer)) < held * self.shift * square) return false;
     self.unit = std::max(std::sqrt(square), least * size);
     if (!(self.unit > 0.0)) self.unit = 1.0;

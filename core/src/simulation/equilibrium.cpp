@@ -103,9 +103,10 @@ public:
         require_nothing_touches(mechanics_, found.end.state, rows_, 0.0);
         LoadPath path(mechanics_, [this](double factor) { mechanics_.set_load_factor(factor); },
                       {.tolerance = rule_.tolerance});
+        const State unloaded = found.end.state;
         LoadPathPoint start = begin_of(path, found.end);
         PathFollower follower(path, {.first_step = 1.0 / rule_.load_steps, .most_points = wanted.most_points});
-        follower.goal = goal_of(wanted, start.state);
+        follower.goal = goal_of(wanted, unloaded);
         double farthest = 1.0;
         for (const double q : start.state.q) farthest = std::max(farthest, std::abs(q));
         farthest *= 1e6;
@@ -119,7 +120,7 @@ public:
                     fmt::format("on the path of equilibria something moves away without bound, at {:.4g} of the loads",
                                 point.load));
             mechanics_.follow(point.state);
-            found.points.push_back(described(point, event, start.state));
+            found.points.push_back(described(point, event, unloaded));
             const PathPoint& last = found.points.back();
             found.end.load_steps.push_back({last.load, 1, last.newton_iterations, last.residual, last.energy});
             found.end.largest_force = std::max(found.end.largest_force, point.reaction);
