@@ -103,4 +103,12 @@ BorderedFactor::Solution BorderedFactor::solve(const Vector& a, const Vector& b,
     return {z.head(self.n), z.tail(self.m), (first + second) * self.load_unit};
 }
 
+Vector BorderedFactor::solve_inside(const Vector& a, const Vector& b) const {
+    const auto& self = *implementation_;
+    Vector f(self.n + self.m);
+    f << a, b;
+    const Vector z = self.factor.solve(f.cwiseProduct(self.row_scale));
+    return z.cwiseProduct(self.column_scale).head(self.n);
+}
+
 }  // namespace delassus

@@ -29,6 +29,8 @@ public:
 
     /// After factorise().
     [[nodiscard]] Solution solve(const Vector& a, const Vector& b, double c) const;
+    /// x of the matrix without its border, μ = 0.
+    [[nodiscard]] Vector solve_inside(const Vector& a, const Vector& b) const;
 
 private:
     struct Implementation;

@@ -261,7 +261,7 @@ bool LoadPath::begin(LoadPathPoint& start) {
 
 bool LoadPath::find(const LoadPathPoint& from, double length, LoadPathPoint& to) {
     auto& self = *implementation_;
-    constexpr double shortest_part = 1.0 / 16.0, farthest = 1.25;
+    constexpr double shortest_part = 1.0 / 16.0, farthest = 1.05;
     const double unit2 = self.unit * self.unit;
     Vector weight = Vector::Zero(self.n);  // M t/D²
     self.system.multiply_mass(from.state, 1.0 / unit2, from.direction.data(), weight.data());
@@ -330,6 +330,28 @@ bool LoadPath::find(const LoadPathPoint& from, double length, LoadPathPoint& to)
     to.turn = std::acos(std::clamp(cosine, -1.0, 1.0));
     self.judge(to, now);
     return true;
+}
+
+// Inverse iteration with K + σ M on the null space of C_q.
+Vector LoadPath::critical_motion() const {
+    const auto& self = *implementation_;
+    constexpr int iterations = 12;
+    Vector motion(self.n);
+    for (std::int32_t i = 0; i < self.n; ++i) motion[i] = (1.0 + 0.5 * std::sin(1.0 + 2.0 * i)) / self.root[i];
+    for (int i = 0; i < iterations; ++i) {
+        motion = self.factor.solve_inside(self.weighed(motion), Vector::Zero(self.m));
+        const double size = std::sqrt(std::max(0.0, motion.dot(self.weighed(motion))));
+        if (!std::isfinite(size) || !(size > 0.0)) return Vector::Zero(self.n);
+        motion /= size;
+    }
+    return motion;
+}
+
+double LoadPath::square_of(const Vector& motion) const {
+    const auto& self = *implementation_;
+    Vector K_motion = Vector::Zero(self.n);
+    self.stiffness.multiply_add(1.0, motion.data(), K_motion.data());
+    return motion.dot(K_motion) / motion.dot(self.weighed(motion));
 }
 
 }  // namespace delassus

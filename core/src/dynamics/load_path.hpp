@@ -41,14 +41,19 @@ public:
     LoadPath(const LoadPath&) = delete;
     LoadPath& operator=(const LoadPath&) = delete;
 
-    /// start: state, lambda and load of what is nearly an equilibrium are given, the rest is found; the tangent is that along which μ
-    /// grows. The unit of length of the path is set here. False where the tangent is not determined: the loads move
-    /// something that nothing holds there.
+    /// start: state, lambda and load of what is nearly an equilibrium are given, the rest is found; the tangent is that
+    /// along which μ grows. The unit of length of the path is set here. False where the tangent is not determined: the
+    /// loads move something that nothing holds there.
     bool begin(LoadPathPoint& start);
 
     /// The point on the plane normal to from's tangent that is `length` ≠ 0 away along it, and the distance in to.step.
     /// False if Newton's method does not lead there, or leads too far from the plane's foot; to is then anything.
     bool find(const LoadPathPoint& from, double length, LoadPathPoint& to);
+
+    /// At the point that was found last: the motion (n) whose ω² is nearest to that at which LoadPathPoint::negative
+    /// counts, and ω² = φᵀ K φ/φᵀ M φ of a motion.
+    [[nodiscard]] Vector critical_motion() const;
+    [[nodiscard]] double square_of(const Vector& motion) const;
 
 private:
     struct Implementation;

@@ -55,7 +55,8 @@ std::int32_t negative_eigenvalues(const SparseMatrix& K, const SparseMatrix& M, 
     R.setFromTriplets(rows.begin(), rows.end());
     if (m > 0) {
         const double least = std::max(1e-6 * diagonal.cwiseAbs().maxCoeff(), 1e6 * shift);
-        for (std::int32_t j = 0; j < m; ++j) weight[j] = std::max(sizes[j] > 0.0 ? weight[j] / sizes[j] : 0.0, least);
+        for (std::int32_t j = 0; j < m; ++j)
+            weight[j] = std::max(sizes[j] > 0.0 ? 3.0 * weight[j] / sizes[j] : 0.0, least);
         A = (A + Sparse(R.transpose() * weight.asDiagonal() * R)).eval();
     }
     const Eigen::SimplicialLDLT<Sparse> factor(A);

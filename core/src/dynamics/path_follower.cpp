@@ -17,7 +17,8 @@ namespace delassus {
 //
 // Where dμ/ds changes its sign in a step, the load factor has an extremum in it: the root of dμ/ds as a function of the
 // step's length, by regula falsi (Illinois). Where the number of negative eigenvalues changes and dμ/ds does not
-// vanish, branches cross; that point is found by bisection of the step, and the path goes straight on.
+// vanish, branches cross; that point is found by bisection of the step and by the eigenvalue, and the path goes
+// straight on.
 
 namespace {
 
@@ -65,21 +66,33 @@ bool PathFollower::root(const LoadPathPoint& from, const LoadPathPoint& to, doub
     return true;
 }
 
-bool PathFollower::change_of_count(const LoadPathPoint& from, const LoadPathPoint& to, double length, Found& found) {
+bool PathFollower::change_of_count(const LoadPathPoint& from, double length, Found& found) {
     double a = 0.0, b = length;
-    found.point = to;
-    found.length = length;
     while (b - a > share_of_count * length) {
         const double s = 0.5 * (a + b);
         LoadPathPoint middle;
         if (!path_.find(from, s, middle) || middle.negative < 0) return false;
-        if (middle.negative == from.negative) {
-            a = s;
-            continue;
-        }
-        b = s;
-        found.point = std::move(middle);
+        (middle.negative == from.negative ? a : b) = s;
+    }
+    if (!path_.find(from, b, found.point)) return false;
+    found.length = b;
+    // What is counted are ω² below a small −σ. From there to ω² = 0, by the secant of ω² of the critical motion.
+    const Vector motion = path_.critical_motion();
+    double at_s = path_.square_of(motion), s = b, before = a > 0.5 * length ? 0.9 * b : 1.1 * b;
+    LoadPathPoint point;
+    if (!path_.find(from, before, point)) return true;
+    double at_before = path_.square_of(motion);
+    constexpr int most = 4;
+    for (int i = 0; i < most && at_s != at_before; ++i) {
+        const double next = s - at_s * (s - before) / (at_s - at_before);
+        if (!(std::abs(next - b) < length) || !(next > 0.0) || !path_.find(from, next, point)) return true;
+        before = s;
+        at_before = at_s;
+        s = next;
+        at_s = path_.square_of(motion);
+        found.point = point;
         found.length = s;
+        if (std::abs(s - before) <= share_of_count * length) break;
     }
     return true;
 }
@@ -99,7 +112,7 @@ std::vector<PathFollower::Found> PathFollower::events(const LoadPathPoint& from,
     if (!known || from.negative == to.negative) return result;
     if (has_limit && std::abs(from.negative - to.negative) == 1) return result;
     Found change;
-    if (!change_of_count(from, to, length, change)) return result;
+    if (!change_of_count(from, length, change)) return result;
     change.event = PathEvent::Bifurcation;
     if (!has_limit || std::abs(change.length - limit.length) > 1e-6 * length) {
         result.push_back(std::move(change));

@@ -50,7 +50,7 @@ private:
     };
     bool root(const LoadPathPoint& from, const LoadPathPoint& to, double length,
               const std::function<double(const LoadPathPoint&)>& function, Found& found);
-    bool change_of_count(const LoadPathPoint& from, const LoadPathPoint& to, double length, Found& found);
+    bool change_of_count(const LoadPathPoint& from, double length, Found& found);
     std::vector<Found> events(const LoadPathPoint& from, const LoadPathPoint& to, double length);
 
     LoadPath& path_;
