@@ -211,7 +211,7 @@ std::string circular_arch(int elements, double degrees, bool clamped, double loa
                "inertia_y: 1, inertia_z: 1000, torsion: 1000}}}}\n"
                "joints:\n  - {{name: left, kind: revolute, second: n0, point: {}, axis: [0, 1, 0]}}\n"
                "  - {{name: right, kind: {}, second: n{}, point: {}, axis: [0, 1, 0]}}\n"
-               "loads: [{{name: P, body: n{}, force: [0, 0, {}]}}]\n",
+               "loads:\n  - {{name: P, body: n{}, force: [0, 0, {}]}}\n",
                names, area, place(0), clamped ? "fixed" : "revolute", elements, place(elements), elements / 2, -load);
 }
 
