@@ -117,7 +117,8 @@ TEST(BeamInertia, ConservesEnergyAndMomentum) {
             for (std::size_t i = 0; i < 3; ++i) {
                 const auto k = static_cast<Eigen::Index>(i);
                 EXPECT_NEAR((later[0][i] - before[0][i]) / (2.0 * step), mass_g[k], 1e-7 * size) << amount;
-                if (weight == 0.0) EXPECT_NEAR((later[1][i] - before[1][i]) / (2.0 * step), 0.0, 1e-7 * size) << amount;
+                if (weight > 0.0) continue;
+                EXPECT_NEAR((later[1][i] - before[1][i]) / (2.0 * step), 0.0, 1e-7 * size) << amount;
             }
         }
     }
@@ -230,7 +231,7 @@ TEST(BeamInertia, FrequenciesOfSlenderBeamsConvergeWithOrderFour) {
             const int elements = mode == 0 && known.clamped ? 4 : 8;
             const auto consistent =
                 convergence(elements, BeamMass::Consistent, 1e-4, infinite, known.clamped, mode, exact);
-            EXPECT_NEAR(consistent.order(), 4.0, 0.15) << mode;
+            EXPECT_NEAR(consistent.order(), 4.0, 0.2) << mode;
             EXPECT_GT(consistent.coarse, 0.0) << "from above";
             // (β h)⁴/1440, as of the cubic element.
             EXPECT_NEAR(consistent.fine / std::pow(beta / (2.0 * elements), 4) * 1440.0, 1.0, 0.2) << mode;

@@ -9,13 +9,20 @@
 //
 // ---- M_e ----
 // Bending: ρ A ∫ N Nᵀ + ρ I ∫ G Gᵀ with the displacement w = N·(w₁, θ₁, w₂, θ₂) and the turn of the section θ = G·(…)
-// of Timoshenko's beam under end loads (Friedman and Kosmatka, Computers & Structures 47, 1993), whose stiffness
-// beam.cpp has. So frequencies of bending err by order 4 of the element's size; where shear matters, by order 2 with
-// the small factor that shear has in them, for a beam under its own inertia shears within an element too.
+// of Timoshenko's beam under end loads (Friedman and Kosmatka, Computers & Structures 47, 1993), whose stiffness K
+// beam.cpp has. As K gives exact displacements of nodes under any load, all of the error is that of the load of inertia
+// q = ρ A ω² w, by what w has within an element beside N. Bending adds q x² (L − x)²/(24 E I), an error of order 4.
+// Shear adds q x (L − x)/(2 G A_s), of order 2: on average q L²/(12 G A_s), and its inertia is ω² ρ A L²/(12 G A_s) of
+// that of the rest, ω² M by ω² M ≈ K for a mode. So
 //
-// Stretching and twisting: linear displacements have m [2 1; 1 2]/6, whose frequencies err by (k h)²/24, upwards;
-// lumped ones err by as much downwards. Their mean, m [5 1; 1 5]/12, errs by order 4 (Goudreau and Taylor, Comput.
-// Methods Appl. Mech. Engrg. 2, 1973).
+//     M_e = ρ A ∫ N Nᵀ + ρ I ∫ G Gᵀ + ρ A L²/(12 G A_s) K
+//
+// takes it away but for the share of the rotary inertia in ω² M. With Φ = 12 E I/(G A_s L²) the factor is
+// ρ A L⁴ Φ/(144 E I). Rigid motions have nothing of it.
+//
+// Stretching and twisting: linear displacements have m [2 1; 1 2]/6. The same reasoning adds m [1 −1; −1 1]/12, which
+// makes m [5 1; 1 5]/12, the mean with lumped masses, of order 4 (Goudreau and Taylor, Comput. Methods Appl. Mech.
+// Engrg. 2, 1973).
 //
 // What T leaves out is the bulge of an element that is bent: the axial velocity of points beside the chord, and their
 // part in the rotary inertia. It is of the second order in φ, as what the frame itself leaves out.
@@ -89,7 +96,13 @@ Eigen::Matrix4d bending_mass(double mass, double rotary, double length, double s
                                    -6.0 * (x2 - x) / length, 3.0 * x2 - (2.0 - shear) * x);
         result += weight * length * (mass * N * N.transpose() + rotary * G * G.transpose());
     }
-    return result;
+    const double l = length, l2 = l * l, near = (4.0 + shear) * l2, far = (2.0 - shear) * l2;
+    Eigen::Matrix4d stiffness;                   // by E I/((1 + Φ) L³)
+    stiffness << 12.0, 6.0 * l, -12.0, 6.0 * l,  //
+        6.0 * l, near, -6.0 * l, far,            //
+        -12.0, -6.0 * l, 12.0, -6.0 * l,         //
+        6.0 * l, far, -6.0 * l, near;
+    return result + mass * length * shear * unit / 144.0 * stiffness;
 }
 
 }  // namespace
@@ -157,13 +170,13 @@ struct BeamInertia::Kinematics : BeamFrame {
     }
 
     [[nodiscard]] Vector12 force() const {
-        Vector12 f = -cross(mu, u) + M * cross(mu, v);
+        Vector12 result = -cross(mu, u) + M * cross(mu, v);
         for (int i = 0; i < 2; ++i) {
             const double sign = i == 0 ? -1.0 : 1.0;
             const Vector3d spin = block(v, turning(i)), momentum = block(u, turning(i));
-            block(f, turning(i)) += spin.cross(momentum) - 0.5 * h + sign * (Z * h);  // Zᵀ = −Z
+            block(result, turning(i)) += spin.cross(momentum) - 0.5 * h + sign * (Z * h);  // Zᵀ = −Z
         }
-        return f;
+        return result;
     }
     /// Of force() along dv̂ and dφ.
     [[nodiscard]] Vector12 force_along(const Vector12& dv, const Vector3d& dphi) const {
