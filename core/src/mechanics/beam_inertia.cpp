@@ -49,6 +49,7 @@
 // Derivatives of all this along increments are taken forwards, one motion of an end after the other.
 #include "mechanics/beam_inertia.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 
 namespace delassus::mechanics {
@@ -284,6 +285,14 @@ void BeamInertia::inertial_stiffness(const Ends& at, const Forces& acceleration,
     now.along_turns(result, [&](int end, const Vector3d& turn, const Vector3d&, const Vector3d& a) -> Vector12 {
         return inner_ * Kinematics::of_into(a_hat, end, turn, a) - Kinematics::of_into(f, end, turn, a);
     });
+}
+
+bool BeamInertia::leaves_definite(const Ends& at, const Matrix& matrix, double factor) const {
+    constexpr double share = 0.3;
+    Matrix sum;
+    mass(at, sum);
+    sum = (share * sum + 0.5 * factor * (matrix + matrix.transpose())).eval();
+    return Eigen::LLT<Matrix12>(sum).info() == Eigen::Success;
 }
 
 double BeamInertia::kinetic_energy(const Ends& at) const {

@@ -28,6 +28,8 @@ public:
     void damping(const Ends& at, Matrix& result) const;
     /// ∂(M a)/∂q for fixed a.
     void inertial_stiffness(const Ends& at, const Forces& a, Matrix& result) const;
+    /// Whether 0.3 M + factor · ½(matrix + matrixᵀ) is definite.
+    [[nodiscard]] bool leaves_definite(const Ends& at, const Matrix& matrix, double factor) const;
     [[nodiscard]] double kinetic_energy(const Ends& at) const;
     [[nodiscard]] double potential(const Ends& at, const Vector3d& gravity) const;
     /// Momentum, and angular momentum about the origin, world frame.

@@ -150,15 +150,16 @@ void MultibodySystem::multiply_mass(const State& state, double factor, const dou
     });
 }
 
-// The symmetric tangent takes nothing of it: it is not definite.
+// What is not definite: the symmetric tangent takes its symmetric part where that leaves M definite.
 void MultibodySystem::add_inertial_stiffness(const State& state, const double* acceleration, double factor,
                                              Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
-    if (self.beam_inertias.empty() || tangent == Tangent::Symmetric) return;
+    if (self.beam_inertias.empty()) return;
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_inertia([&](const auto& inertia, const auto& at) {
         mechanics::BeamInertia::Matrix matrix;
         inertia.inertial_stiffness(at, gathered(at, acceleration), matrix);
+        if (tangent == Tangent::Symmetric && !inertia.leaves_definite(at, matrix, factor)) return;
         add_element<6>(matrix, at, factor, tangent, H);
     });
 }
@@ -265,12 +266,13 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         element.stiffness(at, K);
         add_element<Element::freedoms>(K, at, factor, tangent, H);
     });
-    // The symmetric tangent has nothing of the inertia: it is not definite.
     self.for_each_inertia([&](const auto& inertia, auto at) {
-        if (tangent == Tangent::Symmetric)
-            for (auto& end : at) end.v = end.omega = Vector3d::Zero();
         mechanics::BeamInertia::Matrix K;
         inertia.stiffness(at, self.load_factor * vector(self.gravity), K);
+        if (tangent == Tangent::Symmetric && !inertia.leaves_definite(at, K, factor)) {
+            for (auto& end : at) end.v = end.omega = Vector3d::Zero();
+            inertia.stiffness(at, self.load_factor * vector(self.gravity), K);
+        }
         add_element<6>(K, at, factor, tangent, H);
     });
     for (const auto& load : self.loads) {
@@ -311,10 +313,10 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
         element.damping(at, R);
         add_element<Element::freedoms>(R, at, factor, tangent, H);
     });
-    if (tangent == Tangent::Symmetric) return;
     self.for_each_inertia([&](const auto& inertia, const auto& at) {
         mechanics::BeamInertia::Matrix R;
         inertia.damping(at, R);
+        if (tangent == Tangent::Symmetric && !inertia.leaves_definite(at, R, factor)) return;
         add_element<6>(R, at, factor, tangent, H);
     });
 }
