@@ -124,6 +124,44 @@ TEST(BeamInertia, ConservesEnergyAndMomentum) {
     }
 }
 
+TEST(BeamInertia, AUniformVelocityChangesNothing) {
+    MultibodySystem system;
+    system.set_gravity({1.0, -2.0, 3.0});
+    system.add_elastic_beam(thick_beam(2));
+    system.finish();
+    const State state = tumbled(system, 0.5, 1.0);
+    State fast = state;
+    for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t i = 0; i < 3; ++i) fast.v[6 * k + i] += 100.0 * (1.0 + static_cast<double>(i));
+    VectorXd f = VectorXd::Zero(system.n()), of_fast = f;
+    system.add_force(state, 1.0, f.data());
+    system.add_force(fast, 1.0, of_fast.data());
+    EXPECT_LE((of_fast - f).norm(), 1e-10 * f.norm());
+    const double mass = 2.0 * 0.7 * Vector3d(1.1, 0.7, 0.3).norm();
+    const auto slow = system.momentum(state)[0], after = system.momentum(fast)[0];
+    for (std::size_t i = 0; i < 3; ++i)
+        EXPECT_NEAR(after[i] - slow[i], 100.0 * mass * (1.0 + static_cast<double>(i)), 1e-9);
+}
+
+TEST(BeamInertia, ABentBeamFallsAsWithoutWeight) {
+    const auto accelerations = [](const Vector3& gravity) {
+        MultibodySystem system;
+        system.set_gravity(gravity);
+        system.add_elastic_beam(thick_beam(2));
+        system.finish();
+        const State state = tumbled(system, 0.5, 1.0);
+        const MatrixXd M = matrix_of(system, [&](auto& H) { system.add_mass(state, 1.0, H); });
+        VectorXd f = VectorXd::Zero(system.n());
+        system.add_force(state, 1.0, f.data());
+        return VectorXd(M.ldlt().solve(f));
+    };
+    const VectorXd change = accelerations({1.0, -2.0, 3.0}) - accelerations({0.0, 0.0, 0.0});
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        EXPECT_LE((change.segment<3>(6 * k) - Vector3d(1.0, -2.0, 3.0)).norm(), 1e-10);
+        EXPECT_LE(change.segment<3>(6 * k + 3).norm(), 1e-10);
+    }
+}
+
 TEST(BeamInertia, AStraightBeamFallsStraight) {
     MultibodySystem system;
     system.set_gravity({1.0, -2.0, 3.0});

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The kinetic energy of a beam's element is that of its end velocities in the frame R halfway between its ends
-// (beam.cpp), with a constant matrix:
+// The kinetic energy of a beam's element is that of its mass centre c, and that of its end velocities in the frame R
+// halfway between its ends (beam.cpp), with a constant matrix:
 //
-//     T = ½ v̂ᵀ M_e v̂,   v̂ = (Rᵀ v₁, P₁ ω̄₁, Rᵀ v₂, P₂ ω̄₂) = E(q) v,   P_i = Rᵀ A_i
+//     T = ½ m |ċ|² + ½ v̂ᵀ M' v̂,   v̂ = (Rᵀ v₁, P₁ ω̄₁, Rᵀ v₂, P₂ ω̄₂) = E(q) v,   P_i = Rᵀ A_i
+//     c = ½ (x₁ + x₂) + λ (A₁ e − A₂ e),   λ = L/12,   e = (1, 0, 0)
 //
-// No rigid motion of positions and velocities changes T, so that Lagrange's equations conserve momentum, angular
-// momentum and energy. M = Eᵀ M_e E depends on the orientations alone.
+// c is that of the cubic that has the ends' places and tangents L A_i e, affine in the poses. In the frame R of a
+// straight element ċ is V v̂ with V = (½ I, −λ [e]×, ½ I, λ [e]×), and M' = M_e − m Vᵀ V, with the consistent mass M_e
+// below: a uniform velocity gives M' nothing, M_e having V as its mean. So rigid motions of positions and velocities do
+// not change T, and a uniform velocity adds to it what it adds to a particle's (with M_e in place of M' it would not: a
+// beam in a fast train would feel gyroscopic moments at its ends). Lagrange's equations conserve momentum m ċ, angular
+// momentum and energy, and a beam falls as if there were no weight.
 //
 // ---- M_e ----
 // Bending: ρ A ∫ N Nᵀ + ρ I ∫ G Gᵀ with the displacement w = N·(w₁, θ₁, w₂, θ₂) and the turn of the section θ = G·(…)
@@ -24,29 +29,26 @@
 // makes m [5 1; 1 5]/12, the mean with lumped masses, of order 4 (Goudreau and Taylor, Comput. Methods Appl. Mech.
 // Engrg. 2, 1973).
 //
-// What T leaves out is the bulge of an element that is bent: the axial velocity of points beside the chord, and their
-// part in the rotary inertia. It is of the second order in φ, as what the frame itself leaves out.
+// What T leaves out is of the second order in φ: the velocity along an element of its points beside the chord, and
+// their part in the rotary inertia.
 //
 // ---- Lagrange's equations ----
-// û = M_e v̂; û_k, v̂_k are its blocks of three. R turns by μ in its own axes, μ = ½(ω̂₁ + ω̂₂) + Z (ω̂₂ − ω̂₁). Then
-// d/dt Rᵀ v = −μ × Rᵀ v at fixed v, and for ω̄ likewise, Ė v = −μ × v̂ by blocks. The momenta of the group are Eᵀ û; with
-// ω̄_i × (P_iᵀ û_i) of the body frames,
+// Of the second part: û = M' v̂; û_k, v̂_k are its blocks of three. R turns by μ in its own axes,
+// μ = ½(ω̂₁ + ω̂₂) + Z (ω̂₂ − ω̂₁). Then d/dt Rᵀ v = −μ × Rᵀ v at fixed v, and for ω̄ likewise, Ė v = −μ × v̂ by blocks. The
+// momenta of the group are Eᵀ û; with ω̄_i × (P_iᵀ û_i) of the body frames,
 //
-//     M v̇ = Q + Eᵀ f̂,    f̂_k = −μ × û_k + (M_e (μ × v̂))_k   and, on the turning of end i,
-//                         f̂_i  += ω̂_i × û_i − (½ h ∓ Zᵀ h),   h = Σ_k v̂_k × û_k
+//     f = Eᵀ f̂,    f̂_k = −μ × û_k + (M' (μ × v̂))_k   and, on the turning of end i,
+//                  f̂_i  += ω̂_i × û_i − (½ h ∓ Zᵀ h),   h = Σ_k v̂_k × û_k
 //
 // The last line is ∂T/∂θ: a turn a_i = P_i θ_i changes v̂_k by −μ_δ × v̂_k and ω̂_i by a_i × ω̂_i besides, with
-// μ_δ = c + Z b, c = ½(a₁ + a₂), b = a₂ − a₁. The upper sign is that of the first end.
+// μ_δ = c + Z b, c = ½(a₁ + a₂), b = a₂ − a₁. The upper sign is that of the first end. Derivatives of it along
+// increments are taken forwards, one motion of an end after the other.
 //
-// ---- Weight ----
-// V = −½ m g · (x₁ + x₂) + κ φ · (e × ĝ),   κ = m L/12,  ĝ = Rᵀ g,  e = (1, 0, 0)
+// Of the first part, with ċ = C v, λ₁ = λ, λ₂ = −λ, and of the weight −m g · c:
 //
-// where the second part is the weight's work on the bulge: M_e times the acceleration g at both ends are these forces
-// and, at φ = 0, these moments. So a straight beam falls straight. With τ̂ = e × ĝ and s = (φ × e) × ĝ,
-//
-//     δ(φ · τ̂) = (W τ̂ + Zᵀ s) · b + s · c
-//
-// Derivatives of all this along increments are taken forwards, one motion of an end after the other.
+//     C = (½ I, −λ₁ A₁ [e]×, ½ I, −λ₂ A₂ [e]×),   γ = Ċ v = Σ λ_i A_i (ω̄_i × (ω̄_i × e))
+//     M = m Cᵀ C,   f = m Cᵀ (g − γ),   ∂(Cᵀ y)/∂θ_i = λ_i [e]× [A_iᵀ y]×
+//     ∂γ/∂ω̄_i = −λ_i A_i ([ω̄_i × e]× + [ω̄_i]× [e]×),   ∂γ/∂θ_i = −λ_i A_i [ω̄_i × (ω̄_i × e)]×
 #include "mechanics/beam_inertia.hpp"
 
 #include <Eigen/Cholesky>
@@ -113,26 +115,30 @@ BeamInertia::BeamInertia(const ElasticBeamParameters& beam, double length, const
     const auto& section = beam.section;
     const double density = beam.material.density, young = beam.material.young;
     const double shear = 0.5 * young / (1.0 + beam.material.poisson);
-    inner_.setZero();
+    Matrix12 M = Matrix12::Zero();
     const auto add_rod = [&](int dof, double inertia) {
-        inner_(dof, dof) = inner_(dof + 6, dof + 6) = 5.0 / 12.0 * inertia;
-        inner_(dof, dof + 6) = inner_(dof + 6, dof) = inertia / 12.0;
+        M(dof, dof) = M(dof + 6, dof + 6) = 5.0 / 12.0 * inertia;
+        M(dof, dof + 6) = M(dof + 6, dof) = inertia / 12.0;
     };
     add_rod(0, mass_);
     add_rod(3, density * (section.inertia_y + section.inertia_z) * length);
     // The turn about y lowers z along x.
     const auto add_bending = [&](int across, int about, double sign, double inertia, double shear_area) {
         const double phi = 12.0 * young * inertia / (shear * shear_area * length * length);
-        const Eigen::Matrix4d M = bending_mass(density * section.area, density * inertia, length, phi);
+        const Eigen::Matrix4d bending = bending_mass(density * section.area, density * inertia, length, phi);
         const std::array<int, 4> dofs{across, about, across + 6, about + 6};
         const std::array<double, 4> signs{1.0, sign, 1.0, sign};
         for (std::size_t i = 0; i < 4; ++i)
             for (std::size_t j = 0; j < 4; ++j)
-                inner_(dofs[i], dofs[j]) =
-                    signs[i] * signs[j] * M(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+                M(dofs[i], dofs[j]) =
+                    signs[i] * signs[j] * bending(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     };
     add_bending(1, 5, 1.0, section.inertia_z, section.shear_area_y);
     add_bending(2, 4, -1.0, section.inertia_y, section.shear_area_z);
+    const Matrix3d arm = length / 12.0 * skew(Vector3d::UnitX());
+    Eigen::Matrix<double, 3, 12> V;
+    V << 0.5 * Matrix3d::Identity(), -arm, 0.5 * Matrix3d::Identity(), arm;
+    inner_ = M - mass_ * V.transpose() * V;
 }
 
 struct BeamInertia::Kinematics : BeamFrame {
@@ -199,28 +205,6 @@ struct BeamInertia::Kinematics : BeamFrame {
         return df;
     }
 
-    /// Moments of weight on the turning of both ends, by κ.
-    [[nodiscard]] Vector12 weight(double kappa, const Vector3d& gravity) const {
-        const Vector3d e = Vector3d::UnitX(), g = R.transpose() * gravity;
-        const Vector3d s = phi.cross(e).cross(g);
-        const Vector3d by_b = W * e.cross(g) - Z * s;
-        Vector12 result = Vector12::Zero();
-        block(result, 1) = kappa * (by_b - 0.5 * s);
-        block(result, 3) = kappa * (-by_b - 0.5 * s);
-        return result;
-    }
-    [[nodiscard]] Vector12 weight_along(double kappa, const Vector3d& gravity, const Vector3d& turn,
-                                        const Vector3d& dphi) const {
-        const Vector3d e = Vector3d::UnitX(), g = R.transpose() * gravity, dg = g.cross(turn);
-        const Vector3d bulge = phi.cross(e), s = bulge.cross(g);
-        const Vector3d ds = dphi.cross(e).cross(g) + bulge.cross(dg);
-        const Vector3d by_b = W * e.cross(dg) + change_of_W(e.cross(g)) * dphi - Z * ds - change_of_Z(s) * dphi;
-        Vector12 result = Vector12::Zero();
-        block(result, 1) = kappa * (by_b - 0.5 * ds);
-        block(result, 3) = kappa * (-by_b - 0.5 * ds);
-        return result;
-    }
-
     /// Column by column of the turning of the ends: column(a_i's end, μ_δ, δφ, a_i) is Eᵀ of what it returns.
     template <class Column>
     void along_turns(Matrix& result, Column&& column) const {
@@ -240,6 +224,38 @@ struct BeamInertia::Kinematics : BeamFrame {
     }
 };
 
+struct BeamInertia::Centre {
+    using Jacobian = Eigen::Matrix<double, 3, 12>;
+    std::array<Matrix3d, 2> arm;  // λ_i A_i
+    Vector3d place, gamma;
+    Jacobian C;
+
+    Centre(const Ends& at, double length) {
+        C << 0.5 * Matrix3d::Identity(), Matrix3d::Zero(), 0.5 * Matrix3d::Identity(), Matrix3d::Zero();
+        place = 0.5 * (at[0].x + at[1].x);
+        gamma.setZero();
+        const Vector3d e = Vector3d::UnitX();
+        for (std::size_t i = 0; i < 2; ++i) {
+            arm[i] = (i == 0 ? length : -length) / 12.0 * at[i].A;
+            C.middleCols<3>(6 * static_cast<Eigen::Index>(i) + 3) = -arm[i] * skew(e);
+            place += arm[i] * e;
+            gamma += arm[i] * at[i].omega.cross(at[i].omega.cross(e));
+        }
+    }
+    [[nodiscard]] Vector3d velocity(const Ends& at) const {
+        Vector12 v;
+        v << at[0].v, at[0].omega, at[1].v, at[1].omega;
+        return C * v;
+    }
+    /// result += ∂(Cᵀ y)/∂q
+    void add_change(const Vector3d& y, Matrix& result) const {
+        const Matrix3d e = skew(Vector3d::UnitX());
+        for (int i = 0; i < 2; ++i)
+            result.block<3, 3>(6 * i + 3, 6 * i + 3) +=
+                e * skew(Vector3d(arm[static_cast<std::size_t>(i)].transpose() * y));
+    }
+};
+
 void BeamInertia::mass(const Ends& at, Matrix& result) const {
     const Kinematics now(at, inner_);
     Matrix12 E = Matrix12::Zero();
@@ -247,36 +263,51 @@ void BeamInertia::mass(const Ends& at, Matrix& result) const {
         E.block<3, 3>(6 * i, 6 * i) = now.R.transpose();
         E.block<3, 3>(6 * i + 3, 6 * i + 3) = now.P[static_cast<std::size_t>(i)];
     }
-    result = E.transpose() * inner_ * E;
+    const Centre centre(at, length_);
+    result = E.transpose() * inner_ * E + mass_ * centre.C.transpose() * centre.C;
 }
 
 void BeamInertia::multiply_mass(const Ends& at, const Forces& x, Forces& result) const {
     const Kinematics now(at, inner_);
-    result = now.out_of(inner_ * now.into(x));
+    const Centre centre(at, length_);
+    result = now.out_of(inner_ * now.into(x)) + mass_ * centre.C.transpose() * (centre.C * x);
 }
 
 void BeamInertia::force(const Ends& at, const Vector3d& gravity, Forces& result) const {
     const Kinematics now(at, inner_);
-    result = now.out_of(now.force() + now.weight(mass_ * length_ / 12.0, gravity));
-    for (int i = 0; i < 2; ++i) result.segment<3>(6 * i) += 0.5 * mass_ * gravity;
+    const Centre centre(at, length_);
+    result = now.out_of(now.force()) + mass_ * centre.C.transpose() * (gravity - centre.gamma);
 }
 
 // δ(Eᵀ f̂) = Eᵀ (δf̂ − of_into(f̂)): E is orthogonal, so that δEᵀ = −Eᵀ δE Eᵀ.
 void BeamInertia::stiffness(const Ends& at, const Vector3d& gravity, Matrix& result) const {
     const Kinematics now(at, inner_);
-    const double kappa = mass_ * length_ / 12.0;
-    const Vector12 f = now.force() + now.weight(kappa, gravity);
+    const Vector12 f = now.force();
     now.along_turns(result, [&](int end, const Vector3d& turn, const Vector3d& dphi, const Vector3d& a) -> Vector12 {
         const Vector12 dv = Kinematics::of_into(now.v, end, turn, a);
-        return -now.force_along(dv, dphi) - now.weight_along(kappa, gravity, turn, dphi) +
-               Kinematics::of_into(f, end, turn, a);
+        return -now.force_along(dv, dphi) + Kinematics::of_into(f, end, turn, a);
     });
+    const Centre centre(at, length_);
+    centre.add_change(mass_ * (centre.gamma - gravity), result);
+    for (int i = 0; i < 2; ++i) {
+        const auto& end = at[static_cast<std::size_t>(i)];
+        const Vector3d turning_in = end.omega.cross(end.omega.cross(Vector3d::UnitX()));
+        result.middleCols<3>(6 * i + 3) -=
+            mass_ * centre.C.transpose() * centre.arm[static_cast<std::size_t>(i)] * skew(turning_in);
+    }
 }
 
 void BeamInertia::damping(const Ends& at, Matrix& result) const {
     const Kinematics now(at, inner_);
     for (int j = 0; j < 12; ++j)
         result.col(j) = -now.out_of(now.force_along(now.into(Vector12::Unit(j)), Vector3d::Zero()));
+    const Centre centre(at, length_);
+    const Vector3d e = Vector3d::UnitX();
+    for (int i = 0; i < 2; ++i) {
+        const Vector3d& omega = at[static_cast<std::size_t>(i)].omega;
+        result.middleCols<3>(6 * i + 3) -= mass_ * centre.C.transpose() * centre.arm[static_cast<std::size_t>(i)] *
+                                           (skew(Vector3d(omega.cross(e))) + skew(omega) * skew(e));
+    }
 }
 
 void BeamInertia::inertial_stiffness(const Ends& at, const Forces& acceleration, Matrix& result) const {
@@ -285,6 +316,14 @@ void BeamInertia::inertial_stiffness(const Ends& at, const Forces& acceleration,
     now.along_turns(result, [&](int end, const Vector3d& turn, const Vector3d&, const Vector3d& a) -> Vector12 {
         return inner_ * Kinematics::of_into(a_hat, end, turn, a) - Kinematics::of_into(f, end, turn, a);
     });
+    const Centre centre(at, length_);
+    centre.add_change(mass_ * (centre.C * acceleration), result);
+    // δC a = Σ λ_i A_i (θ_i × (ᾱ_i × e))
+    for (int i = 0; i < 2; ++i) {
+        const Vector3d alpha = acceleration.segment<3>(6 * i + 3);
+        result.middleCols<3>(6 * i + 3) -= mass_ * centre.C.transpose() * centre.arm[static_cast<std::size_t>(i)] *
+                                           skew(Vector3d(alpha.cross(Vector3d::UnitX())));
+    }
 }
 
 bool BeamInertia::leaves_definite(const Ends& at, const Matrix& matrix, double factor) const {
@@ -297,23 +336,22 @@ bool BeamInertia::leaves_definite(const Ends& at, const Matrix& matrix, double f
 
 double BeamInertia::kinetic_energy(const Ends& at) const {
     const Kinematics now(at, inner_);
-    return 0.5 * now.v.dot(now.u);
+    return 0.5 * now.v.dot(now.u) + 0.5 * mass_ * Centre(at, length_).velocity(at).squaredNorm();
 }
 
 double BeamInertia::potential(const Ends& at, const Vector3d& gravity) const {
-    const Kinematics now(at, inner_);
-    const Vector3d g = now.R.transpose() * gravity;
-    return -0.5 * mass_ * gravity.dot(at[0].x + at[1].x) +
-           mass_ * length_ / 12.0 * now.phi.dot(Vector3d::UnitX().cross(g));
+    return -mass_ * gravity.dot(Centre(at, length_).place);
 }
 
 void BeamInertia::momentum(const Ends& at, Vector3d& linear, Vector3d& angular) const {
     const Kinematics now(at, inner_);
-    for (int i = 0; i < 2; ++i) {
-        const Vector3d p = now.R * block(now.u, 2 * i);
-        linear += p;
-        angular += at[static_cast<std::size_t>(i)].x.cross(p) + now.R * block(now.u, turning(i));
-    }
+    const Centre centre(at, length_);
+    const Vector3d p = mass_ * centre.velocity(at);
+    linear += p;
+    angular += centre.place.cross(p);
+    for (int i = 0; i < 2; ++i)
+        angular +=
+            at[static_cast<std::size_t>(i)].x.cross(now.R * block(now.u, 2 * i)) + now.R * block(now.u, turning(i));
 }
 
 }  // namespace delassus::mechanics

@@ -37,10 +37,11 @@ public:
 
 private:
     struct Kinematics;
+    struct Centre;
 
     std::array<BodyIndex, 2> bodies_;
     double mass_, length_;
-    Eigen::Matrix<double, 12, 12> inner_;  // M_e
+    Eigen::Matrix<double, 12, 12> inner_;  // M'
 };
 
 }  // namespace delassus::mechanics
