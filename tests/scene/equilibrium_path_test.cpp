@@ -329,7 +329,12 @@ TEST(EquilibriumPath, AgreesWithLoadSteppingWhereThereIsNoLimitPoint) {
         "  - {name: b, mass: 2, inertia: {xx: 1.0e-3, yy: 1.0e-3, zz: 1.0e-3}, position: [1.5, 0, 0]}\n"
         "joints:\n  - {name: j0, kind: spherical, second: a}\n"
         "  - {name: j1, kind: spherical, first: a, second: b, point: [1, 0, 0]}\n";
-    for (const std::string& yaml : {cable, chain, head + column(8, 0.5, 0.3).substr(head.size())}) {
+    // From where the loads move it freely: the first load step is divided until there is an equilibrium.
+    const std::string hinged =
+        "step: 0.001\nend: 0.1\nbeams:\n  - {name: rod, from: [0, 0, 0], to: [1, 0, 0], elements: 4, young: 2.0e+8, "
+        "density: 1000, section: {rectangle: [0.03, 0.02]}, mass: consistent}\n"
+        "joints: [{name: h, kind: revolute, second: rod_0, axis: [0, 1, 0]}]\n";
+    for (const std::string& yaml : {cable, chain, hinged, column(8, 0.5, 0.3)}) {
         Scene scene = parse_scene(yaml, "s");
         const Equilibrium stepped = find_equilibrium(scene.systems.at(0), registry());
         const Followed found(yaml);

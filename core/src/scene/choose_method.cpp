@@ -168,6 +168,7 @@ void choose_method(SceneSystem& system) {
     system.method_reason = why_default(system);
     if (!system.method_reason.empty()) return;
     const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
+                           !system.system->has_consistent_mass() &&
                            std::any_of(system.joints.begin(), system.joints.end(),
                                        [&](const JointParameters& joint) { return can_be_in_a_tree(system, joint); });
     const bool unilateral = system.system->has_unilateral();

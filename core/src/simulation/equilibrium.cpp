@@ -162,15 +162,21 @@ private:
         LoadPathPoint start;
         start.lambda = Vector::Zero(mechanics_.m());
         start.state = found.state;
-        for (const double part : {0.0, 1.0 / rule_.load_steps}) {
+        int divided = 0;
+        for (double part = 0.0;;) {
             mechanics_.set_load_factor(part);
             try {
                 relaxation_.run(start.state, start.lambda, solver_);
             } catch (const StepFailure& error) {
-                throw StepFailure(fmt::format("under {:.4g} of the loads {}", part, error.what()));
+                if (part == 0.0 || ++divided > most_divided)
+                    throw StepFailure(fmt::format("under {:.4g} of the loads {}", part, error.what()));
+                part *= 0.5;
+                continue;
             }
             start.load = part;
             if (path.begin(start)) return start;
+            if (part > 0.0) break;
+            part = 1.0 / rule_.load_steps;
         }
         throw StepFailure("the path of equilibria has no beginning: the loads move something that nothing holds");
     }
