@@ -263,6 +263,7 @@ TEST(Equilibrium, WhatHasNoneIsRefusedInASentence) {
                                        "motors: [{name: m, joint: j, speed: true, motion: 0, force_limit: 1}]\n"),
                     "no motors and actuators with a limit"));
     EXPECT_TRUE(has(refusal("start: given\n" + with("")), "must be equilibrium"));
+    EXPECT_TRUE(has(refusal("start: {equilibrium: {method: riks}}\n" + with("")), "load_steps or arc_length"));
     EXPECT_TRUE(has(refusal("start: {equilibrium: {load_steps: 0}}\n" + with("")), "from 1 to"));
 #ifdef DELASSUS_HAS_FCL
     EXPECT_TRUE(has(refusal("bodies:\n  - {name: ground, fixed: true, shapes: [{plane: {}}]}\n"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The example scenes with beams and with meshes from files against what their heads say is known, and what is said of
 // wrong beams and meshes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -134,6 +135,66 @@ std::string refusal(const std::string& text) {
     return "taken";
 }
 
+/// Six elements with a consistent mass, which tumble.
+std::string tumbling_beam(const std::string& more) {
+    return "step: 0.000513\nend: 0.2\n" + more +
+           "beams:\n  - {name: rod, from: [0, 0, 0.5], to: [1.037, 0.113, 0.7], elements: 6, young: 1.0e+8, density: "
+           "1000, section: {rectangle: [0.03, 0.02]}, mass: consistent, velocity: [0.1, 0, 1], angular_velocity: [3, "
+           "-7, "
+           "4]}\n";
+}
+
+TEST(FlexibleScene, AFreeBeamWithAConsistentMassKeepsEnergyAndMomentum) {
+    struct Case {
+        const char* integrator;
+        double energy;  // share that may be lost or won
+    };
+    for (const auto& [integrator, energy] :
+         {Case{"trapezoidal", 1e-5}, Case{"generalized_alpha", 1e-5}, Case{"moreau_jean", 1e-5},
+          Case{"linearly_implicit_trapezoidal", 1e-4}, Case{"euler_implicit_linearized", 0.02}}) {
+        Running run(parse_scene(tumbling_beam(fmt::format("gravity: [0, 0, 0]\nintegrator: {}\n", integrator)), "s"));
+        const auto start = run.simulation.record();
+        run.finish();
+        const auto end = run.simulation.record();
+        const double before = run.system().energy(run.system().initial_state()),
+                     after = run.system().energy(run.simulation.state());
+        EXPECT_NEAR(after, before, energy * before) << integrator;
+        const double size = std::sqrt(start.angular_momentum[0] * start.angular_momentum[0] +
+                                      start.angular_momentum[1] * start.angular_momentum[1] +
+                                      start.angular_momentum[2] * start.angular_momentum[2]);
+        for (std::size_t i = 0; i < 3; ++i) {
+            EXPECT_NEAR(end.momentum[i], start.momentum[i], 1e-8) << integrator;
+            EXPECT_NEAR(end.angular_momentum[i], start.angular_momentum[i], 0.02 * size) << integrator;
+        }
+    }
+}
+
+TEST(FlexibleScene, AConsistentMassTakesJointsAndContactsAndRefusesJointCoordinates) {
+    const std::string hinge =
+        "joints: [{name: h, kind: revolute, second: rod_0, point: [0, 0, 0.5], axis: [0, 1, 0]}]\n";
+    const Scene chosen = parse_scene(tumbling_beam("") + hinge, "s");
+    EXPECT_EQ(chosen.systems.at(0).coordinates, Coordinates::Maximal);
+    EXPECT_THROW(Running(parse_scene(tumbling_beam("coordinates: joint\nintegrator: euler_implicit\n") + hinge, "s")),
+                 Unsupported);
+#ifdef DELASSUS_HAS_FCL
+    // It lies down on the ground, and its weight is carried.
+    Running run(
+        parse_scene("step: 0.00073\nend: 1.5\nbeams:\n  - {name: rod, from: [0, 0, 0.2], to: [1.037, 0.113, 0.3], "
+                    "elements: 3, young: 1.0e+9, density: 1000, section: {rectangle: [0.03, 0.02]}, mass: "
+                    "consistent, damping_time: 0.002}\nbodies:\n"
+                    "  - {name: ground, fixed: true, shapes: [{plane: {}}]}\n"
+                    "  - {name: a, mass: 0.3, position: [0, 0, 0.2], shapes: [{sphere: {radius: 0.05}}]}\n"
+                    "  - {name: b, mass: 0.3, position: [1.037, 0.113, 0.3], shapes: [{sphere: {radius: 0.05}}]}\n"
+                    "joints:\n  - {name: j, kind: fixed, first: rod_0, second: a, point: [0, 0, 0.2]}\n"
+                    "  - {name: k, kind: fixed, first: rod_3, second: b, point: [1.037, 0.113, 0.3]}\n",
+                    "s"));
+    run.finish();
+    EXPECT_NEAR(run.pose("a").position[2], 0.05, 1e-4);
+    EXPECT_NEAR(run.pose("b").position[2], 0.05, 1e-4);
+    EXPECT_LT(run.pose("rod_1").position[2], 0.05);
+#endif
+}
+
 TEST(FlexibleScene, WrongBeamsAreToldInOneSentence) {
     const auto beam = [](const std::string& keys) { return refusal("beams:\n  - {name: b, " + keys + "}\n"); };
     const std::string ends = "from: [0, 0, 0], to: [1, 0, 0]";
@@ -152,6 +213,9 @@ TEST(FlexibleScene, WrongBeamsAreToldInOneSentence) {
               "s.yaml, line 4: \"elements\" is 0; it must be from 1 to 100000");
     EXPECT_EQ(beam(ends + ", section: {circle: 0.01}, fixed_ends: [form]"),
               "s.yaml, line 4: there is no end \"form\"; it must be from or to");
+    EXPECT_EQ(beam(ends + ", section: {circle: 0.01}, mass: consistent"), "taken");
+    EXPECT_EQ(beam(ends + ", section: {circle: 0.01}, mass: heavy"),
+              "s.yaml, line 4: there is no mass \"heavy\" of beams; it must be lumped or consistent");
     EXPECT_EQ(
         beam(ends + ", section: {circle: 0.01}, section_y: [1, 0, 0]"),
         "s.yaml, line 4: the y axis of the section of the beam \"b\" runs along the beam; it must point across it");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// delassus equilibrium: the static equilibrium of a scene.
+// delassus equilibrium: the static equilibrium of a scene, or the path of its equilibria.
 #include "delassus/equilibrium.hpp"
 
 #include <fmt/format.h>
@@ -29,8 +29,113 @@ struct EquilibriumArguments {
     std::filesystem::path output;
     std::optional<std::int32_t> load_steps;
     std::optional<double> tolerance;
+    bool path = false;
+    std::string until;
+    std::optional<std::int32_t> points;
+    std::vector<std::string> watch;
     bool json = false;
 };
+
+/// A body or a node of a system by its name.
+struct Watched {
+    std::string name;
+    BodyIndex body = world_body;
+    std::int32_t node = -1;
+
+    [[nodiscard]] Vector3 place(const MultibodySystem& mechanics, const State& state) const {
+        return node >= 0 ? mechanics.node_position(state, node) : mechanics.pose(state, body).position;
+    }
+};
+
+Watched named(const SceneSystem& system, const std::string& name) {
+    Watched found{.name = name, .body = system.system->find_body(name)};
+    for (std::size_t i = 0; i < system.nodes.size() && found.body == world_body; ++i)
+        if (system.nodes[i].name == name) found.node = static_cast<std::int32_t>(i);
+    if (found.body == world_body && found.node < 0)
+        throw InputError(fmt::format("the system \"{}\" has no body and no node \"{}\"", system.name, name));
+    return found;
+}
+
+/// A load factor, or NAME.AXIS=METRES.
+PathRule rule_of(const SceneSystem& system, const EquilibriumArguments& arguments) {
+    PathRule rule;
+    if (arguments.points) rule.most_points = *arguments.points;
+    if (arguments.until.empty()) return rule;
+    const auto number = [&](const std::string& text) {
+        try {
+            std::size_t read = 0;
+            const double value = std::stod(text, &read);
+            if (read == text.size()) return value;
+        } catch (const std::exception&) {
+        }
+        throw InputError(
+            fmt::format("--until is \"{}\"; it must be a load factor, or a displacement such as "
+                        "rod_6.z=-0.5 (m)",
+                        arguments.until));
+    };
+    const auto equals = arguments.until.find('=');
+    if (equals == std::string::npos) {
+        rule.load = number(arguments.until);
+        return rule;
+    }
+    const std::string place = arguments.until.substr(0, equals);
+    const std::string axes = "xyz";
+    const auto axis = place.size() > 2 && place[place.size() - 2] == '.' ? axes.find(place.back()) : std::string::npos;
+    if (axis == std::string::npos)
+        throw InputError(fmt::format("--until names \"{}\"; it must be a body or a node with .x, .y or .z", place));
+    const Watched watched = named(system, place.substr(0, place.size() - 2));
+    rule.displacement = PathDisplacement{watched.body, watched.node, static_cast<int>(axis),
+                                         number(arguments.until.substr(equals + 1))};
+    return rule;
+}
+
+std::string_view name_of(PathMark mark) {
+    return mark == PathMark::Limit ? "limit point" : mark == PathMark::Bifurcation ? "bifurcation" : "";
+}
+
+/// A path with what its points say of the bodies and nodes that are watched.
+struct WatchedPath {
+    EquilibriumPath path;
+    std::vector<Watched> watched;
+    std::vector<std::vector<Vector3>> displacements;  // of each, by point
+};
+
+std::string csv_of(const WatchedPath& found) {
+    std::string text =
+        "load,arc_length,largest_displacement,energy,negative_eigenvalues,newton_iterations,residual,mark";
+    for (const Watched& one : found.watched)
+        for (const char axis : {'x', 'y', 'z'}) text += fmt::format(",{}.{}", one.name, axis);
+    text += '\n';
+    for (std::size_t i = 0; i < found.path.points.size(); ++i) {
+        const PathPoint& point = found.path.points[i];
+        text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{},{},{:.3g},{}", point.load, point.arc,
+                            point.displacement, point.energy, point.negative_eigenvalues, point.newton_iterations,
+                            point.residual, name_of(point.mark));
+        for (const auto& of_one : found.displacements)
+            for (const double value : of_one[i]) text += fmt::format(",{:.17g}", value);
+        text += '\n';
+    }
+    return text;
+}
+
+Json json_of(const WatchedPath& found) {
+    Json points = Json::array();
+    for (std::size_t i = 0; i < found.path.points.size(); ++i) {
+        const PathPoint& point = found.path.points[i];
+        Json json = {{"load", point.load},
+                     {"arc_length", point.arc},
+                     {"largest_displacement", point.displacement},
+                     {"energy", json_number(point.energy)},
+                     {"negative_eigenvalues", point.negative_eigenvalues},
+                     {"newton_iterations", point.newton_iterations},
+                     {"residual", json_number(point.residual)}};
+        if (point.mark != PathMark::None) json["mark"] = name_of(point.mark);
+        for (std::size_t k = 0; k < found.watched.size(); ++k)
+            json["displacements"][found.watched[k].name] = found.displacements[k][i];
+        points.push_back(std::move(json));
+    }
+    return {{"complete", found.path.complete}, {"ending", found.path.ending}, {"points", std::move(points)}};
+}
 
 std::string_view stability_of(const Equilibrium& found) {
     if (std::isnan(found.smallest_eigenvalue)) return "not judged";
@@ -72,15 +177,8 @@ Json json_of(const SceneSystem& system, const Equilibrium& found) {
             {"reactions", std::move(joints)}};
 }
 
-void print_summary(const SceneSystem& system, const Equilibrium& found) {
-    std::int64_t steps = 0, iterations = 0;
-    for (const LoadStep& step : found.load_steps) {
-        steps += step.steps;
-        iterations += step.newton_iterations;
-    }
+void print_end(const Equilibrium& found) {
     const LoadStep& last = found.load_steps.back();
-    fmt::print("{}: equilibrium after {} load steps, {} steps of the search, {} Newton iterations\n", system.name,
-               found.load_steps.size(), steps, iterations);
     fmt::print("  largest unbalanced force {:.1e}, of forces up to {:.3g} (N, Nm)\n", last.residual,
                found.largest_force);
     if (std::isfinite(last.energy)) fmt::print("  energy {:.6g} J\n", last.energy);
@@ -90,6 +188,33 @@ void print_summary(const SceneSystem& system, const Equilibrium& found) {
     fmt::print("\n");
 }
 
+void print_summary(const SceneSystem& system, const EquilibriumPath& found) {
+    std::int64_t iterations = 0;
+    for (const PathPoint& point : found.points) iterations += point.newton_iterations;
+    const PathPoint& last = found.points.back();
+    fmt::print("{}: path of {} equilibria to the load factor {:.9g}, {} Newton iterations\n", system.name,
+               found.points.size(), last.load, iterations);
+    for (const PathPoint& point : found.points)
+        if (point.mark != PathMark::None)
+            fmt::print("  {} at the load factor {:.9g}, largest displacement {:.6g} m\n", name_of(point.mark),
+                       point.load, point.displacement);
+    fmt::print("  at its end: largest displacement {:.6g} m\n", last.displacement);
+    print_end(found.end);
+}
+
+void print_summary(const SceneSystem& system, const Equilibrium& found) {
+    std::int64_t steps = 0, iterations = 0;
+    for (const LoadStep& step : found.load_steps) {
+        steps += step.steps;
+        iterations += step.newton_iterations;
+    }
+    fmt::print("{}: equilibrium after {} load steps, {} steps of the search, {} Newton iterations\n", system.name,
+               found.load_steps.size(), steps, iterations);
+    print_end(found);
+}
+
+constexpr std::string_view path_ending = ".path.csv";
+
 /// Makes the folder for the frames, in place of those of an earlier search.
 void make_folder(const std::filesystem::path& output, const std::filesystem::path& frames) {
     if (std::filesystem::exists(output)) {
@@ -98,8 +223,31 @@ void make_folder(const std::filesystem::path& output, const std::filesystem::pat
             throw InputError(fmt::format("{} contains something else than an earlier equilibrium; name another folder",
                                          output.string()));
         std::filesystem::remove_all(frames);
+        for (const auto& entry : std::filesystem::directory_iterator(output))
+            if (entry.path().filename().string().ends_with(path_ending)) std::filesystem::remove(entry.path());
     }
     std::filesystem::create_directories(frames);
+}
+
+/// Follows the path; write(arc length, state) is called with each point.
+template <class Write>
+WatchedPath path_of(SceneSystem& system, const Registry& registry, const EquilibriumArguments& arguments,
+                    Write&& write) {
+    const PathRule rule = rule_of(system, arguments);
+    WatchedPath found;
+    for (const std::string& name : arguments.watch) found.watched.push_back(named(system, name));
+    found.displacements.resize(found.watched.size());
+    const MultibodySystem& mechanics = *system.system;
+    const auto note = [&](const PathPoint& point, const State& state) {
+        write(point.arc, state);
+        for (std::size_t k = 0; k < found.watched.size(); ++k) {
+            const Vector3 now = found.watched[k].place(mechanics, state);
+            const Vector3 start = found.watched[k].place(mechanics, mechanics.initial_state());
+            found.displacements[k].push_back({now[0] - start[0], now[1] - start[1], now[2] - start[2]});
+        }
+    };
+    found.path = follow_equilibria(system, registry, rule, note, interrupted);
+    return found;
 }
 
 int equilibrium(const EquilibriumArguments& arguments) {
@@ -113,9 +261,11 @@ int equilibrium(const EquilibriumArguments& arguments) {
     Json report = {
         {"scene", arguments.scene.file.filename().string()}, {"title", scene.title}, {"systems", Json::array()}};
     std::vector<Equilibrium> all;
+    std::vector<std::optional<WatchedPath>> paths(scene.systems.size());
+    int exit = exit_solved;
     std::vector<VtkSeries> series;
     series.reserve(scene.systems.size());
-    std::vector<std::vector<double>> loads(scene.systems.size());
+    std::vector<std::vector<double>> times(scene.systems.size());
     for (std::size_t i = 0; i < scene.systems.size(); ++i) {
         SceneSystem& system = scene.systems[i];
         EquilibriumRule rule = system.equilibrium.value_or(EquilibriumRule{});
@@ -123,37 +273,64 @@ int equilibrium(const EquilibriumArguments& arguments) {
         if (arguments.tolerance) rule.tolerance = *arguments.tolerance;
         if (rule.load_steps < 1) throw InputError("--load-steps must be at least 1");
         if (!(rule.tolerance > 0.0)) throw InputError("--equilibrium-tolerance must be positive");
+        if (arguments.path) rule.method = EquilibriumMethod::ArcLength;
+        const bool by_path = rule.method == EquilibriumMethod::ArcLength;
+        if (!by_path && (!arguments.until.empty() || arguments.points || !arguments.watch.empty()))
+            throw InputError("--until, --points and --watch are for paths of equilibria; give --path too");
         system.equilibrium = rule;
         series.emplace_back(frames, system.name, *system.system);
-        const auto write = [&](const LoadStep& step, const State& state) {
+        const auto write = [&](double time, const State& state) {
             if (arguments.output.empty()) return;
             State frame = state;
-            frame.t = step.load;
-            series[i].write(static_cast<std::int64_t>(loads[i].size()), frame);
-            loads[i].push_back(step.load);
+            frame.t = time;
+            series[i].write(static_cast<std::int64_t>(times[i].size()), frame);
+            times[i].push_back(time);
         };
         try {
-            all.push_back(find_equilibrium(system, registry, write, interrupted));
+            if (by_path) {
+                paths[i] = path_of(system, registry, arguments, write);
+                if (!paths[i]->path.complete) {
+                    guard.release();
+                    fmt::print(stderr, "delassus: system \"{}\": {}\n", system.name, paths[i]->path.ending);
+                    if (!arguments.points) exit = exit_not_converged;
+                }
+                all.push_back(paths[i]->path.end);
+            } else {
+                all.push_back(find_equilibrium(
+                    system, registry, [&](const LoadStep& step, const State& state) { write(step.load, state); },
+                    interrupted));
+            }
         } catch (const StepFailure& error) {
             guard.release();
             fmt::print(stderr, "delassus: {}\n", error.what());
             return exit_not_converged;
         }
         report["systems"].push_back(json_of(system, all.back()));
+        if (paths[i]) report["systems"].back()["path"] = json_of(*paths[i]);
     }
     guard.release();
     if (!arguments.output.empty()) {
         std::vector<VtkCollectionPart> parts;
-        for (std::size_t i = 0; i < series.size(); ++i) parts.push_back({&series[i], &loads[i]});
+        for (std::size_t i = 0; i < series.size(); ++i) parts.push_back({&series[i], &times[i]});
         write_vtk_collection(arguments.output / "equilibrium.pvd", "vtk", parts);
         write_file_atomically(arguments.output / "equilibrium.json", json_text(report) + "\n");
+        for (std::size_t i = 0; i < paths.size(); ++i)
+            if (paths[i])
+                write_file_atomically(arguments.output / (scene.systems[i].name + std::string(path_ending)),
+                                      csv_of(*paths[i]));
     }
     if (arguments.json) {
         fmt::print("{}\n", json_text(report));
     } else {
-        for (std::size_t i = 0; i < all.size(); ++i) print_summary(scene.systems[i], all[i]);
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            if (paths[i]) {
+                print_summary(scene.systems[i], paths[i]->path);
+            } else {
+                print_summary(scene.systems[i], all[i]);
+            }
+        }
     }
-    return exit_solved;
+    return exit;
 }
 
 }  // namespace
@@ -164,15 +341,30 @@ void add_equilibrium(CLI::App& program, Action& action) {
         "equilibrium", "Find the static equilibrium of a scene under its weight and its loads at t = 0");
     add_scene_arguments(*command, arguments->scene);
     command
-        ->add_option("-o,--output", arguments->output,
-                     "Folder for equilibrium.json and VTK files, a frame for each load step")
+        ->add_option(
+            "-o,--output", arguments->output,
+            "Folder for equilibrium.json, tables of paths (NAME.path.csv) and VTK files, a frame for each load "
+            "step or point")
         ->type_name("DIR");
-    command->add_option("--load-steps", arguments->load_steps, "Parts in which weight and loads are raised [10]")
+    command
+        ->add_option("--load-steps", arguments->load_steps,
+                     "Parts in which weight and loads are raised; of a path, its first step [10]")
         ->type_name("N");
     command
         ->add_option("--equilibrium-tolerance", arguments->tolerance,
                      "Last movement of the search over the whole way [1e-10]")
         ->type_name("EPS");
+    command->add_flag("--path", arguments->path,
+                      "Follow the path of equilibria past limit points, by arc length, to the whole loads");
+    command
+        ->add_option("--until", arguments->until,
+                     "Where the path ends: at a load factor, or a displacement such as rod_6.z=-0.5 (m) [1]")
+        ->type_name("WHERE");
+    command->add_option("--points", arguments->points, "Points of the path at most [1000]")->type_name("N");
+    command
+        ->add_option("--watch", arguments->watch,
+                     "Bodies and nodes whose displacements are columns of the path's table")
+        ->type_name("NAME");
     command->add_flag("--json", arguments->json, "Print the report as JSON");
     command->callback([arguments, &action] { action.run = [arguments] { return equilibrium(*arguments); }; });
 }

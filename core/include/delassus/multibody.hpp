@@ -295,6 +295,12 @@ struct BeamParameters {
     ElasticMaterial material;  ///< its density is not used
 };
 
+/// What the inertia of a beam follows from.
+enum class BeamMass {
+    Lumped,     ///< each body's share: M is diagonal by bodies; frequencies converge with order 2
+    Consistent  ///< the kinetic energy of the displacements in an element: M couples its ends; order 4 in bending
+};
+
 /// A straight beam of equal elements with a body at each node, that has its share of the mass and of the section's
 /// inertia. Bodies are named name_0, name_1, …; their x axis is along the beam.
 struct ElasticBeamParameters {
@@ -304,6 +310,7 @@ struct ElasticBeamParameters {
     Vector3 section_y{};                ///< as in BeamParameters
     BeamSection section = BeamSection::rectangle(0.01, 0.01);
     ElasticMaterial material;
+    BeamMass mass = BeamMass::Lumped;
     bool fixed_from = false, fixed_to = false;  ///< whether the body at that end is fixed
     Vector3 velocity{};                         ///< of the end `from`, m/s; the beam moves as a rigid body at the start
     Vector3 angular_velocity{};                 ///< world frame, rad/s
@@ -370,6 +377,8 @@ public:
     void add_beam(const BeamParameters& beam);
     /// Returns the number of its first body, at `from`; the others follow.
     BodyIndex add_elastic_beam(const ElasticBeamParameters& beam);
+    /// Whether a beam has a consistent mass: M is not diagonal by bodies then.
+    [[nodiscard]] bool has_consistent_mass() const;
     /// shape.body names the body; material indexes what add_material() returned.
     void add_shape(const Shape& shape, std::int32_t material);
     /// A node touches shapes of bodies as a small sphere. radius: m, > 0. The outer sides of tetrahedra whose nodes all
@@ -502,6 +511,8 @@ public:
     void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const override;
+    void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
+                                MatrixAssembler& H) const override;
     [[nodiscard]] bool has_stiffness() const override;
     void constraint(const State& state, double* C) const override;
     void add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const override;

@@ -44,10 +44,17 @@ struct SleepingRule {
     double time = 0.5;    ///< s, > 0
 };
 
+/// How a static equilibrium is looked for.
+enum class EquilibriumMethod {
+    LoadSteps,  ///< weight and loads are raised in steps, each with a search downhill
+    ArcLength   ///< the path of equilibria is followed, past limit points
+};
+
 /// That a run begins in a static equilibrium (delassus/equilibrium.hpp).
 struct EquilibriumRule {
-    std::int32_t load_steps = 10;  ///< ≥ 1: parts in which weight and loads are raised
+    std::int32_t load_steps = 10;  ///< ≥ 1: parts in which weight and loads are raised; of a path, its first step
     double tolerance = 1e-10;      ///< > 0: the last movement of the search, as a share of the whole way
+    EquilibriumMethod method = EquilibriumMethod::LoadSteps;
 };
 
 /// What a run must not exceed; a step that does is a failure. Infinity: no limit.

@@ -44,6 +44,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "mechanics/beam_frame.hpp"
 
 namespace delassus::mechanics {
 namespace {
@@ -52,32 +53,6 @@ using Matrix39 = Eigen::Matrix<double, 3, 9>;
 using Matrix99 = Eigen::Matrix<double, 9, 9>;
 using Matrix912 = Eigen::Matrix<double, 9, 12>;
 using Vector9 = Eigen::Matrix<double, 9, 1>;
-
-/// w, y and z as functions of s, with their derivatives.
-struct Factors {
-    double w, y, z, w_s, y_s, z_s;
-};
-
-// Below s = 0.05 by the series of x/sin x and tan x/(4x); both converge to s = 39.
-Factors factors_of(double s) {
-    if (s < 0.05) {
-        constexpr double w1 = 1.0 / 24.0, w2 = 7.0 / 5760.0, w3 = 31.0 / 967680.0, w4 = 127.0 / 154828800.0;
-        constexpr double z0 = 0.25, z1 = 1.0 / 192.0, z2 = 1.0 / 7680.0, z3 = 17.0 / 5160960.0, z4 = 62.0 / 743178240.0;
-        return {1.0 + s * (w1 + s * (w2 + s * (w3 + s * w4))), -(w1 + s * (w2 + s * (w3 + s * w4))),
-                z0 + s * (z1 + s * (z2 + s * (z3 + s * z4))),  w1 + s * (2.0 * w2 + s * (3.0 * w3 + s * 4.0 * w4)),
-                -(w2 + s * (2.0 * w3 + s * 3.0 * w4)),         z1 + s * (2.0 * z2 + s * (3.0 * z3 + s * 4.0 * z4))};
-    }
-    const double angle = std::sqrt(s), x = 0.5 * angle, quarter = 0.25 * angle;
-    const double sine = std::sin(x), tangent = std::tan(quarter);
-    Factors f{};
-    f.w = x / sine;
-    f.w_s = (sine - x * std::cos(x)) / (8.0 * x * sine * sine);
-    f.y = (1.0 - f.w) / s;
-    f.y_s = -(f.w_s + f.y) / s;
-    f.z = tangent / angle;
-    f.z_s = (quarter * (1.0 + tangent * tangent) - tangent) / (2.0 * s * angle);
-    return f;
-}
 
 }  // namespace
 
@@ -124,10 +99,8 @@ Beam::Beam(const BeamParameters& beam, const Placements& at)
     bending_ = Vector3d(shear * section.torsion, young * section.inertia_y, young * section.inertia_z) / length_;
 }
 
-struct Beam::Kinematics {
-    Vector3d phi, d;
-    Factors f;
-    Matrix3d W, Z;
+struct Beam::Kinematics : BeamFrame {
+    Vector3d d;
     std::array<Matrix3d, 2> P;
     Matrix912 B;
     Vector3d n, m, t, g;                  // with damping
@@ -151,26 +124,12 @@ struct Beam::Kinematics {
         result.leftCols<3>() += Matrix3d::Identity();
         return result;
     }
-    /// ∂(W v)/∂φ for fixed v.
-    [[nodiscard]] Matrix3d change_of_W(const Vector3d& v) const {
-        const double along = phi.dot(v);
-        return 2.0 * (f.w_s * v + f.y_s * along * phi) * phi.transpose() +
-               f.y * (along * Matrix3d::Identity() + phi * v.transpose());
-    }
-    /// ∂(Z v)/∂φ for fixed v.
-    [[nodiscard]] Matrix3d change_of_Z(const Vector3d& v) const {
-        return 0.5 * f.z * skew(v) - f.z_s * phi.cross(v) * phi.transpose();
-    }
 };
 
 Beam::Kinematics Beam::kinematics(const Ends& at) const {
     Kinematics now;
-    const Matrix3d first = at[0].A * turn_[0], second = at[1].A * turn_[1];
-    now.phi = logarithm(Quaterniond(Matrix3d(first.transpose() * second)));
-    const Matrix3d R = first * exponential(0.5 * now.phi).toRotationMatrix();
-    now.f = factors_of(now.phi.squaredNorm());
-    now.W = now.f.w * Matrix3d::Identity() + now.f.y * now.phi * now.phi.transpose();
-    now.Z = -0.5 * now.f.z * skew(now.phi);
+    static_cast<BeamFrame&>(now) = BeamFrame(at[0].A * turn_[0], at[1].A * turn_[1]);
+    const Matrix3d& R = now.R;
     now.d = R.transpose() * (at[1].x + at[1].A * arm_[1] - at[0].x - at[0].A * arm_[0]);
     now.B.setZero();
     for (std::size_t i = 0; i < 2; ++i) {

@@ -180,8 +180,21 @@ struct JointCoordinates::Implementation {
     }
 };
 
+namespace {
+
+MultibodySystem& with_masses_of_bodies(MultibodySystem& bodies) {
+    if (bodies.has_consistent_mass())
+        throw Unsupported(
+            "joint coordinates take no beams with a consistent mass, which couples bodies; give the beams lumped "
+            "masses, "
+            "or the scene coordinates: maximal");
+    return bodies;
+}
+
+}  // namespace
+
 JointCoordinates::JointCoordinates(MultibodySystem& bodies)
-    : implementation_(std::make_unique<Implementation>(bodies)) {
+    : implementation_(std::make_unique<Implementation>(with_masses_of_bodies(bodies))) {
     auto& self = *implementation_;
     const State start = bodies.initial_state();
     auto& held = self.held;

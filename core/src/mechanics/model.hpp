@@ -17,6 +17,7 @@ namespace delassus::mechanics {
 struct Body {
     BodyParameters parameters;
     Matrix3d inertia = Matrix3d::Identity();
+    bool mass_of_beams = false;                          ///< the elements beside it have its mass and inertia
     std::int32_t position = -1, column = -1;             ///< first entries in q and v; −1 if fixed or prescribed
     std::shared_ptr<const PrescribedMotion> prescribed;  ///< null: it moves freely, or is fixed
 };

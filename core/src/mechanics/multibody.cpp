@@ -327,14 +327,14 @@ void MultibodySystem::finish() {
         body.column = self.n;
         self.position_size += 7;
         self.n += 6;
-        const Matrix3d& J = body.inertia;
-        const bool gyroscopic = !J.isApprox(J(0, 0) * Matrix3d::Identity(), 1e-14);
+        const Matrix3d J = body.mass_of_beams ? Matrix3d::Zero().eval() : body.inertia;
+        const bool gyroscopic = !body.mass_of_beams && !J.isApprox(J(0, 0) * Matrix3d::Identity(), 1e-14);
         self.moving.push_back({.body = static_cast<BodyIndex>(k),
                                .position = body.position,
                                .column = body.column,
                                .diagonal = J.isDiagonal(0.0),
                                .gyroscopic = gyroscopic,
-                               .mass = body.parameters.mass,
+                               .mass = body.mass_of_beams ? 0.0 : body.parameters.mass,
                                .inertia = J});
         self.gyroscopic = self.gyroscopic || gyroscopic;
     }

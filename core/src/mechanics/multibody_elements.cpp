@@ -113,7 +113,8 @@ void MultibodySystem::add_beam(const BeamParameters& beam) {
 }
 
 // Each element gives half of its mass ρ A ℓ and of its section's inertia ρ ℓ (I_y + I_z, I_y, I_z) to the body at each
-// end. The mass does so as a point: stiffness is exact for loads at the nodes, and this keeps M diagonal.
+// end. The mass does so as a point: stiffness is exact for loads at the nodes, and this keeps M diagonal. With a
+// consistent mass the bodies have the same, for all that asks for a body's mass, but the elements act.
 BodyIndex MultibodySystem::add_elastic_beam(const ElasticBeamParameters& beam) {
     BeamParameters element{beam.name, 0, 0, beam.from, beam.to, beam.section_y, beam.section, beam.material};
     const mechanics::Matrix3d axes = mechanics::Beam::axes(element);
@@ -142,12 +143,21 @@ BodyIndex MultibodySystem::add_elastic_beam(const ElasticBeamParameters& beam) {
             body.angular_velocity = mechanics::array(axes.transpose() * turning);
         }
         element.second = add_body(body);
+        auto& self = *implementation_;
+        self.bodies[static_cast<std::size_t>(element.second)].mass_of_beams = beam.mass == BeamMass::Consistent;
         element.second_point = body.pose.position;
         if (k > 0) add_beam(element);
+        if (k > 0 && beam.mass == BeamMass::Consistent)
+            self.beam_inertias.emplace_back(beam, span.norm() / beam.elements,
+                                            std::array{element.first, element.second});
         element.first = element.second;
         element.first_point = element.second_point;
     }
     return first;
+}
+
+bool MultibodySystem::has_consistent_mass() const {
+    return !implementation_->beam_inertias.empty();
 }
 
 }  // namespace delassus

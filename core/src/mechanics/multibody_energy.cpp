@@ -12,7 +12,7 @@ double MultibodySystem::kinetic_energy(const State& state) const {
     const auto& self = *implementation_;
     double energy = 0.0;
     for (const auto& body : self.bodies) {
-        if (body.column < 0) continue;
+        if (body.column < 0 || body.mass_of_beams) continue;
         const Eigen::Map<const Vector3d> v(state.v.data() + body.column), omega(state.v.data() + body.column + 3);
         energy += 0.5 * body.parameters.mass * v.squaredNorm() + 0.5 * omega.dot(body.inertia * omega);
     }
@@ -20,6 +20,9 @@ double MultibodySystem::kinetic_energy(const State& state) const {
         if (node.column >= 0)
             energy +=
                 0.5 * node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column).squaredNorm();
+    if (self.beam_inertias.empty()) return energy;
+    self.place(state);
+    self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.kinetic_energy(at); });
     return energy;
 }
 
@@ -28,7 +31,7 @@ std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
     self.place(state);
     Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
     for (std::size_t k = 0; k < self.bodies.size(); ++k) {
-        if (self.bodies[k].column < 0) continue;
+        if (self.bodies[k].column < 0 || self.bodies[k].mass_of_beams) continue;
         const auto& place = self.at[static_cast<BodyIndex>(k)];
         const Vector3d p = self.bodies[k].parameters.mass * place.v;
         linear += p;
@@ -40,6 +43,7 @@ std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
         linear += p;
         angular += Eigen::Map<const Vector3d>(state.q.data() + node.position).cross(p);
     }
+    self.for_each_inertia([&](const auto& inertia, const auto& at) { inertia.momentum(at, linear, angular); });
     return {array(linear), array(angular)};
 }
 
@@ -49,11 +53,12 @@ double MultibodySystem::energy(const State& state) const {
     const Vector3d gravity = self.load_factor * vector(self.gravity);
     double energy = kinetic_energy(state);
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
-        if (self.bodies[k].column >= 0)
+        if (self.bodies[k].column >= 0 && !self.bodies[k].mass_of_beams)
             energy -= self.bodies[k].parameters.mass * gravity.dot(self.at[static_cast<BodyIndex>(k)].x);
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             energy -= node.parameters.mass * gravity.dot(Eigen::Map<const Vector3d>(state.q.data() + node.position));
+    self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.potential(at, gravity); });
     self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
     self.for_each_spring([&](const auto& spring) {
         if (!spring.potential) return;

@@ -39,6 +39,25 @@ void add_element(const Matrix& matrix, const Nodes& at, double factor, Tangent t
         }
 }
 
+/// The entries of x (n) at the ends of a beam; 0 of what is fixed.
+mechanics::BeamInertia::Forces gathered(const mechanics::BeamInertia::Ends& at, const double* x) {
+    mechanics::BeamInertia::Forces result = mechanics::BeamInertia::Forces::Zero();
+    for (std::size_t i = 0; i < 2; ++i)
+        if (at[i].column >= 0)
+            result.segment<6>(6 * static_cast<Eigen::Index>(i)) =
+                Eigen::Map<const Eigen::Matrix<double, 6, 1>>(x + at[i].column);
+    return result;
+}
+
+/// result (n) += factor · forces on the ends.
+void scatter(const mechanics::BeamInertia::Forces& forces, const mechanics::BeamInertia::Ends& at, double factor,
+             double* result) {
+    for (std::size_t i = 0; i < 2; ++i)
+        if (at[i].column >= 0)
+            Eigen::Map<Eigen::Matrix<double, 6, 1>>(result + at[i].column) +=
+                factor * forces.segment<6>(6 * static_cast<Eigen::Index>(i));
+}
+
 /// The velocities of the bodies of a row, in the order of its columns.
 RowVector velocities_of(const RowColumns& columns, const Placements& at) {
     RowVector v(6 * columns.bodies);
@@ -89,7 +108,7 @@ void add_follower(const mechanics::Load& load, const mechanics::Placement& place
 
 }  // namespace
 
-void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) const {
+void MultibodySystem::add_mass(const State& state, double factor, MatrixAssembler& M) const {
     const auto& self = *implementation_;
     for (const auto& body : self.moving) {
         for (int i = 0; i < 3; ++i) M.add(body.column + i, body.column + i, factor * body.mass);
@@ -103,9 +122,16 @@ void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) 
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) M.add(node.column + i, node.column + i, factor * node.parameters.mass);
+    if (self.beam_inertias.empty()) return;
+    self.place(state.q.data(), nullptr, state.t);
+    self.for_each_inertia([&](const auto& inertia, const auto& at) {
+        mechanics::BeamInertia::Matrix matrix;
+        inertia.mass(at, matrix);
+        add_element<6>(matrix, at, factor, Tangent::Exact, M);
+    });
 }
 
-void MultibodySystem::multiply_mass(const State&, double factor, const double* x, double* result) const {
+void MultibodySystem::multiply_mass(const State& state, double factor, const double* x, double* result) const {
     const auto& self = *implementation_;
     for (const auto& body : self.moving) {
         const Eigen::Map<const Vector3d> linear(x + body.column), angular(x + body.column + 3);
@@ -115,6 +141,27 @@ void MultibodySystem::multiply_mass(const State&, double factor, const double* x
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) result[node.column + i] += factor * node.parameters.mass * x[node.column + i];
+    if (self.beam_inertias.empty()) return;
+    self.place(state.q.data(), nullptr, state.t);
+    self.for_each_inertia([&](const auto& inertia, const auto& at) {
+        mechanics::BeamInertia::Forces product;
+        inertia.multiply_mass(at, gathered(at, x), product);
+        scatter(product, at, factor, result);
+    });
+}
+
+// What is not definite: the symmetric tangent takes its symmetric part where that leaves M definite.
+void MultibodySystem::add_inertial_stiffness(const State& state, const double* acceleration, double factor,
+                                             Tangent tangent, MatrixAssembler& H) const {
+    const auto& self = *implementation_;
+    if (self.beam_inertias.empty()) return;
+    self.place(state.q.data(), nullptr, state.t);
+    self.for_each_inertia([&](const auto& inertia, const auto& at) {
+        mechanics::BeamInertia::Matrix matrix;
+        inertia.inertial_stiffness(at, gathered(at, acceleration), matrix);
+        if (tangent == Tangent::Symmetric && !inertia.leaves_definite(at, matrix, factor)) return;
+        add_element<6>(matrix, at, factor, tangent, H);
+    });
 }
 
 // Gravity m g; gyroscopic torque −ω̄ × J ω̄ (Newton and Euler in the body frame); springs −(k C + c Ċ) ∇C; loads
@@ -157,6 +204,11 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
             if (at[a].column >= 0)
                 Eigen::Map<Eigen::Matrix<double, freedoms, 1>>(result + at[a].column) +=
                     factor * forces.template segment<freedoms>(freedoms * static_cast<Eigen::Index>(a));
+    });
+    self.for_each_inertia([&](const auto& inertia, const auto& at) {
+        mechanics::BeamInertia::Forces forces;
+        inertia.force(at, gravity, forces);
+        scatter(forces, at, factor, result);
     });
     for (const auto& load : self.loads) {
         const Vector3d force = self.load_factor * at_time(load.parameters.force, state.t);
@@ -214,6 +266,15 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         element.stiffness(at, K);
         add_element<Element::freedoms>(K, at, factor, tangent, H);
     });
+    self.for_each_inertia([&](const auto& inertia, auto at) {
+        mechanics::BeamInertia::Matrix K;
+        inertia.stiffness(at, self.load_factor * vector(self.gravity), K);
+        if (tangent == Tangent::Symmetric && !inertia.leaves_definite(at, K, factor)) {
+            for (auto& end : at) end.v = end.omega = Vector3d::Zero();
+            inertia.stiffness(at, self.load_factor * vector(self.gravity), K);
+        }
+        add_element<6>(K, at, factor, tangent, H);
+    });
     for (const auto& load : self.loads) {
         if (!load.parameters.nodes.empty()) continue;
         const auto& place = self.at[load.parameters.body];
@@ -251,6 +312,12 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
         typename Element::Matrix R;
         element.damping(at, R);
         add_element<Element::freedoms>(R, at, factor, tangent, H);
+    });
+    self.for_each_inertia([&](const auto& inertia, const auto& at) {
+        mechanics::BeamInertia::Matrix R;
+        inertia.damping(at, R);
+        if (tangent == Tangent::Symmetric && !inertia.leaves_definite(at, R, factor)) return;
+        add_element<6>(R, at, factor, tangent, H);
     });
 }
 

@@ -6,6 +6,7 @@
 
 #include "mechanics/attachment.hpp"
 #include "mechanics/beam.hpp"
+#include "mechanics/beam_inertia.hpp"
 #include "mechanics/cable.hpp"
 #include "mechanics/linkage.hpp"
 #include "mechanics/model.hpp"
@@ -36,6 +37,7 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::ElementSide> element_sides;  // of all these
     std::vector<mechanics::Cable> cables;
     std::vector<mechanics::Beam> beams;
+    std::vector<mechanics::BeamInertia> beam_inertias;  // of those with a consistent mass
     std::vector<mechanics::BoundedMotor> bounded_motors;
     std::vector<mechanics::BoundedActuator> bounded_actuators;
     mechanics::Motions motions;
@@ -133,6 +135,13 @@ struct MultibodySystem::Implementation {
         each(bricks);
         each(cables);
         for (const auto& beam : beams) visit(beam, mechanics::Beam::Ends{at[beam.bodies()[0]], at[beam.bodies()[1]]});
+    }
+
+    /// Visits the elements with a consistent mass: visit(element, placements of its ends). After place().
+    template <class Visitor>
+    void for_each_inertia(Visitor&& visit) const {
+        for (const auto& inertia : beam_inertias)
+            visit(inertia, mechanics::BeamInertia::Ends{at[inertia.bodies()[0]], at[inertia.bodies()[1]]});
     }
 
     /// Among the rows that are kept, −1 if it is left out.

@@ -73,6 +73,14 @@ void SystemReader::read_beam(const YAML::Node& item, const Copy& copy) {
                       source_.refuse(n, fmt::format("\"elements\" is {}; it must be from 1 to 100000", beam.elements));
               }),
          made("density", [&](const YAML::Node& n) { beam.material.density = positive_number(source_, n, "density"); }),
+         made("mass",
+              [&](const YAML::Node& n) {
+                  const std::string name = scalar(source_, n, "mass");
+                  if (name != "lumped" && name != "consistent")
+                      source_.refuse(
+                          n, fmt::format("there is no mass \"{}\" of beams; it must be lumped or consistent", name));
+                  beam.mass = name == "consistent" ? BeamMass::Consistent : BeamMass::Lumped;
+              }),
          made("velocity", [&](const YAML::Node& n) { beam.velocity = vector3(source_, n, "velocity"); }),
          made("angular_velocity",
               [&](const YAML::Node& n) { beam.angular_velocity = vector3(source_, n, "angular_velocity"); }),

@@ -132,7 +132,7 @@ void SystemReader::read_sleeping(const YAML::Node& node) {
               {"time", [&](const YAML::Node& n) { rule.time = positive_number(source_, n, "time"); }}});
 }
 
-// start: equilibrium, or start: {equilibrium: {load_steps, tolerance}}
+// start: equilibrium, or start: {equilibrium: {load_steps, tolerance, method}}
 void SystemReader::read_start(const YAML::Node& node) {
     if (node.IsScalar()) {
         if (node.Scalar() != "equilibrium")
@@ -153,8 +153,16 @@ void SystemReader::read_start(const YAML::Node& node) {
                                       source_.refuse(n, fmt::format("\"load_steps\" is {}; it must be from 1 to 100000",
                                                                     rule.load_steps));
                               }},
-                             {"tolerance", [&](const YAML::Node& n) {
-                                  rule.tolerance = positive_number(source_, n, "tolerance");
+                             {"tolerance",
+                              [&](const YAML::Node& n) { rule.tolerance = positive_number(source_, n, "tolerance"); }},
+                             {"method", [&](const YAML::Node& n) {
+                                  const std::string name = scalar(source_, n, "method");
+                                  if (name != "load_steps" && name != "arc_length")
+                                      source_.refuse(n, fmt::format("there is no method \"{}\" for an equilibrium; it "
+                                                                    "must be load_steps or arc_length",
+                                                                    name));
+                                  rule.method = name == "arc_length" ? EquilibriumMethod::ArcLength
+                                                                     : EquilibriumMethod::LoadSteps;
                               }}});
                }}});
     if (!result_.equilibrium) source_.refuse(node, "\"start\" lacks the key \"equilibrium\"");
