@@ -4,6 +4,7 @@
 
 namespace delassus {
 
+using mechanics::at_time;
 using mechanics::Matrix3d;
 using mechanics::Placements;
 using mechanics::RowColumns;
@@ -70,13 +71,6 @@ void add_damper(const TurnDamper& damper, const Placements& at, double factor, T
     add_local(columns, matrix, factor, tangent, H);
 }
 
-Vector3d at_time(const std::array<Motion, 3>& motions, double t) {
-    Vector3d result = Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i)
-        if (motions[i].value) result[static_cast<Eigen::Index>(i)] = motions[i].value(t);
-    return result;
-}
-
 // A force F̄ and a torque T̄ in the frame of the body: f = (A F̄, s̄ × F̄ + T̄), so that −∂f/∂θ = (A [F̄]×, 0). The
 // symmetric tangent takes nothing of it: half of it with its transpose would be indefinite, and in a linearised step
 // the transpose is a torque that does not exist, by which a force through the mass centre would change the spin.
@@ -89,7 +83,7 @@ void add_follower(const mechanics::Load& load, const mechanics::Placement& place
 
 }  // namespace
 
-void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) const {
+void MultibodySystem::add_mass(const State& state, double factor, MatrixAssembler& M) const {
     const auto& self = *implementation_;
     for (const auto& body : self.moving) {
         for (int i = 0; i < 3; ++i) M.add(body.column + i, body.column + i, factor * body.mass);
@@ -103,9 +97,10 @@ void MultibodySystem::add_mass(const State&, double factor, MatrixAssembler& M) 
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) M.add(node.column + i, node.column + i, factor * node.parameters.mass);
+    self.add_modal_mass(state, factor, M);
 }
 
-void MultibodySystem::multiply_mass(const State&, double factor, const double* x, double* result) const {
+void MultibodySystem::multiply_mass(const State& state, double factor, const double* x, double* result) const {
     const auto& self = *implementation_;
     for (const auto& body : self.moving) {
         const Eigen::Map<const Vector3d> linear(x + body.column), angular(x + body.column + 3);
@@ -115,6 +110,7 @@ void MultibodySystem::multiply_mass(const State&, double factor, const double* x
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) result[node.column + i] += factor * node.parameters.mass * x[node.column + i];
+    self.multiply_modal_mass(state, factor, x, result);
 }
 
 // Gravity m g; gyroscopic torque −ω̄ × J ω̄ (Newton and Euler in the body frame); springs −(k C + c Ċ) ∇C; loads
@@ -176,6 +172,7 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
         Eigen::Map<Vector3d>(result + place.column + 3) +=
             factor * (load.point.cross(place.A.transpose() * force) + place.A.transpose() * torque);
     }
+    self.add_modal_force(state, factor, result);
 }
 
 // Springs: f = −(k C + c Ċ) ∇C, so that K = k ∇C ∇Cᵀ + (k C + c Ċ) ∇²C + c ∇C (∂Ċ/∂q)ᵀ with Ċ = ∇C · v and
@@ -227,6 +224,7 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         add_matrix(place.column + 3, place.column + 3, -skew(load.point) * skew(force) - skew(torque),
                    factor * self.load_factor, tangent, H);
     }
+    self.add_modal_stiffness(state, factor, tangent, H);
 }
 
 // Springs: R = c ∇C ∇Cᵀ.
@@ -252,6 +250,7 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
         element.damping(at, R);
         add_element<Element::freedoms>(R, at, factor, tangent, H);
     });
+    self.add_modal_damping(factor, tangent, H);
 }
 
 bool MultibodySystem::has_stiffness() const {
