@@ -86,7 +86,7 @@ VectorXd squares_of(const MultibodySystem& system) {
     const MatrixXd K = stiffness_of(system, start);
     const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(Z.transpose() * (0.5 * (K + K.transpose())) * Z,
                                                                     Z.transpose() * mass_of(system, start) * Z,
-                                                                    Eigen::EigenvaluesOnly);
+                                                                    Eigen::EigenvaluesOnly | Eigen::Ax_lBx);
     return solver.eigenvalues();
 }
 
@@ -198,19 +198,22 @@ TEST(ReducedBody, HasTheEnergyAndMomentumOfItsNodes) {
 
 // ---- Vibrations and deflections ----
 
-/// Relative errors of ω against those of the whole mesh. held: the root by the world. tip: an interface there.
+/// Relative errors of ω against those of the whole mesh. held: the root by the world. tip: a small weight there, and at
+/// the root where it is not held.
 std::vector<double> errors(std::int32_t modes, bool held, bool tip, std::size_t count) {
     const auto squares = [&](std::int32_t kept) {
         MultibodySystem system;
         system.set_gravity({0.0, 0.0, 0.0});
         const auto first = add(system, bar(), kept);
         if (held) system.add_attachment({"root", nodes_at(system, first, 0.0), world_body});
-        if (tip) {
-            BodyParameters weight = rigid("weight", {length, 0.0, 0.0});
+        const auto weigh = [&](const std::string& name, double x) {
+            BodyParameters weight = rigid(name, {x, 0.0, 0.0});
             weight.mass = 1e-3;
             weight.inertia = {1e-6, 1e-6, 1e-6};
-            system.add_attachment({"tip", nodes_at(system, first, length), system.add_body(weight)});
-        }
+            system.add_attachment({name, nodes_at(system, first, x), system.add_body(weight)});
+        };
+        if (tip) weigh("tip", length);
+        if (tip && !held) weigh("root", 0.0);
         system.finish();
         return squares_of(system);
     };
@@ -227,14 +230,14 @@ TEST(ReducedBody, FrequenciesConvergeFromAboveToThoseOfTheMesh) {
         std::vector<double> before(6, 1e9);
         for (const std::int32_t modes : {4, 10, 20}) {
             const auto error = errors(modes, held, true, 6);
-            std::string text;
+            std::printf("held %d, %2d modes:", held, modes);
             for (std::size_t i = 0; i < 6; ++i) {
-                text += std::to_string(error[i]) + " ";
+                std::printf(" %.2e", error[i]);
                 EXPECT_GT(error[i], -1e-8) << modes << " " << i;
                 EXPECT_LT(error[i], before[i] + 1e-8) << modes << " " << i;
             }
             before = error;
-            std::printf("held %d, %d modes: %s\n", held, modes, text.c_str());
+            std::printf("\n");
         }
         for (const double error : before) EXPECT_LT(error, 1e-3);
     }
@@ -303,7 +306,7 @@ Vector3 sag(std::int32_t modes) {
     LoadParameters load;
     load.name = "load";
     for (const auto node : middle) load.nodes.push_back({node, 1.0 / static_cast<double>(middle.size())});
-    load.force = {Motion::constant(1e-3), Motion::constant(2e-3), Motion::constant(-3e-3)};
+    load.force = {Motion::constant(1.0), Motion::constant(2.0), Motion::constant(-3.0)};
     system.add_load(load);
     system.finish();
     VectorXd f = VectorXd::Zero(system.n());
@@ -318,7 +321,7 @@ Vector3 sag(std::int32_t modes) {
 
 TEST(ReducedBody, StaticDeflectionsUnderLoadsOnNodesAreExact) {
     const Vector3 whole = sag(-1), reduced = sag(2);
-    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(reduced[i] / whole[i], 1.0, 1e-6);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(reduced[i] / whole[i], 1.0, 1e-7);
 }
 
 // ---- Motion ----
@@ -358,7 +361,7 @@ TEST(ReducedBody, ASpinningRodStretches) {
     const double omega = 600.0, beta = omega * std::sqrt(1000.0 / 1e9);
     MultibodySystem system;
     system.set_gravity({0.0, 0.0, 0.0});
-    ElasticBlock block = bar({8, 1, 1}, 0.0);
+    ElasticBlock block = bar({16, 1, 1}, 0.0);
     const auto first = system.add_reduced_body({block, 60});
     system.finish();
     State state = system.initial_state();
@@ -376,7 +379,7 @@ TEST(ReducedBody, ASpinningRodStretches) {
     for (const auto node : tip) x += system.node_position(state, node)[0] / static_cast<double>(tip.size());
     const double stretch = x - length, expected = std::tan(0.5 * beta * length) / beta - 0.5 * length;
     std::printf("stretch %.6g, closed form %.6g\n", stretch, expected);
-    EXPECT_NEAR(stretch / expected, 1.0, 0.02);
+    EXPECT_NEAR(stretch / expected, 1.0, 0.012);  // the mesh, with one brick over the section
     // It goes on like that.
     run(system, state, "generalized_alpha", 1e-4, 50);
     double later = 0.0;
@@ -500,12 +503,16 @@ TEST(ReducedBody, WhatCannotBeIsRefusedInOneSentence) {
         }),
         "the elastic body \"bar\" cannot be reduced to modes: the 3 nodes of one of its interfaces lie on a line, "
         "which holds no turn about it; take a single node, or three that make a triangle");
-    EXPECT_EQ(refusal([](auto& system) {
-                  const auto first = system.add_reduced_body({bar(), 4});
-                  system.add_cable({{}, {first, first + 1}});
-              }),
-              "the cable \"\" names a node of \"bar\", which is reduced to modes: its nodes can only be attached and "
-              "loaded");
+    EXPECT_EQ(
+        refusal([](auto& system) {
+            const auto first = system.add_reduced_body({bar(), 4});
+            CableParameters cable;
+            cable.name = "rope";
+            cable.nodes = {first, first + 1};
+            system.add_cable(cable);
+        }),
+        "the cable \"rope\" names a node of \"bar\", which is reduced to modes: its nodes can only be attached and "
+        "loaded");
     EXPECT_EQ(refusal([](auto& system) {
                   const auto first = system.add_reduced_body({bar(), 4});
                   system.add_attachment({"one", nodes_at(system, first, 0.0), world_body});

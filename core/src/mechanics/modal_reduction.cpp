@@ -220,13 +220,16 @@ private:
         const SparseMatrix K = free_stiffness();
         const VectorXd mass = free_rows(mass_);
         MatrixXd forces(freedoms, motions.cols() + loads.cols());
-        forces << -free_rows(times(structure_.K, motions)), free_rows(loads);
+        forces.leftCols(motions.cols()) = -free_rows(times(structure_.K, motions));
+        forces.rightCols(loads.cols()) = free_rows(loads);
         const Eigenmodes found =
             find_eigenmodes(K, mass, floats ? rigid_ : MatrixXd(freedoms, 0), shift, forces, count);
         MatrixXd responses = with_held_rows(found.responses);
         responses.leftCols(motions.cols()) += motions;
         MatrixXd basis(mass_.size(), responses.cols() + normal_);
-        basis << responses, with_held_rows(found.modes.rightCols(normal_));
+        if (basis.cols() == 0) refuse(name_, "no mode is left of it; keep at least one");
+        basis.leftCols(responses.cols()) = responses;
+        basis.rightCols(normal_) = with_held_rows(found.modes.rightCols(normal_));
         for (int twice = 0; twice < 2; ++twice)
             basis -= rigid_ * (rigid_.transpose() * (mass_.asDiagonal() * basis)).eval();
         return basis;
@@ -241,8 +244,7 @@ private:
             if (const double norm = scaled.col(j).norm(); norm > 0.0) scaled.col(j) /= norm;
         Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled);
         qr.setThreshold(1e-10);
-        const Eigen::Index k = scaled.size() > 0 ? qr.rank() : 0;
-        if (k == 0) refuse(name_, "no mode is left of it; keep at least one");
+        const Eigen::Index k = qr.rank();
         MatrixXd W = qr.householderQ() * MatrixXd::Identity(scaled.rows(), k);
         W = root.cwiseInverse().asDiagonal() * W;
         MatrixXd stiffness = W.transpose() * times(structure_.K, W);

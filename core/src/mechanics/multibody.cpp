@@ -340,7 +340,7 @@ void MultibodySystem::finish() {
         self.gyroscopic = self.gyroscopic || gyroscopic;
     }
     for (auto& node : self.nodes) {
-        if (node.parameters.fixed) continue;
+        if (node.parameters.fixed || node.reduced >= 0) continue;
         refuse_unless(node.parameters.mass > 0.0, "the node", node.parameters.name,
                       "has no mass and no element gives it any");
         node.position = self.position_size;
