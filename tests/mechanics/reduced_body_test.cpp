@@ -249,6 +249,23 @@ TEST(ReducedBody, KeptVibrationsAreExact) {
         for (const double error : errors(6, held, false, 6)) EXPECT_NEAR(error, 0.0, 1e-8);
 }
 
+// A cube has pairs and triples of equal frequencies.
+TEST(ReducedBody, RepeatedFrequenciesAreAllFound) {
+    ElasticBlock cube = bar({2, 2, 2});
+    cube.edges = {length, length, length};
+    MultibodySystem mesh, system;
+    mesh.add_elastic_block(cube);
+    mesh.finish();
+    const VectorXd whole = squares_of(mesh);
+    system.add_reduced_body({cube, 20});
+    system.finish();
+    const auto& frequencies = system.reduced_bodies().at(0).frequencies;
+    EXPECT_NEAR(frequencies[1] / frequencies[0], 1.0, 1e-9);
+    for (std::size_t i = 0; i < frequencies.size(); ++i)
+        EXPECT_NEAR(2.0 * std::numbers::pi * frequencies[i] / std::sqrt(whole[static_cast<Eigen::Index>(i) + 6]), 1.0,
+                    1e-9);
+}
+
 TEST(ReducedBody, VibratesAsABeam) {
     MultibodySystem system;
     system.add_reduced_body({bar({10, 1, 1}, 0.0), 8});
