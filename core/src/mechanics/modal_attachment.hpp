@@ -12,8 +12,8 @@
 //     C_i = ½ (d_k · b_j − d_j · b_k) = 0
 //
 // the axial vector of the relative rotation. The linear axes differ from those of exp(θ) by θ³ in these rows, as the
-// terms of second order are symmetric. Each row is bilinear in vectors that are affine in s. With d = A d̂, of the shape
-// Ψ_d (δd̂ = Ψ_d δs), and along increments (δc, ϑ, δs) with δA = A [ϑ]×:
+// terms of second order are symmetric. Each row is bilinear in vectors that are affine in s. With d = A d̂, of the
+// shape Ψ_d (δd̂ = Ψ_d δs), and along increments (δc, ϑ, δs) with δA = A [ϑ]×:
 //
 //     J_d = (0, −A [d̂]×, A Ψ_d),      ḋ = A (ω × d̂ + Ψ_d ṡ),      d̈ at v̇ = 0: A (ω × (ω × d̂) + 2 ω × Ψ_d ṡ)
 //     ∂(J_dᵀ y)/∂(ϑ, s) for fixed y, ŷ = Aᵀ y:   ( [d̂]× [ŷ]×   −[ŷ]× Ψ_d ;  Ψ_dᵀ [ŷ]×   0 )
