@@ -161,6 +161,35 @@ attachments: [{name: bond, body: foot, elastic: column, face: z_min}]
 }
 #endif
 
+// A block of few modes on an incline of 20°: it slides down with g (sin θ − μ cos θ), or stays.
+#ifdef DELASSUS_HAS_FCL
+TEST(ReducedScene, ABlockSlidesOnItsNodes) {
+    for (const double friction : {0.2, 0.5}) {
+        const std::string text = R"(
+step: 0.001
+end: 0.4
+gravity: [3.355207611, 0, -9.218384610]
+materials: {rubber: {friction: )" +
+                                 std::to_string(friction) + R"(}}
+bodies: [{name: ground, fixed: true, shapes: [{plane: {}, material: rubber}]}]
+elastic_blocks:
+  - {name: block, corner: [0, 0, 0.005], edges: [0.4, 0.3, 0.1], cells: [2, 2, 1], young: 1.0e+6, poisson: 0.3, modes: 12,
+     damping_time: 0.01, contact: {radius: 0.005, material: rubber}}
+)";
+        Running run(parse_scene(text, "slide.yaml"));
+        run.finish();
+        const auto column = static_cast<std::size_t>(run.system().reduced_bodies().at(0).column);
+        const double angle = 20.0 * std::numbers::pi / 180.0;
+        const double speed = 9.81 * std::max(0.0, std::sin(angle) - friction * std::cos(angle)) * 0.4;
+        std::printf("speed %.5f, expected %.5f\n", run.simulation.state().v[column], speed);
+        EXPECT_NEAR(run.simulation.state().v[column], speed, 0.01 * std::max(speed, 0.1));
+        EXPECT_NEAR(run.simulation.state().q[static_cast<std::size_t>(run.system().reduced_bodies()[0].position) + 2],
+                    0.055, 1e-4);
+        EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+    }
+}
+#endif
+
 std::string refusal(const std::string& text) {
     try {
         static_cast<void>(parse_scene("step: 0.001\nend: 0.1\n" + text, "s.yaml"));

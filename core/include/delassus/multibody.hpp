@@ -268,8 +268,8 @@ struct ElasticMeshParameters {
 /// are: six for each interface but the first, `modes` vibrations with all interfaces held, and three for each component
 /// of a load on its nodes and each interface of a single node.
 struct ReducedBodyParameters {
-    std::variant<ElasticBlock, ElasticMeshParameters> solid;  ///< without contact
-    std::int32_t modes = 10;                                  ///< ≥ 0
+    std::variant<ElasticBlock, ElasticMeshParameters> solid;
+    std::int32_t modes = 10;  ///< ≥ 0
 };
 
 /// A reduced body of a finished system. Its velocities are that of the mass centre (world frame), the angular velocity
@@ -393,9 +393,9 @@ public:
     /// Returns the number of its first node; nodes are numbered as the vertices of the mesh. Those in the middles of
     /// edges follow.
     std::int32_t add_elastic_mesh(const ElasticMeshParameters& body);
-    /// Returns the number of its first node; nodes are those of the mesh. They can be attached and loaded; they have no
-    /// columns of their own, and take no contact, no element and no cable. finish() finds the modes, and throws
-    /// InputError where there are none to find.
+    /// Returns the number of its first node; nodes are those of the mesh. They can be attached and loaded, and touch
+    /// shapes of bodies. They have no columns of their own, and take no element and no cable. finish() finds the modes,
+    /// and throws InputError where there are none to find.
     std::int32_t add_reduced_body(const ReducedBodyParameters& body);
     void add_cable(const CableParameters& cable);
     void add_beam(const BeamParameters& beam);

@@ -37,6 +37,9 @@ struct Node {
     NodeParameters parameters;
     std::int32_t position = -1, column = -1;
     std::int32_t reduced = -1;  ///< the reduced body that it is a node of; it has no columns then
+    bool touches = false;       ///< has a contact
+    /// Whether forces can move it.
+    [[nodiscard]] bool moves() const { return column >= 0 || reduced >= 0; }
 };
 
 /// A reduced body: its mesh until the system is finished, its modes from then on.

@@ -287,13 +287,13 @@ void MultibodySystem::add_node_contact(std::int32_t node, double radius, std::in
     auto& self = *implementation_;
     self.must_not_be_finished();
     self.check_node(node, "a contact");
-    self.must_have_columns(node, "a contact");
     if (!(radius > 0.0) || !std::isfinite(radius))
         throw InputError(fmt::format("the contact radius of node {} is {} m; it must be positive", node, radius));
     if (material < 0 || material >= static_cast<std::int32_t>(self.materials.size()))
         throw InputError(fmt::format("the contact of node {} has the material {}; there are {}", node, material,
                                      self.materials.size()));
     self.node_contacts.push_back({node, radius, material});
+    self.nodes[static_cast<std::size_t>(node)].touches = true;
 }
 
 void MultibodySystem::set_envelope(double envelope) {

@@ -233,6 +233,9 @@ struct MultibodySystem::Implementation {
         const mechanics::Matrix3d* A;  ///< null for a node
         mechanics::Vector3d arm;       ///< from the mass centre, world frame
         mechanics::Vector3d velocity;  ///< of the point where it is prescribed, else 0
+        const mechanics::ReducedSolid* reduced =
+            nullptr;            ///< of a node of a reduced body, from whose centre the arm is
+        Eigen::Index node = 0;  ///< its number in the mesh
 
         /// The entries of sign · direction · ṗ.
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -49,8 +51,8 @@ VectorXd least_solution(const MatrixXd& A, const VectorXd& b) {
 void MultibodySystem::Implementation::must_have_columns(std::int32_t node, std::string_view what) const {
     if (const auto reduced_body = nodes[static_cast<std::size_t>(node)].reduced; reduced_body >= 0)
         throw InputError(
-            fmt::format("{} names a node of \"{}\", which is reduced to modes: its nodes can only be attached "
-                        "and loaded",
+            fmt::format("{} names a node of \"{}\", which is reduced to modes: its nodes take no "
+                        "element and no cable",
                         what, reduced[static_cast<std::size_t>(reduced_body)].name));
 }
 
@@ -70,14 +72,12 @@ std::int32_t MultibodySystem::add_reduced_body(const ReducedBodyParameters& para
     mechanics::ReducedSolid body;
     body.mesh = std::make_unique<MultibodySystem>();
     body.modes = parameters.modes;
+    double contact_radius = 0.0;
+    std::int32_t contact_material = -1;
     std::visit(
         [&](const auto& given) {
             refuse_unless(parameters.modes >= 0, "the modes of the elastic body", given.name,
                           fmt::format("are {}; their number must not be negative", parameters.modes));
-            refuse_unless(
-                !(given.contact_radius > 0.0), "the elastic body", given.name,
-                "has modes and a contact: a body that is reduced to modes touches nothing; leave one of the two "
-                "out, or attach bodies with shapes");
             refuse_unless(mechanics::finite(given.velocity) && mechanics::finite(given.angular_velocity),
                           "the velocity of the elastic body", given.name, "is not finite");
             body.name = given.name;
@@ -86,7 +86,10 @@ std::int32_t MultibodySystem::add_reduced_body(const ReducedBodyParameters& para
             body.velocity = given.velocity;
             body.angular_velocity = given.angular_velocity;
             mechanics::check_material(given.material);
+            contact_radius = given.contact_radius;
+            contact_material = given.contact_material;
             auto solid = given;
+            solid.contact_radius = 0.0;
             solid.material.damping_time = solid.material.damping_rate = 0.0;
             solid.velocity = solid.angular_velocity = {};
             if constexpr (std::is_same_v<std::decay_t<decltype(given)>, ElasticBlock>) {
@@ -109,6 +112,7 @@ std::int32_t MultibodySystem::add_reduced_body(const ReducedBodyParameters& para
         own.reduced = index;
         self.nodes.push_back(own);
     }
+    const std::size_t sides_before = self.element_sides.size();
     for (auto side : mesh.element_sides) {
         for (auto& node : side.corners) node += body.first_node;
         for (auto& node : side.middles)
@@ -118,6 +122,12 @@ std::int32_t MultibodySystem::add_reduced_body(const ReducedBodyParameters& para
     const auto first = body.first_node;
     const std::string name = body.name;
     self.reduced.push_back(std::move(body));
+    if (contact_radius > 0.0) {
+        std::set<std::int32_t> touching;
+        for (const auto& side : mechanics::outer_sides(std::span(self.element_sides).subspan(sides_before)))
+            side.for_each_node([&](std::int32_t node) { touching.insert(node); });
+        for (const auto node : touching) add_node_contact(node, contact_radius, contact_material);
+    }
     if (!fixed.empty()) self.attach_reduced({name, fixed, world_body}, index);
     return first;
 }
