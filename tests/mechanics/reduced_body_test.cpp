@@ -230,14 +230,13 @@ TEST(ReducedBody, FrequenciesConvergeFromAboveToThoseOfTheMesh) {
         std::vector<double> before(6, 1e9);
         for (const std::int32_t modes : {4, 10, 20}) {
             const auto error = errors(modes, held, true, 6);
-            std::printf("held %d, %2d modes:", held, modes);
             for (std::size_t i = 0; i < 6; ++i) {
-                std::printf(" %.2e", error[i]);
                 EXPECT_GT(error[i], -1e-8) << modes << " " << i;
                 EXPECT_LT(error[i], before[i] + 1e-8) << modes << " " << i;
             }
             before = error;
-            std::printf("\n");
+            RecordProperty((held ? "held, " : "free, ") + std::to_string(modes) + " vibrations",
+                           testing::PrintToString(error));
         }
         for (const double error : before) EXPECT_LT(error, 1e-3);
     }
@@ -307,7 +306,8 @@ TEST(ReducedBody, StaticDeflectionsAtInterfacesAreExact) {
     const VectorXd whole = deflection(-1);
     for (const std::int32_t modes : {0, 4}) {
         const VectorXd reduced = deflection(modes);
-        std::printf("deflection with %d modes: %.2e\n", modes, (reduced - whole).norm() / whole.norm());
+        RecordProperty("error with " + std::to_string(modes) + " vibrations",
+                       testing::PrintToString((reduced - whole).norm() / whole.norm()));
         EXPECT_LE((reduced - whole).norm(), 1e-9 * whole.norm());
     }
 }
@@ -366,10 +366,7 @@ TEST(ReducedBody, FreeMotionConservesMomentaAndEnergy) {
     const auto after = system.momentum(state);
     for (std::size_t part = 0; part < 2; ++part)
         for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(after[part][i], before[part][i], 1e-9) << part << i;
-    std::printf("energy %.2e, momentum %.2e, angular momentum %.2e of %.3g\n", system.energy(state) / energy - 1.0,
-                std::hypot(after[0][0] - before[0][0], after[0][1] - before[0][1], after[0][2] - before[0][2]),
-                std::hypot(after[1][0] - before[1][0], after[1][1] - before[1][1], after[1][2] - before[1][2]),
-                std::hypot(before[1][0], before[1][1], before[1][2]));
+    RecordProperty("energy", testing::PrintToString(system.energy(state) / energy - 1.0));
     EXPECT_NEAR(system.energy(state), energy, 1e-9 * energy);
     double strain = 0.0;
     for (std::size_t i = state.q.size() - 6; i < state.q.size(); ++i) strain += std::abs(state.q[i]);
@@ -399,7 +396,7 @@ TEST(ReducedBody, ASpinningRodStretches) {
     double x = 0.0;
     for (const auto node : tip) x += system.node_position(state, node)[0] / static_cast<double>(tip.size());
     const double stretch = x - length, expected = std::tan(0.5 * beta * length) / beta - 0.5 * length;
-    std::printf("stretch %.6g, closed form %.6g\n", stretch, expected);
+    RecordProperty("stretch", testing::PrintToString(stretch / expected));
     EXPECT_NEAR(stretch / expected, 1.0, 0.012);  // the mesh, with one brick over the section
     // It goes on like that.
     run(system, state, "generalized_alpha", 1e-4, 50);
@@ -444,7 +441,8 @@ TEST(ReducedBody, AFallingArmIsThatOfTheMesh) {
     for (const auto& [young, most] : {std::pair{2e7, 5e-4}, {2e8, 2e-5}}) {
         const Vector3 whole = fallen(-1, "generalized_alpha", 2e-3, 150, young);
         const Vector3 reduced = fallen(8, "generalized_alpha", 2e-3, 150, young);
-        std::printf("whole %.6f %.6f, reduced %.6f %.6f\n", whole[0], whole[2], reduced[0], reduced[2]);
+        RecordProperty("difference " + std::to_string(young),
+                       testing::PrintToString(std::hypot(reduced[0] - whole[0], reduced[2] - whole[2])));
         EXPECT_LT(whole[2], -0.3);
         for (const std::size_t i : {0U, 1U, 2U}) EXPECT_NEAR(reduced[i], whole[i], most);
     }

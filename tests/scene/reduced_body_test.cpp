@@ -33,7 +33,8 @@ TEST(ReducedScene, ArmOfFewModesSwingsAsThatOfTheMesh) {
         const double angle = std::atan2(a[1], a[0]);
         ringing = std::max(ringing, 0.62 * std::abs(angle - 1.0));
     }
-    std::printf("worst %.3g m, ringing %.3g m\n", worst, ringing);
+    RecordProperty("difference", testing::PrintToString(worst));
+    RecordProperty("ringing", testing::PrintToString(ringing));
     EXPECT_LT(worst, 1e-4);
     EXPECT_GT(ringing, 4e-3);
 }
@@ -66,7 +67,8 @@ TEST(ReducedScene, RodOfTheSliderCrankBendsByItsInertia) {
     const double a0 = r * speed * speed * std::sqrt(l * l - r * r) / l;
     const double a1 = -r * r * speed * speed / std::sqrt(l * l - r * r) * r / l;
     const double quasi_static = 5.0 * 7800.0 * area * (a0 + a1) * std::pow(l, 4) / (768.0 * 2e11 * inertia);
-    std::printf("deflection %.4f of the quasi-static one, slider off by %.3g m\n", deflection / quasi_static, slider);
+    RecordProperty("deflection", testing::PrintToString(deflection / quasi_static));
+    RecordProperty("slider", testing::PrintToString(slider));
     EXPECT_NEAR(deflection / quasi_static, 1.0, 0.05);
     EXPECT_LT(slider, 1e-5);
     EXPECT_LT(run.simulation.totals().worst_drift, 1e-9);
@@ -154,7 +156,6 @@ attachments: [{name: bond, body: foot, elastic: column, face: z_min}]
     for (const auto node : top)
         way += run.system().node_position(start, node)[2] - run.system().node_position(run.simulation.state(), node)[2];
     const double shrinks = 500.0 * 9.81 * 0.25 / (2.0 * 1e6);  // ρ g L²/(2 E)
-    std::printf("shrinks by %.4f\n", way / static_cast<double>(top.size()) / shrinks);
     EXPECT_NEAR(way / static_cast<double>(top.size()) / shrinks, 1.0, 0.05);
     for (const double v : run.simulation.state().v) EXPECT_NEAR(v, 0.0, 1e-4);
     EXPECT_NEAR(run.pose("foot").position[2], 0.1, 1e-5);
@@ -181,7 +182,6 @@ elastic_blocks:
         const auto column = static_cast<std::size_t>(run.system().reduced_bodies().at(0).column);
         const double angle = 20.0 * std::numbers::pi / 180.0;
         const double speed = 9.81 * std::max(0.0, std::sin(angle) - friction * std::cos(angle)) * 0.4;
-        std::printf("speed %.5f, expected %.5f\n", run.simulation.state().v[column], speed);
         EXPECT_NEAR(run.simulation.state().v[column], speed, 0.01 * std::max(speed, 0.1));
         EXPECT_NEAR(run.simulation.state().q[static_cast<std::size_t>(run.system().reduced_bodies()[0].position) + 2],
                     0.055, 1e-4);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"

@@ -6,7 +6,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 #include "mechanics/checks.hpp"
 #include "mechanics/eigenmodes.hpp"
