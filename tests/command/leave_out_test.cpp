@@ -40,6 +40,13 @@ TEST(LeaveOut, ConvexShapesAloneMapQhull) {
 #endif
 }
 
+TEST(LeaveOut, ReducedBodiesAloneMapTheEigenSolver) {
+    EXPECT_EQ(loader_log("plan " + scene("box_on_incline")).find("delassus_eigenmodes"), std::string::npos);
+#ifdef DELASSUS_HAS_SPECTRA
+    EXPECT_NE(loader_log("plan " + scene("modal_slider_crank")).find("delassus_eigenmodes"), std::string::npos);
+#endif
+}
+
 TEST(LeaveOut, MeshFilesAloneMapTheirLibraries) {
     const auto without = loader_log("plan " + scene("box_on_incline"));
     for (const char* library : {"libassimp", "libnglib"})

@@ -2,7 +2,8 @@
 // Multibody systems: rigid bodies, point nodes, joints, motors, springs, elements, contact. SI units.
 //
 // A moving body has 7 positions (mass centre, unit quaternion w x y z) and 6 velocities (of the mass centre in the
-// world frame, angular velocity in the body frame). A node has 3 and 3. Fixed ones have none.
+// world frame, angular velocity in the body frame). A node has 3 and 3. Fixed ones have none. A reduced body has as
+// many more as it has modes, after those. Bodies come first, then nodes, then reduced bodies.
 #pragma once
 
 #include <array>
@@ -11,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "delassus/collision.hpp"
@@ -189,6 +191,7 @@ struct NodeShare {
 };
 
 /// Nodes that a body carries: each stays where it is in the body's frame at t = 0. Holds elastic bodies by rigid ones.
+/// Of a reduced body the nodes are an interface, which moves with the body as a whole.
 struct AttachmentParameters {
     std::string name;
     std::vector<std::int32_t> nodes;
@@ -239,6 +242,7 @@ struct ElasticBlock {
     /// their radii; 0: not at all.
     double contact_radius = 0.0;
     std::int32_t contact_material = -1;
+    Vector3 angular_velocity{};  ///< about its mass centre, world frame, rad/s; for nodes that are not fixed
 };
 
 /// A box with edges along the axes, m.
@@ -258,6 +262,29 @@ struct ElasticMeshParameters {
     Vector3 velocity{};                   ///< m/s
     double contact_radius = 0.0;          ///< as in ElasticBlock
     std::int32_t contact_material = -1;
+    Vector3 angular_velocity{};  ///< likewise
+};
+
+/// An elastic body of few modes (Craig and Bampton) in a frame that moves as a rigid body: for small deformations and
+/// any motion. Its interfaces are what add_attachment() holds, and the fixed faces or boxes of the solid. The modes
+/// are: six for each interface but the first, `modes` vibrations with all interfaces held, and three for each component
+/// of a load on its nodes and each interface of a single node.
+struct ReducedBodyParameters {
+    std::variant<ElasticBlock, ElasticMeshParameters> solid;
+    std::int32_t modes = 10;  ///< ≥ 0
+};
+
+/// A reduced body of a finished system. Its velocities are that of the mass centre (world frame), the angular velocity
+/// (body frame) and the rates of the k amplitudes s; its positions are the mass centre, a unit quaternion and s. A node
+/// at the place X has moved to X + Φ s in the frame, which has the axes of the world at t = 0.
+struct ReducedBody {
+    std::string name;
+    std::int32_t first_node = 0;
+    std::int32_t position = 0, column = 0;  ///< first entries in q and v
+    double mass = 0.0;                      ///< kg
+    std::vector<double> frequencies;        ///< of the free body, Hz, ascending; k
+    std::vector<Vector3> places;            ///< X of each node, m
+    std::vector<double> shapes;  ///< Φ: x, y, z of each node, mode after mode; Σ m Φ² = mass, so that s is in m
 };
 
 /// An elastic cable between two nodes.
@@ -353,7 +380,9 @@ public:
     void add_bushing(const BushingParameters& bushing);
     void add_load(const LoadParameters& load);
     /// Three rows for each node of a body that moves, after those of all joints. At the start the nodes move with the
-    /// body. Nodes do not touch the body that carries them. Throws InputError if a node is fixed or attached already.
+    /// body. Nodes do not touch the body that carries them. Of a reduced body six rows hold all nodes together, or
+    /// three a single node, also where the other body is fixed. Throws InputError if a node is fixed or attached
+    /// already.
     void add_attachment(const AttachmentParameters& attachment);
     /// A tetrahedron with linear displacements between four nodes, its mass shared among them. Throws InputError if it
     /// is inverted.
@@ -373,6 +402,10 @@ public:
     /// Returns the number of its first node; nodes are numbered as the vertices of the mesh. Those in the middles of
     /// edges follow.
     std::int32_t add_elastic_mesh(const ElasticMeshParameters& body);
+    /// Returns the number of its first node; nodes are those of the mesh. They can be attached and loaded, and touch
+    /// shapes of bodies. They have no columns of their own, and take no element and no cable. finish() finds the modes,
+    /// and throws InputError where there are none to find.
+    std::int32_t add_reduced_body(const ReducedBodyParameters& body);
     void add_cable(const CableParameters& cable);
     void add_beam(const BeamParameters& beam);
     /// Returns the number of its first body, at `from`; the others follow.
@@ -409,6 +442,8 @@ public:
     [[nodiscard]] std::int32_t body_count() const;
     [[nodiscard]] std::int32_t node_count() const;
     [[nodiscard]] Vector3 node_position(const State& state, std::int32_t node) const;
+    [[nodiscard]] Vector3 node_velocity(const State& state, std::int32_t node) const;  ///< m/s
+    [[nodiscard]] const std::vector<ReducedBody>& reduced_bodies() const;              ///< since finish()
     /// Triangles of nodes that bound the tetrahedra, counter-clockwise from outside.
     [[nodiscard]] std::vector<std::array<std::int32_t, 3>> element_surface() const;
     /// What a force of one unit, spread evenly over the outer sides of elements whose corners lie in the box at t = 0,

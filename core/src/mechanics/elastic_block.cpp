@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "delassus/error.hpp"
+#include "mechanics/checks.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -14,6 +15,8 @@ namespace {
 
 void check(const ElasticBlock& block) {
     double nodes = 1.0;
+    mechanics::refuse_unless(mechanics::finite(block.angular_velocity), "the angular velocity of the elastic block",
+                             block.name, "is not finite");
     for (std::size_t i = 0; i < 3; ++i) {
         if (!(block.edges[i] > 0.0) || !std::isfinite(block.edges[i]) || !std::isfinite(block.corner[i]))
             throw InputError(
@@ -82,6 +85,7 @@ std::int32_t MultibodySystem::add_elastic_block(const ElasticBlock& block) {
             add_quadratic_tetrahedron(nodes, block.material, block.model);
         }
     });
+    implementation_->spin_nodes(first, block.angular_velocity);
     return first;
 }
 

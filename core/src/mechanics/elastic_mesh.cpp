@@ -91,6 +91,23 @@ std::vector<NodeShare> MultibodySystem::spread_over_sides(std::int32_t first, st
     return shares;
 }
 
+void MultibodySystem::Implementation::spin_nodes(std::int32_t first, const Vector3& angular_velocity) {
+    const mechanics::Vector3d omega = mechanics::vector(angular_velocity);
+    if (omega.isZero(0.0)) return;
+    mechanics::Vector3d moment = mechanics::Vector3d::Zero();
+    double mass = 0.0;
+    for (auto k = static_cast<std::size_t>(first); k < nodes.size(); ++k) {
+        mass += nodes[k].parameters.mass;
+        moment += nodes[k].parameters.mass * mechanics::vector(nodes[k].parameters.position);
+    }
+    for (auto k = static_cast<std::size_t>(first); k < nodes.size(); ++k) {
+        auto& node = nodes[k].parameters;
+        if (node.fixed) continue;
+        const mechanics::Vector3d turning = omega.cross(mechanics::vector(node.position) - moment / mass);
+        node.velocity = mechanics::array(mechanics::vector(node.velocity) + turning);
+    }
+}
+
 std::int32_t MultibodySystem::add_elastic_mesh(const ElasticMeshParameters& body) {
     const auto& q = body.pose.orientation;
     refuse_unless(
@@ -136,6 +153,7 @@ std::int32_t MultibodySystem::add_elastic_mesh(const ElasticMeshParameters& body
                 middle(corners[mechanics::tetrahedron_edges[e][0]], corners[mechanics::tetrahedron_edges[e][1]]);
         add_quadratic_tetrahedron(nodes, body.material, body.model);
     }
+    implementation_->spin_nodes(first, body.angular_velocity);
     if (!(body.contact_radius > 0.0)) return first;
     std::set<std::int32_t> touching;
     for (const auto& side : mechanics::outer_sides(std::span(implementation_->element_sides).subspan(sides_before)))

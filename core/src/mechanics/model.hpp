@@ -9,6 +9,7 @@
 
 #include "delassus/multibody.hpp"
 #include "mechanics/angle.hpp"
+#include "mechanics/modal_attachment.hpp"
 #include "mechanics/prescribed_motion.hpp"
 #include "mechanics/row.hpp"
 
@@ -36,6 +37,29 @@ struct MovingBody {
 struct Node {
     NodeParameters parameters;
     std::int32_t position = -1, column = -1;
+    std::int32_t reduced = -1;  ///< the reduced body that it is a node of; it has no columns then
+    bool touches = false;       ///< has a contact
+    /// Whether forces can move it.
+    [[nodiscard]] bool moves() const { return column >= 0 || reduced >= 0; }
+};
+
+/// A reduced body: its mesh until the system is finished, its modes from then on.
+struct ReducedSolid {
+    std::string name;
+    std::unique_ptr<MultibodySystem> mesh;  ///< the elements at rest, alone
+    std::int32_t first_node = 0, nodes = 0, modes = 0;
+    double damping_time = 0.0, damping_rate = 0.0;
+    Vector3 velocity{}, angular_velocity{};
+    ModalModel model;
+    std::int32_t position = -1, column = -1;
+};
+
+/// What a load of the system gives to a reduced body: the force `weight` F at the point.
+struct ModalLoad {
+    std::size_t load = 0;
+    std::int32_t reduced = 0;
+    double weight = 0.0;
+    ModalPoint point;  ///< times the weight
 };
 
 /// q₂ θ₂ − p₁ θ₁ = 0 modulo 2π, divided by q₂: the ratio p₁/q₂ of integers makes it a function of the configuration.
@@ -147,6 +171,14 @@ inline Vector3 array(const Vector3d& v) {
 }
 inline Quaterniond quaternion(const Quaternion& q) {
     return {q[0], q[1], q[2], q[3]};
+}
+
+/// Three motions at a time; empty ones are 0.
+inline Vector3d at_time(const std::array<Motion, 3>& motions, double t) {
+    Vector3d result = Vector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i)
+        if (motions[i].value) result[static_cast<Eigen::Index>(i)] = motions[i].value(t);
+    return result;
 }
 
 /// The rows of a joint of bodies at these placements. Throws InputError for an axis of no length, points that coincide

@@ -293,6 +293,7 @@ void MultibodySystem::add_node_contact(std::int32_t node, double radius, std::in
         throw InputError(fmt::format("the contact of node {} has the material {}; there are {}", node, material,
                                      self.materials.size()));
     self.node_contacts.push_back({node, radius, material});
+    self.nodes[static_cast<std::size_t>(node)].touches = true;
 }
 
 void MultibodySystem::set_envelope(double envelope) {
@@ -339,7 +340,7 @@ void MultibodySystem::finish() {
         self.gyroscopic = self.gyroscopic || gyroscopic;
     }
     for (auto& node : self.nodes) {
-        if (node.parameters.fixed) continue;
+        if (node.parameters.fixed || node.reduced >= 0) continue;
         refuse_unless(node.parameters.mass > 0.0, "the node", node.parameters.name,
                       "has no mass and no element gives it any");
         node.position = self.position_size;
@@ -347,6 +348,7 @@ void MultibodySystem::finish() {
         self.position_size += 3;
         self.n += 3;
     }
+    self.reduce_bodies();
     self.at = self.initial_placements();
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
         self.at[static_cast<BodyIndex>(k)].column =
@@ -359,6 +361,10 @@ void MultibodySystem::finish() {
     for (auto& attachment : self.attachments) {
         attachment.first_row = rows;
         rows += 3;
+    }
+    for (auto& attachment : self.modal_attachments) {
+        attachment.first_row = rows;
+        rows += attachment.rows();
     }
     self.place_of_row.assign(static_cast<std::size_t>(rows), 0);
     self.number_rows();
@@ -400,11 +406,13 @@ void MultibodySystem::Implementation::place(const double* q, const double* v, do
             place.omega = Eigen::Map<const Vector3d>(v + body.column + 3);
         }
     }
+    place_modal(q, v);
 }
 
 mechanics::NodePlacement MultibodySystem::Implementation::node_at(std::int32_t index, const double* q,
                                                                   const double* v) const {
     const auto& node = nodes[static_cast<std::size_t>(index)];
+    if (node.reduced >= 0 && finished) return node_of_reduced(index, q, v);
     if (node.column < 0) return {vector(node.parameters.position), Vector3d::Zero(), -1};
     return {Eigen::Map<const Vector3d>(q + node.position), Eigen::Map<const Vector3d>(v + node.column), node.column};
 }
@@ -415,6 +423,10 @@ std::int32_t MultibodySystem::node_count() const {
 Vector3 MultibodySystem::node_position(const State& state, std::int32_t node) const {
     implementation_->check_node(node, "node_position()");
     return array(implementation_->node_at(node, state.q.data(), state.v.data()).x);
+}
+Vector3 MultibodySystem::node_velocity(const State& state, std::int32_t node) const {
+    implementation_->check_node(node, "node_velocity()");
+    return array(implementation_->node_at(node, state.q.data(), state.v.data()).v);
 }
 std::vector<std::int32_t> MultibodySystem::loose_nodes() const {
     std::vector<bool> held(implementation_->nodes.size());
@@ -543,50 +555,69 @@ State MultibodySystem::initial_state() const {
         state.q.insert(state.q.end(), node.parameters.position.begin(), node.parameters.position.end());
         state.v.insert(state.v.end(), node.parameters.velocity.begin(), node.parameters.velocity.end());
     }
+    self.append_modal_start(state);
     self.carry_nodes(state);
     return state;
 }
 
+namespace {
+
+/// A mass centre and a quaternion, by six increments.
+void increment_pose(const double* from, const double* by, double* to) {
+    const Quaterniond turned =
+        mechanics::rotated({from[3], from[4], from[5], from[6]}, Eigen::Map<const Vector3d>(by + 3));
+    for (int i = 0; i < 3; ++i) to[i] = from[i] + by[i];
+    to[3] = turned.w();
+    to[4] = turned.x();
+    to[5] = turned.y();
+    to[6] = turned.z();
+}
+
+void difference_of_poses(const double* a, const double* b, double* delta) {
+    for (int i = 0; i < 3; ++i) delta[i] = b[i] - a[i];
+    const Quaterniond first(a[3], a[4], a[5], a[6]), second(b[3], b[4], b[5], b[6]);
+    Eigen::Map<Vector3d>(delta + 3) = mechanics::logarithm(first.conjugate() * second);
+}
+
+}  // namespace
+
 void MultibodySystem::increment(const double* q, const double* delta, double* result) const {
     const auto& self = *implementation_;
-    for (const auto& body : self.moving) {
-        const double *from = q + body.position, *by = delta + body.column;
-        double* to = result + body.position;
-        const Quaterniond turned =
-            mechanics::rotated({from[3], from[4], from[5], from[6]}, Eigen::Map<const Vector3d>(by + 3));
-        for (int i = 0; i < 3; ++i) to[i] = from[i] + by[i];
-        to[3] = turned.w();
-        to[4] = turned.x();
-        to[5] = turned.y();
-        to[6] = turned.z();
-    }
+    for (const auto& body : self.moving) increment_pose(q + body.position, delta + body.column, result + body.position);
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) result[node.position + i] = q[node.position + i] + delta[node.column + i];
+    for (const auto& body : self.reduced) {
+        increment_pose(q + body.position, delta + body.column, result + body.position);
+        for (Eigen::Index a = 0; a < body.model.inertia.modes(); ++a)
+            result[body.position + 7 + a] = q[body.position + 7 + a] + delta[body.column + 6 + a];
+    }
 }
 
 void MultibodySystem::difference(const double* from, const double* to, double* delta) const {
     const auto& self = *implementation_;
-    for (const auto& body : self.moving) {
-        const double *a = from + body.position, *b = to + body.position;
-        for (int i = 0; i < 3; ++i) delta[body.column + i] = b[i] - a[i];
-        const Quaterniond first(a[3], a[4], a[5], a[6]), second(b[3], b[4], b[5], b[6]);
-        Eigen::Map<Vector3d>(delta + body.column + 3) = mechanics::logarithm(first.conjugate() * second);
-    }
+    for (const auto& body : self.moving)
+        difference_of_poses(from + body.position, to + body.position, delta + body.column);
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) delta[node.column + i] = to[node.position + i] - from[node.position + i];
+    for (const auto& body : self.reduced) {
+        difference_of_poses(from + body.position, to + body.position, delta + body.column);
+        for (Eigen::Index a = 0; a < body.model.inertia.modes(); ++a)
+            delta[body.column + 6 + a] = to[body.position + 7 + a] - from[body.position + 7 + a];
+    }
 }
 
 void MultibodySystem::inverse_tangent(const double* delta, std::vector<DiagonalBlock3>& blocks) const {
     blocks.clear();
-    for (const auto& body : implementation_->moving) {
-        DiagonalBlock3 block;
-        block.first = body.column + 3;
+    const auto turn_at = [&](std::int32_t column) {
+        DiagonalBlock3& block = blocks.emplace_back();
+        block.first = column;
         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(block.value) =
-            mechanics::inverse_tangent_of(Eigen::Map<const Vector3d>(delta + body.column + 3));
-        blocks.push_back(block);
-    }
+            mechanics::inverse_tangent_of(Eigen::Map<const Vector3d>(delta + column));
+    };
+    for (const auto& body : implementation_->moving) turn_at(body.column + 3);
+    for (const auto& body : implementation_->reduced) turn_at(body.column + 3);
 }
 
 }  // namespace delassus

@@ -17,10 +17,12 @@ void MultibodySystem::add_attachment(const AttachmentParameters& parameters) {
     const std::string& name = parameters.name;
     self.check_body(parameters.body, name);
     refuse_unless(!parameters.nodes.empty(), "the attachment", name, "holds no node");
+    for (const auto node : parameters.nodes) self.check_node(node, fmt::format("the attachment \"{}\"", name));
+    if (const auto reduced = self.reduced_of(parameters.nodes, name); reduced >= 0)
+        return self.attach_reduced(parameters, reduced);
     const auto placements = self.initial_placements();
     const auto& place = placements[parameters.body];
     for (const auto node : parameters.nodes) {
-        self.check_node(node, fmt::format("the attachment \"{}\"", name));
         const bool taken = std::any_of(self.attachments.begin(), self.attachments.end(),
                                        [&](const auto& other) { return other.node == node; });
         refuse_unless(!taken && !self.nodes[static_cast<std::size_t>(node)].parameters.fixed, "the attachment", name,
@@ -35,6 +37,7 @@ void MultibodySystem::add_attachment(const AttachmentParameters& parameters) {
 }
 
 void MultibodySystem::Implementation::carry_nodes(State& state) const {
+    carry_reduced(state);
     if (attachments.empty()) return;
     place(state);
     for (const auto& one : attachments) {

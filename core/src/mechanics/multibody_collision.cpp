@@ -62,11 +62,15 @@ void MultibodySystem::Implementation::make_detector() {
         setup.group.push_back(prescribed.empty() || body.column >= 0 ? -1 : 1);
     }
     for (const auto& node : nodes) {
-        setup.fixed.push_back(node.column < 0);
+        setup.fixed.push_back(!node.moves());
         setup.group.push_back(0);
     }
     for (const auto& one : attachments)
         setup.apart.emplace_back(one.body, static_cast<std::int32_t>(bodies.size()) + one.node);
+    for (const auto& one : modal_attachments)
+        for (const auto node : one.nodes)
+            setup.apart.emplace_back(one.body, static_cast<std::int32_t>(bodies.size()) +
+                                                   reduced[static_cast<std::size_t>(one.reduced)].first_node + node);
     for (const auto& contact : node_contacts) {
         Shape sphere;
         sphere.size[0] = contact.radius;

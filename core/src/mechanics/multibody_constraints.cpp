@@ -12,9 +12,19 @@ using mechanics::Attachment;
 using mechanics::Feature;
 using mechanics::Gear;
 using mechanics::Matrix3d;
+using mechanics::ModalAttachment;
+using mechanics::ModalPlacement;
 using mechanics::Placement;
 using mechanics::Row;
 using mechanics::Vector3d;
+
+namespace {
+
+void put(const Eigen::VectorXd& values, double* to) {
+    std::copy(values.begin(), values.end(), to);
+}
+
+}  // namespace
 
 std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
     implementation_->must_be_finished();
@@ -40,6 +50,8 @@ std::vector<std::int32_t> MultibodySystem::constraint_blocks() const {
         if (count > 0) blocks.push_back(count);
     }
     blocks.insert(blocks.end(), implementation_->attachments.size(), 3);
+    for (const auto& one : implementation_->modal_attachments)
+        blocks.insert(blocks.end(), static_cast<std::size_t>(one.rows() / 3), 3);
     return blocks;
 }
 
@@ -51,6 +63,8 @@ void MultibodySystem::constraint(const State& state, double* C) const {
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         Eigen::Map<Vector3d>(C + i) = self.node_at(one.node, state.q.data(), state.v.data()).x - one.place(body);
     });
+    self.for_each_modal_attachment([&](std::int32_t i, const ModalAttachment& one, const ModalPlacement& own,
+                                       const Placement& body) { put(one.value(own, body), C + i); });
 }
 
 void MultibodySystem::all_constraints(const State& state, double* C) const {
@@ -64,6 +78,8 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
     for (const auto& one : self.attachments)
         Eigen::Map<Vector3d>(C + one.first_row) =
             self.node_at(one.node, state.q.data(), state.v.data()).x - one.place(self.at[one.body]);
+    for (const auto& one : self.modal_attachments)
+        put(one.value(self.modal_at[static_cast<std::size_t>(one.reduced)], self.at[one.body]), C + one.first_row);
 }
 
 void MultibodySystem::Implementation::add_gradient(const Row& row, double t, std::int32_t to,
@@ -105,6 +121,14 @@ void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t f
             for (int j = 0; j < 3; ++j) D.add(first_row + i + k, body.column + 3 + j, turn(k, j));
         }
     });
+    self.for_each_modal_attachment(
+        [&](std::int32_t i, const ModalAttachment& one, const ModalPlacement& own, const Placement& body) {
+            const auto rows = one.jacobian(own, body);
+            self.for_each_part(own, body, [&](std::int32_t from, std::int32_t to, std::int32_t count) {
+                for (std::int32_t row = 0; row < one.rows(); ++row)
+                    for (std::int32_t j = 0; j < count; ++j) D.add(first_row + i + row, to + j, rows(row, from + j));
+            });
+        });
 }
 
 void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
@@ -115,6 +139,8 @@ void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         Eigen::Map<Vector3d>(C_t + i) = body.prescribed() ? Vector3d(-one.velocity(body)) : Vector3d::Zero();
     });
+    self.for_each_modal_attachment([&](std::int32_t i, const ModalAttachment& one, const ModalPlacement& own,
+                                       const Placement& body) { put(one.rate(own, body), C_t + i); });
 }
 
 void MultibodySystem::constraint_curvature(const State& state, double* c) const {
@@ -132,6 +158,8 @@ void MultibodySystem::constraint_curvature(const State& state, double* c) const 
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         Eigen::Map<Vector3d>(c + i) = one.curvature(body);
     });
+    self.for_each_modal_attachment([&](std::int32_t i, const ModalAttachment& one, const ModalPlacement& own,
+                                       const Placement& body) { put(one.curvature(own, body), c + i); });
 }
 
 void MultibodySystem::add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
@@ -172,6 +200,18 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
         for (int a = 0; a < 3; ++a)
             for (int b = 0; b < 3; ++b) H.add(body.column + 3 + a, body.column + 3 + b, K(a, b));
     });
+    self.for_each_modal_attachment(
+        [&](std::int32_t i, const ModalAttachment& one, const ModalPlacement& own, const Placement& body) {
+            Eigen::MatrixXd K = factor * one.stiffness(own, body, lambda + i);
+            if (tangent != Tangent::Exact) K = (0.5 * (K + K.transpose())).eval();
+            const auto add = [&](std::int32_t row, std::int32_t to_row, std::int32_t rows) {
+                self.for_each_part(own, body, [&](std::int32_t column, std::int32_t to, std::int32_t columns) {
+                    for (std::int32_t a = 0; a < rows; ++a)
+                        for (std::int32_t b = 0; b < columns; ++b) H.add(to_row + a, to + b, K(row + a, column + b));
+                });
+            };
+            self.for_each_part(own, body, add);
+        });
 }
 
 // A point of a body at the arm c̄ (body frame), on which a joint puts the force s y, adds s [c̄]× [Aᵀy]× to

@@ -37,6 +37,7 @@ std::array<Vector3d, Nodes> MultibodySystem::Implementation::positions_of(const 
     std::array<Vector3d, Nodes> positions;
     for (std::size_t k = 0; k < Nodes; ++k) {
         check_node(named[k], what);
+        must_have_columns(named[k], what);
         positions[k] = vector(nodes[static_cast<std::size_t>(named[k])].parameters.position);
     }
     return positions;

@@ -20,6 +20,8 @@ double MultibodySystem::kinetic_energy(const State& state) const {
         if (node.column >= 0)
             energy +=
                 0.5 * node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column).squaredNorm();
+    self.place_modal(state.q.data(), state.v.data());
+    for (std::size_t k = 0; k < self.reduced.size(); ++k) energy += self.modal_dynamics(k).kinetic_energy();
     if (self.beam_inertias.empty()) return energy;
     self.place(state);
     self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.kinetic_energy(at); });
@@ -43,6 +45,12 @@ std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
         linear += p;
         angular += Eigen::Map<const Vector3d>(state.q.data() + node.position).cross(p);
     }
+    for (std::size_t k = 0; k < self.reduced.size(); ++k) {
+        const auto& place = self.modal_at[k];
+        const Vector3d p = self.reduced[k].model.inertia.mass * place.v;
+        linear += p;
+        angular += place.x.cross(p) + place.A * self.modal_dynamics(k).angular_momentum();
+    }
     self.for_each_inertia([&](const auto& inertia, const auto& at) { inertia.momentum(at, linear, angular); });
     return {array(linear), array(angular)};
 }
@@ -58,6 +66,9 @@ double MultibodySystem::energy(const State& state) const {
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             energy -= node.parameters.mass * gravity.dot(Eigen::Map<const Vector3d>(state.q.data() + node.position));
+    for (std::size_t k = 0; k < self.reduced.size(); ++k)
+        energy += self.modal_dynamics(k).elastic_energy() -
+                  self.reduced[k].model.inertia.mass * gravity.dot(self.modal_at[k].x);
     self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.potential(at, gravity); });
     self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
     self.for_each_spring([&](const auto& spring) {

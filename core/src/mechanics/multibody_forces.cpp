@@ -4,6 +4,7 @@
 
 namespace delassus {
 
+using mechanics::at_time;
 using mechanics::Matrix3d;
 using mechanics::Placements;
 using mechanics::RowColumns;
@@ -89,13 +90,6 @@ void add_damper(const TurnDamper& damper, const Placements& at, double factor, T
     add_local(columns, matrix, factor, tangent, H);
 }
 
-Vector3d at_time(const std::array<Motion, 3>& motions, double t) {
-    Vector3d result = Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i)
-        if (motions[i].value) result[static_cast<Eigen::Index>(i)] = motions[i].value(t);
-    return result;
-}
-
 // A force F̄ and a torque T̄ in the frame of the body: f = (A F̄, s̄ × F̄ + T̄), so that −∂f/∂θ = (A [F̄]×, 0). The
 // symmetric tangent takes nothing of it: half of it with its transpose would be indefinite, and in a linearised step
 // the transpose is a torque that does not exist, by which a force through the mass centre would change the spin.
@@ -122,6 +116,7 @@ void MultibodySystem::add_mass(const State& state, double factor, MatrixAssemble
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) M.add(node.column + i, node.column + i, factor * node.parameters.mass);
+    self.add_modal_mass(state, factor, M);
     if (self.beam_inertias.empty()) return;
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_inertia([&](const auto& inertia, const auto& at) {
@@ -141,6 +136,7 @@ void MultibodySystem::multiply_mass(const State& state, double factor, const dou
     for (const auto& node : self.nodes)
         if (node.column >= 0)
             for (int i = 0; i < 3; ++i) result[node.column + i] += factor * node.parameters.mass * x[node.column + i];
+    self.multiply_modal_mass(state, factor, x, result);
     if (self.beam_inertias.empty()) return;
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_inertia([&](const auto& inertia, const auto& at) {
@@ -154,6 +150,7 @@ void MultibodySystem::multiply_mass(const State& state, double factor, const dou
 void MultibodySystem::add_inertial_stiffness(const State& state, const double* acceleration, double factor,
                                              Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
+    self.add_modal_inertial_stiffness(state, acceleration, factor, tangent, H);
     if (self.beam_inertias.empty()) return;
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_inertia([&](const auto& inertia, const auto& at) {
@@ -228,6 +225,7 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
         Eigen::Map<Vector3d>(result + place.column + 3) +=
             factor * (load.point.cross(place.A.transpose() * force) + place.A.transpose() * torque);
     }
+    self.add_modal_force(state, factor, result);
 }
 
 // Springs: f = −(k C + c Ċ) ∇C, so that K = k ∇C ∇Cᵀ + (k C + c Ċ) ∇²C + c ∇C (∂Ċ/∂q)ᵀ with Ċ = ∇C · v and
@@ -288,6 +286,7 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         add_matrix(place.column + 3, place.column + 3, -skew(load.point) * skew(force) - skew(torque),
                    factor * self.load_factor, tangent, H);
     }
+    self.add_modal_stiffness(state, factor, tangent, H);
 }
 
 // Springs: R = c ∇C ∇Cᵀ.
@@ -313,6 +312,7 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
         element.damping(at, R);
         add_element<Element::freedoms>(R, at, factor, tangent, H);
     });
+    self.add_modal_damping(factor, tangent, H);
     self.for_each_inertia([&](const auto& inertia, const auto& at) {
         mechanics::BeamInertia::Matrix R;
         inertia.damping(at, R);

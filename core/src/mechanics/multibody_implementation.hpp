@@ -38,6 +38,8 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::Cable> cables;
     std::vector<mechanics::Beam> beams;
     std::vector<mechanics::BeamInertia> beam_inertias;  // of those with a consistent mass
+    std::vector<mechanics::ReducedSolid> reduced;
+    std::vector<mechanics::ModalAttachment> modal_attachments;
     std::vector<mechanics::BoundedMotor> bounded_motors;
     std::vector<mechanics::BoundedActuator> bounded_actuators;
     mechanics::Motions motions;
@@ -57,7 +59,10 @@ struct MultibodySystem::Implementation {
 
     // ---- Since finish() ----
     std::int32_t n = 0, position_size = 0;
-    // Of all joints' rows, then of attachments: number among those that are kept, −1: left out.
+    std::vector<ReducedBody> reduced_bodies;  // as `reduced`
+    std::vector<mechanics::ModalLoad> modal_loads;
+    // Of all joints' rows, then of attachments, those of reduced bodies last: number among those that are kept, −1:
+    // left out.
     std::vector<std::int32_t> place_of_row;
     std::vector<std::int32_t> kept_rows;  // ascending
     std::optional<State> assembled;       // since assemble()
@@ -77,6 +82,7 @@ struct MultibodySystem::Implementation {
 
     // ---- Work space of the call that runs ----
     mutable mechanics::Placements at;
+    mutable std::vector<mechanics::ModalPlacement> modal_at;  // of `reduced`
     mutable mechanics::RowVector gradient;
     mutable mechanics::RowMatrix hessian;
     std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
@@ -119,6 +125,7 @@ struct MultibodySystem::Implementation {
     }
 
     [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
+    [[nodiscard]] mechanics::NodePlacement node_of_reduced(std::int32_t node, const double* q, const double* v) const;
     /// Visits all elements with the placements of their nodes or bodies: visit(element, placements). After place().
     template <class Visitor>
     void for_each_element(const State& state, Visitor&& visit) const {
@@ -177,8 +184,50 @@ struct MultibodySystem::Implementation {
         for (const auto& one : attachments)
             visit(place_of_row[static_cast<std::size_t>(one.first_row)], one, at[one.body]);
     }
-    /// Puts attached nodes to where their bodies are, and gives them the velocity of that place.
+    /// Puts attached nodes to where their bodies are, and gives them the velocity of that place; reduced bodies
+    /// likewise, rigidly as far as that goes.
     void carry_nodes(State& state) const;
+
+    /// Adds ω × r to the velocities of the nodes from `first` on that are not fixed, r being from their mass centre.
+    void spin_nodes(std::int32_t first, const Vector3& angular_velocity);
+
+    // ---- Reduced bodies (multibody_reduced.cpp) ----
+
+    /// Whether `nodes` are of one reduced body: its number, or −1. Throws InputError if only some are.
+    [[nodiscard]] std::int32_t reduced_of(const std::vector<std::int32_t>& nodes, const std::string& who) const;
+    /// Throws InputError if the node is one of a reduced body.
+    void must_have_columns(std::int32_t node, std::string_view what) const;
+    void attach_reduced(const AttachmentParameters& parameters, std::int32_t index);
+    /// Finds the modes, and numbers what they add.
+    void reduce_bodies();
+    void append_modal_start(State& state) const;
+    void carry_reduced(State& state) const;
+    void place_modal(const double* q, const double* v) const;
+    [[nodiscard]] mechanics::ModalDynamics modal_dynamics(std::size_t index) const {
+        return {reduced[index].model.inertia, modal_at[index]};
+    }
+    void add_modal_mass(const State& state, double factor, MatrixAssembler& M) const;
+    void multiply_modal_mass(const State& state, double factor, const double* x, double* result) const;
+    /// After place(), as all that follow.
+    void add_modal_force(const State& state, double factor, double* result) const;
+    void add_modal_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const;
+    void add_modal_damping(double factor, Tangent tangent, MatrixAssembler& H) const;
+    void add_modal_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
+                                      MatrixAssembler& H) const;
+    /// Visits the attachments of reduced bodies: visit(first row of C, attachment, placement, placement of its body).
+    template <class Visitor>
+    void for_each_modal_attachment(Visitor&& visit) const {
+        for (const auto& one : modal_attachments)
+            visit(place_of_row[static_cast<std::size_t>(one.first_row)], one,
+                  modal_at[static_cast<std::size_t>(one.reduced)], at[one.body]);
+    }
+    /// Calls visit(first column within the attachment's matrices, first column in v, count) for what moves.
+    template <class Visitor>
+    static void for_each_part(const mechanics::ModalPlacement& own, const mechanics::Placement& body, Visitor&& visit) {
+        const auto count = static_cast<std::int32_t>(6 + own.s.size());
+        visit(0, own.column, count);
+        if (body.column >= 0) visit(count, body.column, 6);
+    }
 
     /// The two angles of a gear with their factors in C.
     struct GearTerm {
@@ -197,6 +246,9 @@ struct MultibodySystem::Implementation {
         const mechanics::Matrix3d* A;  ///< null for a node
         mechanics::Vector3d arm;       ///< from the mass centre, world frame
         mechanics::Vector3d velocity;  ///< of the point where it is prescribed, else 0
+        const mechanics::ReducedSolid* reduced =
+            nullptr;            ///< of a node of a reduced body, from whose centre the arm is
+        Eigen::Index node = 0;  ///< its number in the mesh
 
         /// The entries of sign · direction · ṗ.
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;

@@ -45,14 +45,11 @@ Vector3d midpoint_speed(const Matrix3d& J, const Vector3d& omega, double h) {
 void MultibodySystem::free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const {
     const auto& self = *implementation_;
     spins.clear();
-    if (!self.gyroscopic) return;
-    for (const auto& body : self.moving) {
-        if (!body.gyroscopic) continue;
-        const Matrix3d& J = body.inertia;
-        const Vector3d omega = Eigen::Map<const Vector3d>(state.v.data() + body.column + 3);
+    const auto add = [&](const Matrix3d& J, std::int32_t column, bool alone) {
+        const Vector3d omega = Eigen::Map<const Vector3d>(state.v.data() + column);
         FreeSpin& spin = spins.emplace_back();
-        spin.column = body.column + 3;
-        spin.alone = body.alone;
+        spin.column = column;
+        spin.alone = alone;
         const double parts = std::clamp(std::ceil(h * omega.norm() / largest_turn), 1.0, most_parts);
         const double part = h / parts;
         Vector3d speed = omega;
@@ -66,7 +63,13 @@ void MultibodySystem::free_spins(const State& state, double h, std::vector<FreeS
         spin.impulse = mechanics::array(J * (speed - omega));
         spin.speed = mechanics::array(speed);
         spin.turn = mechanics::array(mechanics::logarithm(turn));
-    }
+    };
+    if (self.gyroscopic)
+        for (const auto& body : self.moving)
+            if (body.gyroscopic) add(body.inertia, body.column + 3, body.alone);
+    self.place_modal(state.q.data(), state.v.data());
+    for (std::size_t k = 0; k < self.reduced.size(); ++k)  // with the inertia of the shape of now
+        add(self.modal_dynamics(k).inertia(), self.reduced[k].column + 3, false);
 }
 
 // R = ∂(ω̄ × J ω̄)/∂ω̄ = [ω̄]× J − [J ω̄]×. Its symmetric part ½([ω̄]× J − J [ω̄]×) is indefinite; beside J it stays
@@ -75,18 +78,22 @@ void MultibodySystem::free_spins(const State& state, double h, std::vector<FreeS
 void MultibodySystem::add_gyroscopic_damping(const State& state, double factor, Tangent tangent,
                                              MatrixAssembler& H) const {
     const auto& self = *implementation_;
-    if (!self.gyroscopic) return;
-    for (const auto& body : self.moving) {
-        if (!body.gyroscopic) continue;
-        const Eigen::Map<const Vector3d> omega(state.v.data() + body.column + 3);
-        Matrix3d R = skew(omega) * body.inertia - skew(body.inertia * omega);
+    const auto add = [&](const Matrix3d& J, std::int32_t column) {
+        const Eigen::Map<const Vector3d> omega(state.v.data() + column);
+        Matrix3d R = skew(omega) * J - skew(J * omega);
         if (tangent == Tangent::Symmetric) {
             R = (0.5 * (R + R.transpose())).eval();
-            if (std::abs(factor) * R.norm() > 0.25 * body.inertia.diagonal().minCoeff()) continue;
+            if (std::abs(factor) * R.norm() > 0.25 * J.diagonal().minCoeff()) return;
         }
         const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> block = R;
-        H.add_block(body.column + 3, body.column + 3, 3, 3, block.data(), factor);
-    }
+        H.add_block(column, column, 3, 3, block.data(), factor);
+    };
+    if (self.gyroscopic)
+        for (const auto& body : self.moving)
+            if (body.gyroscopic) add(body.inertia, body.column + 3);
+    self.place_modal(state.q.data(), state.v.data());
+    for (std::size_t k = 0; k < self.reduced.size(); ++k)
+        add(self.modal_dynamics(k).inertia(), self.reduced[k].column + 3);
 }
 
 }  // namespace delassus

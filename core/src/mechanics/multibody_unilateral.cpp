@@ -99,8 +99,9 @@ void MultibodySystem::Implementation::place_shapes(const State& state) {
     for (const auto index : prescribed)
         poses[static_cast<std::size_t>(index)] = pose_of(static_cast<std::size_t>(index), state);
     for (std::size_t k = 0; k < nodes.size(); ++k)
-        poses[bodies.size() + k].position =
-            mechanics::array(node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
+        if (nodes[k].touches)
+            poses[bodies.size() + k].position =
+                mechanics::array(node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()).x);
 }
 
 // At the velocities of the beginning and those that weight adds: other forces are small over a step, or meet a contact
@@ -116,8 +117,10 @@ void MultibodySystem::Implementation::predict_displacements(double h, const Stat
     for (const auto& body : moving) put(body.body, at[body.body].v + fall);
     for (const auto index : prescribed) put(index, at[index].v);
     for (std::size_t k = 0; k < nodes.size(); ++k)
-        if (const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data()); node.column >= 0)
+        if (nodes[k].touches && nodes[k].moves()) {
+            const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data());
             displacements[bodies.size() + k].translation = mechanics::array(h * (node.v + fall));
+        }
 }
 
 namespace {
@@ -231,12 +234,21 @@ void MultibodySystem::Implementation::collect_actuators(double t, double h, Unil
     }
 }
 
-// d · ṗ = d · v + (s × d) · ω with ω = A ω̄, for a point at s from the mass centre; a node has no ω.
+// d · ṗ = d · v + (s × d) · ω with ω = A ω̄, for a point at s from the mass centre; a node has no ω. For a node of a
+// reduced body, which is at s = A u, there is d · A Φ ṡ more.
 MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::point_of(std::int32_t owner,
                                                                                         const Vector3d& point) const {
     const auto count = static_cast<std::int32_t>(bodies.size());
-    if (owner >= count)
-        return {nodes[static_cast<std::size_t>(owner - count)].column, nullptr, Vector3d::Zero(), Vector3d::Zero()};
+    if (owner >= count) {
+        const auto& node = nodes[static_cast<std::size_t>(owner - count)];
+        if (node.reduced < 0) return {node.column, nullptr, Vector3d::Zero(), Vector3d::Zero()};
+        const auto& body = reduced[static_cast<std::size_t>(node.reduced)];
+        const auto& place = modal_at[static_cast<std::size_t>(node.reduced)];
+        const Eigen::Index local = owner - count - body.first_node;
+        const auto shape = body.model.shapes.middleRows(3 * local, 3);
+        return {place.column,     &place.A, place.A * (body.model.places.col(local) + shape * place.s),
+                Vector3d::Zero(), &body,    local};
+    }
     const auto& place = at[owner];
     const Vector3d arm = point - place.x;
     if (!place.prescribed()) return {place.column, &place.A, arm, Vector3d::Zero()};
@@ -251,6 +263,11 @@ inline void MultibodySystem::Implementation::PointOfOwner::put(const Vector3d& d
     const Vector3d turning = A->transpose() * arm.cross(direction);
     rows.entries(column, std::array{sign * direction[0], sign * direction[1], sign * direction[2], sign * turning[0],
                                     sign * turning[1], sign * turning[2]});
+    if (!reduced) return;
+    const Vector3d turned = sign * (A->transpose() * direction);
+    for (Eigen::Index a = 0; a < reduced->model.inertia.modes(); ++a)
+        rows.entry(column + 6 + static_cast<std::int32_t>(a),
+                   reduced->model.shapes.col(a).segment<3>(3 * node).dot(turned));
 }
 
 ContactMaterial MultibodySystem::Implementation::material_between(std::int32_t first, std::int32_t second) const {

@@ -46,6 +46,9 @@ TrajectoryModel trajectory_model(const SceneSystem& system) {
         model.nodes.push_back(mechanics.node_position(start, node));
         model.node_entry.push_back(column < 0 ? -1 : column + moving);
     }
+    for (const auto& body : mechanics.reduced_bodies())
+        model.reduced.push_back({body.first_node, body.position, static_cast<std::int32_t>(body.frequencies.size()),
+                                 body.places, body.shapes});
     model.loose = mechanics.loose_nodes();
     model.surface = mechanics.element_surface();
     model.cables = mechanics.cables();

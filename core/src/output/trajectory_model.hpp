@@ -29,6 +29,15 @@ struct TrajectoryLink {
     std::array<Vector3, 2> points;       ///< in the bodies' frames; of the world in its own, m
 };
 
+/// An elastic body of few modes: its nodes follow from a pose and amplitudes in q.
+struct TrajectoryModes {
+    std::int32_t first_node = 0;
+    std::int32_t entry = 0;  ///< first entry in q: mass centre, quaternion w x y z, then an amplitude for each mode
+    std::int32_t modes = 0;  ///< their number
+    std::vector<Vector3> places;  ///< of its nodes, in its frame, m
+    std::vector<double> shapes;   ///< displacements of the nodes for an amplitude of 1, mode after mode
+};
+
 struct TrajectoryModel {
     Vector3 gravity{};                ///< m/s²
     std::vector<std::string> bodies;  ///< names
@@ -36,6 +45,7 @@ struct TrajectoryModel {
     std::vector<Shape> shapes;
     std::vector<Vector3> nodes;                        ///< positions at the start, m
     std::vector<std::int32_t> node_entry;              ///< of each node: its first entry in q, −1 if it is fixed
+    std::vector<TrajectoryModes> reduced;              ///< whose nodes count as fixed above
     std::vector<std::int32_t> loose;                   ///< nodes that no tetrahedron holds
     std::vector<std::array<std::int32_t, 3>> surface;  ///< of the tetrahedra: triangles of nodes
     std::vector<std::array<std::int32_t, 2>> cables;   ///< their nodes

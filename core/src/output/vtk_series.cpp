@@ -104,9 +104,7 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
     const auto add_node_cell = [&](const auto& nodes) {
         double v = 0.0;
         for (const auto node : nodes) {
-            const auto column = system_.node_column(node);
-            if (column < 0) continue;
-            const double* w = state.v.data() + column;
+            const Vector3 w = system_.node_velocity(state, node);
             v += std::hypot(w[0], w[1], w[2]) / static_cast<double>(nodes.size());
         }
         body_of_cell.push_back(system_.body_count());

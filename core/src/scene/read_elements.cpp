@@ -36,7 +36,8 @@ ElementOrder element_order(const Source& source, const YAML::Node& node) {
 }  // namespace
 
 template <class Parameters>
-std::vector<std::pair<std::string_view, Handler>> SystemReader::elastic_handlers(Parameters& body) {
+std::vector<std::pair<std::string_view, Handler>> SystemReader::elastic_handlers(Parameters& body,
+                                                                                 std::optional<std::int32_t>& modes) {
     const auto number = [&](double& value, std::string_view key, auto&& read) {
         return std::pair<std::string_view, Handler>{
             key, [this, &value, key, read](const YAML::Node& n) { value = read(source_, n, key); }};
@@ -64,6 +65,10 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::elastic_handlers
             {"model", [this, &body](const YAML::Node& n) { body.model = element_model(source_, n); }},
             {"order", [this, &body](const YAML::Node& n) { body.order = element_order(source_, n); }},
             {"velocity", [this, &body](const YAML::Node& n) { body.velocity = vector3(source_, n, "velocity"); }},
+            {"angular_velocity",
+             [this, &body](const YAML::Node& n) { body.angular_velocity = vector3(source_, n, "angular_velocity"); }},
+            {"modes", [this, &modes](
+                          const YAML::Node& n) { modes = value<std::int32_t>(source_, n, "modes", "a whole number"); }},
             {"contact", read_contact},
             {"repeat", [](const YAML::Node&) {}}};
 }
@@ -72,7 +77,8 @@ void SystemReader::read_elastic_block(const YAML::Node& item, const Copy& copy) 
     ElasticBlock block;
     block.corner = copy.offset;
     bool edges = false, cells = false;
-    auto handlers = elastic_handlers(block);
+    std::optional<std::int32_t> modes;
+    auto handlers = elastic_handlers(block, modes);
     handlers.insert(handlers.end(),
                     {{"name", [&](const YAML::Node& n) { block.name = name_in(source_, n, "name", copy); }},
                      {"corner", [&](const YAML::Node& n) { block.corner = point_in(source_, n, "corner", copy); }},
@@ -97,13 +103,21 @@ void SystemReader::read_elastic_block(const YAML::Node& item, const Copy& copy) 
     if (!edges || !cells)
         source_.refuse(item,
                        fmt::format("elastic block \"{}\" lacks the key \"{}\"", block.name, edges ? "cells" : "edges"));
-    const auto first = at(item, [&] { return result_.system->add_elastic_block(block); });
+    const auto first = at(item, [&] {
+        return modes ? result_.system->add_reduced_body({block, *modes}) : result_.system->add_elastic_block(block);
+    });
+    if (modes) note_modes(item);
     take_name(item, blocks_, "elastic block", block.name, static_cast<std::int32_t>(elastic_.size()));
     AlignedBox box{block.corner, block.corner};
     for (std::size_t i = 0; i < 3; ++i) box.upper[i] += block.edges[i];
     elastic_.push_back({first, result_.system->node_count() - first, box});
     if (block.contact_radius > 0.0) result_.node_contact_material.push_back(block.contact_material);
     result_.elastic_blocks.push_back(block);
+}
+
+void SystemReader::note_modes(const YAML::Node& item) {
+    if (result_.sleeping)
+        source_.refuse(item, "a body with \"modes\" cannot sleep; leave \"sleeping\" or \"modes\" out");
 }
 
 AlignedBox SystemReader::read_box(const YAML::Node& node, std::string_view what) {
@@ -206,7 +220,8 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
     std::string file;
     double scale = 1.0;
     int refinements = 0;
-    auto handlers = elastic_handlers(body);
+    std::optional<std::int32_t> modes;
+    auto handlers = elastic_handlers(body, modes);
     handlers.insert(
         handlers.end(),
         {{"name", [&](const YAML::Node& n) { body.name = name_in(source_, n, "name", copy); }},
@@ -226,8 +241,9 @@ void SystemReader::read_elastic_mesh(const YAML::Node& item, const Copy& copy) {
     if (!file.ends_with(".vol")) result_.surfaces_read = true;
     const auto first = at(item, [&] {
         body.mesh = read_tetrahedral_mesh(source_.folder() / file, scale, refinements);
-        return result_.system->add_elastic_mesh(body);
+        return modes ? result_.system->add_reduced_body({body, *modes}) : result_.system->add_elastic_mesh(body);
     });
+    if (modes) note_modes(item);
     take_name(item, blocks_, "elastic mesh", body.name, static_cast<std::int32_t>(elastic_.size()));
     elastic_.push_back({first, result_.system->node_count() - first, {}});
     if (body.contact_radius > 0.0) result_.node_contact_material.push_back(body.contact_material);

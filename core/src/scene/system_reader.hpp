@@ -70,9 +70,12 @@ private:
     std::vector<Shape> read_mesh_shapes(const YAML::Node& node);
     Shape read_terrain_shape(const YAML::Node& node);
     Shape read_height_field(const YAML::Node& node);
-    /// Keys that elastic blocks and meshes share.
+    /// Keys that elastic blocks and meshes share. Both outlive what is returned.
     template <class Parameters>
-    std::vector<std::pair<std::string_view, Handler>> elastic_handlers(Parameters& body);
+    std::vector<std::pair<std::string_view, Handler>> elastic_handlers(Parameters& body,
+                                                                       std::optional<std::int32_t>& modes);
+    /// Refuses a body that is reduced to modes where the system has what it cannot.
+    void note_modes(const YAML::Node& item);
     Shape read_shape_kind(const YAML::Node& item, std::string_view kind, const YAML::Node& node);
     ContactMaterial read_contact_material(const YAML::Node& node, std::string_view name,
                                           std::vector<std::pair<std::string_view, Handler>> more = {});

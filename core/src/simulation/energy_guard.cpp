@@ -30,6 +30,7 @@ EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
     };
     for (BodyIndex body = 0; body < mechanics.body_count(); ++body) set(mechanics.body_column(body));
     for (std::int32_t node = 0; node < mechanics.node_count(); ++node) set(mechanics.node_column(node));
+    for (const auto& body : mechanics.reduced_bodies()) set(body.column);
     mechanics.multiply_mass(start, 1.0, fall.data(), momentum.data());
     fall_ = 0.0;
     for (std::size_t i = 0; i < n; ++i) fall_ += 2.0 * fall[i] * momentum[i];

@@ -118,8 +118,19 @@ private:
             keep(counted(moving.size(), "moving body", "moving bodies"),
                  (simulation_.joint_coordinates() ? "placed by joint coordinates: " : "6 velocities each: ") +
                      some_of(moving));
-        if (const auto nodes = system_.system->node_count(); nodes > 0)
-            keep(counted(static_cast<std::size_t>(nodes), "node", "nodes"), "3 velocities for each that moves");
+        auto nodes = static_cast<std::size_t>(system_.system->node_count());
+        for (const auto& body : system_.system->reduced_bodies()) nodes -= body.places.size();
+        if (nodes > 0) keep(counted(nodes, "node", "nodes"), "3 velocities for each that moves");
+        for (const auto& body : system_.system->reduced_bodies()) {
+            const std::size_t own = body.places.size(), modes = body.frequencies.size();
+            keep(fmt::format("elastic body \"{}\" of {}", body.name, counted(modes, "mode", "modes")),
+                 fmt::format("{} velocities, those of its frame included; frequencies of the free body from {:.4g} to "
+                             "{:.4g} Hz",
+                             6 + modes, body.frequencies.front(), body.frequencies.back()));
+            leave(fmt::format("{} velocities of the {} of \"{}\"", 3 * own, counted(own, "node", "nodes"), body.name),
+                  "its modes move them");
+        }
+        if (!system_.system->reduced_bodies().empty()) plan_.libraries.emplace_back("delassus_eigenmodes.so");
         if (!prescribed.empty())
             keep(counted(prescribed.size(), "kinematic body", "kinematic bodies"),
                  "its motion is given: no columns, its velocity is part of its contacts and joints: " +
@@ -144,7 +155,23 @@ private:
 
     void constraints() {
         std::size_t attached = 0;
-        for (const auto& attachment : system_.attachments) attached += attachment.nodes.size();
+        std::int32_t interfaces = 0;
+        const auto& reduced = system_.system->reduced_bodies();
+        for (const auto& attachment : system_.attachments) {
+            const auto node = attachment.nodes.front();
+            const bool of_modes = std::any_of(reduced.begin(), reduced.end(), [&](const ReducedBody& body) {
+                return node >= body.first_node &&
+                       node - body.first_node < static_cast<std::int32_t>(body.places.size());
+            });
+            if (of_modes) {
+                ++interfaces;
+            } else {
+                attached += attachment.nodes.size();
+            }
+        }
+        if (interfaces > 0)
+            keep(counted(static_cast<std::size_t>(interfaces), "interface", "interfaces"),
+                 "six rows for each attachment of an elastic body with modes, three for that of a single node");
         if (attached > 0)
             keep(counted(attached, "attached node", "attached nodes"),
                  "three rows for each that a moving body carries; one of a fixed body is fixed and has none");

@@ -59,6 +59,31 @@ void write_shapes(hid_t model, const std::vector<Shape>& shapes, const std::stri
         triangles, {3}, file);
 }
 
+void write_modes(hid_t model, const std::vector<TrajectoryModes>& bodies, const std::string& file) {
+    if (bodies.empty()) return;
+    std::vector<std::int32_t> first, entry, modes, end;
+    std::vector<double> places, shapes;
+    for (const auto& body : bodies) {
+        first.push_back(body.first_node);
+        entry.push_back(body.entry);
+        modes.push_back(body.modes);
+        const auto own = flat(body.places);
+        places.insert(places.end(), own.begin(), own.end());
+        shapes.insert(shapes.end(), body.shapes.begin(), body.shapes.end());
+        end.push_back(static_cast<std::int32_t>(places.size() / 3));
+    }
+    const Handle group = group_in(model, "reduced", false, file);
+    const hid_t id = group.get();
+    put_rows(id, {"first_node", "1", "of each elastic body of few modes"}, first, {}, file);
+    put_rows(id, {"entry", "1", "first entry in frames/q: mass centre, quaternion w x y z, amplitudes"}, entry, {},
+             file);
+    put_rows(id, {"modes", "1", "their number"}, modes, {}, file);
+    put_rows(id, {"place_end", "1", "where the places of its nodes end"}, end, {}, file);
+    put_rows(id, {"places", "m", "of the nodes, in the body's frame"}, places, {3}, file);
+    put_rows(id, {"shapes", "1", "displacements of the nodes for an amplitude of 1 m, mode after mode"}, shapes, {},
+             file);
+}
+
 void write_links(hid_t model, const std::vector<TrajectoryLink>& links, const std::string& file) {
     if (links.empty()) return;
     std::vector<std::string> names, kinds;
@@ -119,6 +144,37 @@ std::vector<Element> rows_of(const std::vector<Number>& values) {
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * std::tuple_size_v<Element>),
                     std::tuple_size_v<Element>, rows[i].begin());
     return rows;
+}
+
+std::vector<TrajectoryModes> read_modes(const Group& model, std::int64_t nodes) {
+    if (!model.has("reduced")) return {};
+    const Group group = model.group("reduced");
+    const Reader in(group);
+    const auto first = in.integers("first_node", 0, nodes), entry = in.integers("entry", 0, std::int64_t{1} << 31),
+               modes = in.integers("modes", 1, std::int64_t{1} << 20), end = in.integers("place_end", 0, nodes + 1);
+    const auto places = rows_of<Vector3>(in.numbers("places", 3));
+    const std::vector<double> shapes = in.numbers("shapes", 1);
+    for (const auto& [name, count] :
+         {std::pair{"entry", entry.size()}, {"modes", modes.size()}, {"place_end", end.size()}})
+        in.must_have(name, count, first.size());
+    std::vector<TrajectoryModes> bodies;
+    std::size_t place = 0, shape = 0;
+    for (std::size_t k = 0; k < first.size(); ++k) {
+        const auto last = static_cast<std::size_t>(end[k]);
+        if (last < place || last > places.size() || first[k] + static_cast<std::int64_t>(last - place) > nodes)
+            group.refuse("/place_end does not fit the places and the nodes");
+        TrajectoryModes body{first[k], entry[k], modes[k], {}, {}};
+        body.places.assign(places.begin() + static_cast<std::ptrdiff_t>(place),
+                           places.begin() + static_cast<std::ptrdiff_t>(last));
+        const std::size_t count = 3 * body.places.size() * static_cast<std::size_t>(body.modes);
+        if (shape + count > shapes.size()) group.refuse("/shapes is too short for the modes");
+        body.shapes.assign(shapes.begin() + static_cast<std::ptrdiff_t>(shape),
+                           shapes.begin() + static_cast<std::ptrdiff_t>(shape + count));
+        place = last;
+        shape += count;
+        bodies.push_back(std::move(body));
+    }
+    return bodies;
 }
 
 std::vector<Shape> read_shapes(const Group& model, std::int64_t body_count) {
@@ -205,6 +261,8 @@ std::uint64_t largest_size(const TrajectoryModel& model) {
                           size_of(model.cables) + of_a_shape * model.shapes.size();
     for (const Shape& shape : model.shapes)
         if (shape.mesh) bytes += size_of(shape.mesh->vertices) + size_of(shape.mesh->triangles);
+    for (const TrajectoryModes& body : model.reduced)
+        bytes += sizeof(TrajectoryModes) + size_of(body.places) + size_of(body.shapes);
     std::vector<std::string> names, kinds;
     for (const TrajectoryLink& link : model.links) {
         names.push_back(link.name);
@@ -225,6 +283,7 @@ void write_model(hid_t system, const TrajectoryModel& model, const std::string& 
     put_rows(id, {"surface", "1", "of the tetrahedra: triangles of nodes, counter-clockwise from outside"},
              flat(model.surface), {3}, file);
     put_rows(id, {"cables", "1", "their two nodes"}, flat(model.cables), {2}, file);
+    write_modes(id, model.reduced, file);
     write_shapes(id, model.shapes, file);
     write_links(id, model.links, file);
 }
@@ -249,6 +308,7 @@ TrajectoryModel read_model(const Group& system) {
     model.loose = in.integers("loose", 0, nodes);
     model.surface = rows_of<std::array<std::int32_t, 3>>(in.integers("surface", 0, nodes, 3));
     model.cables = rows_of<std::array<std::int32_t, 2>>(in.integers("cables", 0, nodes, 2));
+    model.reduced = read_modes(group, nodes);
     model.shapes = read_shapes(group, bodies);
     model.links = read_links(group, bodies);
     return model;

@@ -74,12 +74,33 @@ std::vector<std::int64_t> chosen_rows(std::int64_t count, std::int64_t most) {
     return rows;
 }
 
+/// to ← the positions of the body's nodes: c + A (X + Φ s) with q = (c, A, s), A being a unit quaternion (w, u) that
+/// turns p to p + 2 w u × p + 2 u × (u × p).
+void place_nodes(const TrajectoryModes& body, const double* q, double* to) {
+    const double w = q[3];
+    const Vector3 u = {q[4], q[5], q[6]};
+    const auto cross = [](const Vector3& a, const Vector3& b) {
+        return Vector3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    };
+    const std::size_t entries = 3 * body.places.size();
+    for (std::size_t node = 0; node < body.places.size(); ++node) {
+        Vector3 place = body.places[node];
+        for (std::size_t mode = 0; mode < static_cast<std::size_t>(body.modes); ++mode)
+            for (std::size_t i = 0; i < 3; ++i) place[i] += q[7 + mode] * body.shapes[mode * entries + 3 * node + i];
+        const Vector3 once = cross(u, place), twice = cross(u, once);
+        for (std::size_t i = 0; i < 3; ++i) to[3 * node + i] = q[i] + place[i] + 2.0 * (w * once[i] + twice[i]);
+    }
+}
+
 void read_nodes(const Group& frames, const std::vector<std::int64_t>& rows, RecordedSystem& system) {
     const auto& model = system.model;
     if (model.nodes.empty()) return;
-    const bool moving =
-        std::any_of(model.node_entry.begin(), model.node_entry.end(), [](auto entry) { return entry >= 0; });
+    const bool moving = !model.reduced.empty() || std::any_of(model.node_entry.begin(), model.node_entry.end(),
+                                                              [](auto entry) { return entry >= 0; });
     const std::int64_t width = moving ? frames.shape("q").at(1) : 0;
+    for (const auto& body : model.reduced)
+        if (std::int64_t{body.entry} + 7 + body.modes > width)
+            frames.refuse("/q is too narrow for the modes of the model");
     for (const auto entry : model.node_entry)
         if (entry + 2 >= width && entry >= 0) frames.refuse("/q is too narrow for the nodes of the model");
     const auto q = moving ? frames.rows("q", rows, width) : std::vector<double>{};
@@ -90,6 +111,11 @@ void read_nodes(const Group& frames, const std::vector<std::int64_t>& rows, Reco
                 entry < 0 ? model.nodes[node].data() : q.data() + static_cast<std::int64_t>(row) * width + entry;
             system.nodes.insert(system.nodes.end(), at, at + 3);
         }
+    for (std::size_t row = 0; row < rows.size(); ++row)
+        for (const auto& body : model.reduced)
+            place_nodes(
+                body, q.data() + static_cast<std::int64_t>(row) * width + body.entry,
+                system.nodes.data() + 3 * (row * model.nodes.size() + static_cast<std::size_t>(body.first_node)));
 }
 
 /// Contacts of the chosen frames.
@@ -189,6 +215,13 @@ void transfer(Message& message, RecordedSystem& system) {
     message.each(model.shapes, [&](Shape& shape) { transfer(message, shape); });
     message(model.nodes);
     message(model.node_entry);
+    message.each(model.reduced, [&](TrajectoryModes& body) {
+        message(body.first_node);
+        message(body.entry);
+        message(body.modes);
+        message(body.places);
+        message(body.shapes);
+    });
     message(model.loose);
     message(model.surface);
     message(model.cables);
