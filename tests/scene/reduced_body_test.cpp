@@ -212,6 +212,20 @@ TEST(ReducedScene, WhatCannotBeIsToldInOneSentence) {
               "s.yaml, line 5: a body with \"modes\" cannot sleep; leave \"sleeping\" or \"modes\" out");
 }
 
+TEST(ReducedScene, TouchesNoOtherElasticBody) {
+    const auto blocks = [](const std::string& modes, const std::string& contact) {
+        return refusal(
+            "elastic_blocks:\n  - {name: a, modes: 3, contact: {radius: 0.01}}\n  - {name: b, corner: [0, 0, " +
+            std::string("1.5]") + modes + contact + "}\n");
+    };
+    const std::string touches = ", contact: {radius: 0.01}";
+    EXPECT_EQ(blocks("", ""), "taken");
+    for (const char* modes : {"", ", modes: 2"})
+        EXPECT_NE(blocks(modes, touches).find("has modes and contact, and so has another elastic body"),
+                  std::string::npos)
+            << blocks(modes, touches);
+}
+
 // Without modes too a block turns as a rigid body at the start.
 TEST(ReducedScene, ABlockWithAnAngularVelocityHasItsMomentum) {
     for (const char* modes : {"", ", modes: 4"}) {

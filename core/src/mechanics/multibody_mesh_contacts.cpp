@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Contacts between meshes of a multibody system (mesh_contacts.hpp).
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <numeric>
@@ -67,12 +69,25 @@ void MultibodySystem::Implementation::make_mesh_contacts() {
     for (std::size_t k = 0; k < node_contacts.size(); ++k)
         shape_of_node[static_cast<std::size_t>(node_contacts[k].node)] = static_cast<std::int32_t>(shapes.size() + k);
     std::map<std::int32_t, std::vector<mechanics::ElementSide>> surfaces;
+    std::int32_t of_modes = -1;  // a reduced body whose nodes touch
+    bool several = false;
     for (const auto& side : mechanics::outer_sides(element_sides)) {
         bool touches = true;
         side.for_each_node(
             [&](std::int32_t node) { touches = touches && shape_of_node[static_cast<std::size_t>(node)] >= 0; });
-        if (touches) surfaces[meshes.root(side.corners[0])].push_back(side);
+        if (!touches) continue;
+        if (const auto reduced_body = nodes[static_cast<std::size_t>(side.corners[0])].reduced; reduced_body >= 0) {
+            several = several || (of_modes >= 0 && of_modes != reduced_body);
+            of_modes = reduced_body;
+            continue;
+        }
+        surfaces[meshes.root(side.corners[0])].push_back(side);
     }
+    if (of_modes >= 0 && (several || !surfaces.empty()))
+        throw InputError(fmt::format(
+            "the elastic body \"{}\" has modes and contact, and so has another elastic body contact: with modes it "
+            "touches rigid bodies, but no mesh; leave out its modes, or the contact of all elastic bodies but it",
+            reduced[static_cast<std::size_t>(of_modes)].name));
     const auto moves = [&](std::int32_t node) { return nodes[static_cast<std::size_t>(node)].column >= 0; };
     bool any_moves = false;
     for (const auto& [root, sides] : surfaces)
