@@ -110,6 +110,16 @@ TEST_P(References, AreMetByTolerance) {
     }
 }
 
+TEST_P(References, AreMetByRadauIIA) {
+    if (GetParam().name == "forty_four_bars") GTEST_SKIP() << "takes ten seconds";
+    const double tolerance = 1e-5, factor = GetParam().name == "spatial_slider_crank" ? 40.0 : 10.0;
+    const double error = off(GetParam(), {{"integrator", "radau_iia"},
+                                          {"coordinates", "joint"},
+                                          {"step", "{initial: 1.0e-5, smallest: 1.0e-10, largest: 0.05}"},
+                                          {"tolerance", fmt::format("{{absolute: {}}}", tolerance)}});
+    EXPECT_LE(error, factor * tolerance);
+}
+
 TEST_P(References, AreMetByScenesThatNameNothing) {
     const double step = std::min(0.01, 0.01 * GetParam().end);
     const double error =
