@@ -61,8 +61,8 @@ struct PathPoint {
     /// The arc length ds² = ‖dq‖²_M/D² + dload², D the way that the linear answer to the whole loads goes (1); by
     /// chords.
     double arc = 0.0;
-    double displacement = 0.0;              ///< the largest of a body's mass centre or a node, m, from the system's start
-    double energy = 0.0;                    ///< potential energy, J
+    double displacement = 0.0;  ///< the largest of a body's mass centre or a node, m, from the system's start
+    double energy = 0.0;        ///< potential energy, J
     std::int32_t negative_eigenvalues = 0;  ///< 0: stable; −1: not known
     std::int64_t newton_iterations = 0;     ///< of the step that led here
     double residual = 0.0;                  ///< largest unbalanced force, N or Nm

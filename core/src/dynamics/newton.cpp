@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace delassus {
 
@@ -329,6 +330,12 @@ private:
     /// need not be one of descent: then false, and the next iteration has a new or the whole one. Else the whole way is
     /// gone, as Newton's method without a search would.
     bool search() {
+        if (watched_) return judge_watched();
+        if (settings_.watchdog && may_watch_ && !falls() && std::isfinite(trial_rho_)) {
+            watched_.emplace(Watched{point_, residual_, rho_});
+            return true;
+        }
+        may_watch_ = true;
         while (!falls() && part_ > shortest_part) move(0.5 * part_);
         if (falls()) return true;
         if (!fresh_) {
@@ -342,6 +349,21 @@ private:
         move(1.0);
         if (!std::isfinite(trial_rho_)) fail("no part of Newton's increment leads to a finite residual");
         return true;
+    }
+
+    /// After the whole of an increment that let the residual grow (Chamberlain et al., Math. Programming Study 16,
+    /// 1982): an increment that turns a slender part stretches it, which the next one takes back. If that does not lead
+    /// below the residual from before, back there, and parts of the increment are tried.
+    bool judge_watched() {
+        const bool below = trial_rho_ <= threshold_ || trial_rho_ <= (1.0 - 1e-4) * watched_->rho;
+        if (!below) {
+            point_ = watched_->point;
+            residual_ = watched_->residual;
+            may_watch_ = false;
+            renew_ = true;
+        }
+        watched_.reset();
+        return below;
     }
 
     /// The point ← the trial. Whether that is the solution; else renew_ says whether the matrices served.
@@ -385,6 +407,13 @@ private:
     Vector direction_;               // T⁻¹ x
     StepPoint trial_;
     StepResidual trial_residual_;
+    struct Watched {
+        StepPoint point;
+        StepResidual residual;
+        double rho;
+    };
+    std::optional<Watched> watched_;  // the point before the residual grew
+    bool may_watch_ = true;
     double part_ = 1.0;  // of the increment in the trial
     double rho_ = 0.0, trial_rho_ = 0.0, threshold_ = 0.0, rounding_ = 0.0;
 };

@@ -31,6 +31,7 @@ struct NewtonSettings {
     bool linearized = false;                ///< one iteration; what it left is measured against linearization_limit
     double linearization_limit = HUGE_VAL;  ///< of its error (dynamics/linearization.hpp)
     double largest_turn = HUGE_VAL;         ///< of a body in a step, rad
+    bool watchdog = false;                  ///< the residual may grow for one iteration before increments are halved
 };
 
 /// v = v₀ + γ′ Δ and v̇ = v̇₀ + β′ Δ in a step whose positions are q = q_n ∘ exp(Δ).

@@ -31,7 +31,8 @@ namespace delassus {
 Relaxation::Relaxation(DynamicalSystem& system, RelaxationSettings settings)
     : system_(system),
       settings_(settings),
-      newton_(system, {.method = "the search for an equilibrium", .exact = false, .max_iterations = 25}),
+      newton_(system,
+              {.method = "the search for an equilibrium", .exact = false, .max_iterations = 25, .watchdog = true}),
       n_(system.n()),
       m_(system.m()) {}
 
