@@ -2,9 +2,7 @@
 // The method of order 5 of Dormand and Prince with its embedded one of order 4 (Journal of Computational and Applied
 // Mathematics 6, 1980; Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, table II.5.2). Its
 // seventh stage is the first one of the next step.
-#include <cmath>
-#include <limits>
-
+#include "dynamics/error_limit.hpp"
 #include "dynamics/explicit_method.hpp"
 
 namespace delassus {
@@ -21,14 +19,7 @@ constexpr double embedded[] = {71.0 / 57600.0,      0.0,          -71.0 / 16695.
 const RegisterTimestepper dormand_prince_row{
     {.name = "dormand_prince",
      .description = "Dormand and Prince's Runge–Kutta method of order 5(4), for steps by tolerance; without contacts",
-     .options = {{.key = "error_limit",
-                  .type = DELASSUS_OPTION_REAL,
-                  .default_value = "inf",
-                  .minimum = std::numeric_limits<double>::min(),
-                  .maximum = HUGE_VAL,
-                  .unit = "m, rad",
-                  .doc =
-                      "a tolerance: a step of a fixed size is taken in as many parts as steps by tolerance would be"}},
+     .options = {error_limit_option()},
      .constraints = true,
      .unilateral = false,
      .order = 5,

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/error_limit.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/newton.hpp"
 #include "dynamics/return_to_constraints.hpp"
@@ -565,14 +566,7 @@ const RegisterTimestepper radau_row{
                   .minimum = 1.0,
                   .maximum = 1e6,
                   .doc = "iterations over the three stages before the step counts as too long"},
-                 {.key = "error_limit",
-                  .type = DELASSUS_OPTION_REAL,
-                  .default_value = "inf",
-                  .minimum = std::numeric_limits<double>::min(),
-                  .maximum = HUGE_VAL,
-                  .unit = "m, rad",
-                  .doc =
-                      "a tolerance: a step of a fixed size is taken in as many parts as steps by tolerance would be"}},
+                 error_limit_option()},
      .constraints = true,
      .unilateral = false,
      .order = 5,

@@ -147,8 +147,7 @@ void choose_method(SceneSystem& system) {
     if (!system.method_reason.empty()) return;
     // Joint coordinates take rigid bodies alone, with masses of their own.
     const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
-                           system.system->node_count() == 0 &&
-                           !system.system->has_consistent_mass() &&
+                           system.system->node_count() == 0 && !system.system->has_consistent_mass() &&
                            std::any_of(system.joints.begin(), system.joints.end(),
                                        [&](const JointParameters& joint) { return can_be_in_a_tree(system, joint); });
     const bool unilateral = system.system->has_unilateral();
