@@ -213,17 +213,18 @@ TEST(ReducedScene, WhatCannotBeIsToldInOneSentence) {
 }
 
 TEST(ReducedScene, TouchesNoOtherElasticBody) {
-    const auto blocks = [](const std::string& modes, const std::string& contact) {
+    const std::string touches = ", contact: {radius: 0.01, material: m}";
+    const auto blocks = [&](const std::string& keys) {
         return refusal(
-            "elastic_blocks:\n  - {name: a, modes: 3, contact: {radius: 0.01}}\n  - {name: b, corner: [0, 0, " +
-            std::string("1.5]") + modes + contact + "}\n");
+            "materials: {m: {friction: 0.1}}\nelastic_blocks:\n  - {name: a, edges: [1, 1, 1], cells: [1, 1, 1], "
+            "modes: 3" +
+            touches + "}\n  - {name: b, corner: [0, 0, 1.5], edges: [1, 1, 1], cells: [1, 1, 1]" + keys + "}\n");
     };
-    const std::string touches = ", contact: {radius: 0.01}";
-    EXPECT_EQ(blocks("", ""), "taken");
+    EXPECT_EQ(blocks(""), "taken");
     for (const char* modes : {"", ", modes: 2"})
-        EXPECT_NE(blocks(modes, touches).find("has modes and contact, and so has another elastic body"),
+        EXPECT_NE(blocks(modes + touches).find("has modes and contact, and so has another elastic body"),
                   std::string::npos)
-            << blocks(modes, touches);
+            << blocks(modes + touches);
 }
 
 // Without modes too a block turns as a rigid body at the start.
