@@ -375,15 +375,13 @@ TEST(EquilibriumPath, ATripodOfCablesSnapsThrough) {
 // ---- The command ----
 
 TEST(EquilibriumPath, TheCommandWritesTheTable) {
-    const auto folder = std::filesystem::temp_directory_path() / "delassus_path_test";
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directories(folder);
-    std::ofstream(folder / "truss.yaml") << truss(30.0);
-    const std::string scene = (folder / "truss.yaml").string(), out = (folder / "out").string();
+    const ScratchFolder scratch;
+    const std::string scene = (scratch / "truss.yaml").string(), out = (scratch / "out").string();
+    std::ofstream(scene) << truss(30.0);
     const auto result = run_command("equilibrium " + scene + " --path --watch apex -o " + out);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_NE(result.out.find("limit point at the load factor 0.19444364"), std::string::npos) << result.out;
-    std::ifstream table(folder / "out" / "main.path.csv");
+    std::ifstream table(scratch / "out" / "main.path.csv");
     std::string line;
     std::getline(table, line);
     EXPECT_EQ(line,
@@ -399,9 +397,16 @@ TEST(EquilibriumPath, TheCommandWritesTheTable) {
     EXPECT_EQ(run_command("equilibrium " + scene + " --until 0.5").exit_code, 2);
     EXPECT_EQ(run_command("equilibrium " + scene + " --path --until apex.w=1").exit_code, 2);
     EXPECT_EQ(run_command("equilibrium " + scene + " --path --until none.z=1").exit_code, 2);
+    // What fails leaves nothing.
+    const auto nothing = (scratch / "nothing").string();
+    EXPECT_EQ(run_command("equilibrium " + scene + " --path --watch none -o " + nothing).exit_code, 2);
+    EXPECT_FALSE(std::filesystem::exists(nothing));
+    const auto falls = (scratch / "falls.yaml").string();
+    std::ofstream(falls) << "step: 0.01\nend: 1\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
+    EXPECT_EQ(run_command("equilibrium " + falls + " -o " + nothing).exit_code, 3);
+    EXPECT_FALSE(std::filesystem::exists(nothing));
     EXPECT_EQ(run_command("equilibrium " + scene + " --path --until 1e").exit_code, 2);
     EXPECT_EQ(run_command("equilibrium " + scene + " --path --points 3").exit_code, 0);
-    std::filesystem::remove_all(folder);
 }
 
 }  // namespace

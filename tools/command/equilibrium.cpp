@@ -223,10 +223,49 @@ void make_folder(const std::filesystem::path& output, const std::filesystem::pat
             throw InputError(fmt::format("{} contains something else than an earlier equilibrium; name another folder",
                                          output.string()));
         std::filesystem::remove_all(frames);
-        for (const auto& entry : std::filesystem::directory_iterator(output))
-            if (entry.path().filename().string().ends_with(path_ending)) std::filesystem::remove(entry.path());
+        for (const auto& entry : std::filesystem::directory_iterator(output)) {
+            const std::string name = entry.path().filename().string();
+            if (name.ends_with(path_ending) || name == "equilibrium.json" || name == "equilibrium.pvd")
+                std::filesystem::remove(entry.path());
+        }
     }
     std::filesystem::create_directories(frames);
+}
+
+/// Leaves nothing of a search that failed.
+class UnfinishedFolder {
+public:
+    UnfinishedFolder(std::filesystem::path output, std::filesystem::path frames)
+        : output_(std::move(output)), frames_(std::move(frames)) {}
+    UnfinishedFolder(const UnfinishedFolder&) = delete;
+    UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+    ~UnfinishedFolder() {
+        if (output_.empty() || finished) return;
+        std::error_code ignored;
+        std::filesystem::remove_all(frames_, ignored);
+        std::filesystem::remove(output_, ignored);  // where it is empty
+    }
+    bool finished = false;
+
+private:
+    std::filesystem::path output_, frames_;
+};
+
+/// The system's rule ← with what the command line says. Throws InputError for arguments that do not fit.
+void set_rule(SceneSystem& system, const EquilibriumArguments& arguments) {
+    EquilibriumRule rule = system.equilibrium.value_or(EquilibriumRule{});
+    if (arguments.load_steps) rule.load_steps = *arguments.load_steps;
+    if (arguments.tolerance) rule.tolerance = *arguments.tolerance;
+    if (rule.load_steps < 1) throw InputError("--load-steps must be at least 1");
+    if (!(rule.tolerance > 0.0)) throw InputError("--equilibrium-tolerance must be positive");
+    if (arguments.path) rule.method = EquilibriumMethod::ArcLength;
+    system.equilibrium = rule;
+    if (rule.method == EquilibriumMethod::ArcLength) {
+        static_cast<void>(rule_of(system, arguments));
+        for (const std::string& name : arguments.watch) static_cast<void>(named(system, name));
+    } else if (!arguments.until.empty() || arguments.points || !arguments.watch.empty()) {
+        throw InputError("--until, --points and --watch are for paths of equilibria; give --path too");
+    }
 }
 
 /// Follows the path; write(arc length, state) is called with each point.
@@ -253,8 +292,10 @@ WatchedPath path_of(SceneSystem& system, const Registry& registry, const Equilib
 int equilibrium(const EquilibriumArguments& arguments) {
     Scene scene = read(arguments.scene);
     const Registry registry(absolute(arguments.scene.plugin_path));
+    for (SceneSystem& system : scene.systems) set_rule(system, arguments);
     const std::filesystem::path frames = arguments.output / "vtk";
     if (!arguments.output.empty()) make_folder(arguments.output, frames);
+    UnfinishedFolder unfinished(arguments.output, frames);
     install_interrupt_handler();
     install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
@@ -268,16 +309,7 @@ int equilibrium(const EquilibriumArguments& arguments) {
     std::vector<std::vector<double>> times(scene.systems.size());
     for (std::size_t i = 0; i < scene.systems.size(); ++i) {
         SceneSystem& system = scene.systems[i];
-        EquilibriumRule rule = system.equilibrium.value_or(EquilibriumRule{});
-        if (arguments.load_steps) rule.load_steps = *arguments.load_steps;
-        if (arguments.tolerance) rule.tolerance = *arguments.tolerance;
-        if (rule.load_steps < 1) throw InputError("--load-steps must be at least 1");
-        if (!(rule.tolerance > 0.0)) throw InputError("--equilibrium-tolerance must be positive");
-        if (arguments.path) rule.method = EquilibriumMethod::ArcLength;
-        const bool by_path = rule.method == EquilibriumMethod::ArcLength;
-        if (!by_path && (!arguments.until.empty() || arguments.points || !arguments.watch.empty()))
-            throw InputError("--until, --points and --watch are for paths of equilibria; give --path too");
-        system.equilibrium = rule;
+        const bool by_path = system.equilibrium->method == EquilibriumMethod::ArcLength;
         series.emplace_back(frames, system.name, *system.system);
         const auto write = [&](double time, const State& state) {
             if (arguments.output.empty()) return;
@@ -318,6 +350,7 @@ int equilibrium(const EquilibriumArguments& arguments) {
             if (paths[i])
                 write_file_atomically(arguments.output / (scene.systems[i].name + std::string(path_ending)),
                                       csv_of(*paths[i]));
+        unfinished.finished = true;
     }
     if (arguments.json) {
         fmt::print("{}\n", json_text(report));
