@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "delassus/error.hpp"
 #include "mechanics/mesh_contacts.hpp"
 #include "mechanics/multibody_implementation.hpp"
 #include "support/frames.hpp"

@@ -49,7 +49,7 @@ void SystemReader::read_beam(const YAML::Node& item, const Copy& copy) {
     std::optional<Vector3> from, to;
     bool section = false;
     std::string_view of_made_bodies;  // a key that has no meaning between existing bodies
-    const auto made = [&](std::string_view key, Handler read) {
+    const auto made = [&](std::string_view key, const Handler& read) {
         return std::pair<std::string_view, Handler>{key, [&of_made_bodies, key, read](const YAML::Node& n) {
                                                         of_made_bodies = key;
                                                         read(n);
