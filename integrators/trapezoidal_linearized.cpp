@@ -26,7 +26,8 @@ const RegisterTimestepper trapezoidal_linearized_row{
      .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
          return std::make_unique<ImplicitMethod>(system, ImplicitCoefficients::newmark(0.5, 0.25),
                                                  NewtonSettings{.method = "trapezoidal_linearized",
-                                                                .exact = values[0].text == "exact",
+                                                                .jacobian = values[0].text == "exact" ? Jacobian::Exact
+                                                                                              : Jacobian::Symmetric,
                                                                 .reuse = Reuse::Full,
                                                                 .max_iterations = 1,
                                                                 .linearized = true,

@@ -27,6 +27,10 @@ constexpr double kLargestCount = std::numeric_limits<std::int32_t>::max();
 // Entries of the factor beyond which a denser Schur complement is not worth its better accuracy.
 constexpr double kSmallFactor = 2e4;
 
+// Times the work of the quasi-definite form, beyond which the Schur complement's better accuracy is not worth its own:
+// refinement makes up for it.
+constexpr double kDearFactor = 8.0;
+
 }  // namespace
 
 void ShiftedFactor::factorize(const ProblemView& problem) {
@@ -156,13 +160,14 @@ void ShiftedFactor::choose_form() {
         return factor;
     };
     if (form_ == Form::Automatic) {
-        const bool plainly_sparse = schur_entries <= 30.0 * (static_cast<double>(system_.D.nonZeros()) + m);
+        const bool plainly_sparse = squared_counts_ <= 30.0 * (static_cast<double>(system_.D.nonZeros()) + m);
         std::unique_ptr<Cholesky> schur, quasi;
         if (!keep_Z_ || !plainly_sparse) quasi = make(Form::QuasiDefinite);
         if (keep_Z_ && (plainly_sparse || schur_entries <= std::max(kSmallFactor, 10.0 * quasi->entries())))
             schur = make(Form::Schur);
-        const bool take_schur =
-            schur && (!quasi || schur->entries() <= kSmallFactor || schur->entries() <= 3.0 * quasi->entries());
+        const auto is_dear = [&] { return squared_counts_ + schur->flops() > kDearFactor * quasi->flops(); };
+        const bool take_schur = schur && (!quasi || (!is_dear() && (schur->entries() <= kSmallFactor ||
+                                                                    schur->entries() <= 3.0 * quasi->entries())));
         form_ = take_schur ? Form::Schur : Form::QuasiDefinite;
         saddle_ = std::move(take_schur ? schur : quasi);
     } else {

@@ -31,11 +31,24 @@ namespace delassus {
 // tends to [M −Dᵀ; D 0] as h → 0 (Bottasso, Dopico, Trainelli, Multibody System Dynamics 19, 2008: optimal scaling of
 // index-3 problems).
 
+namespace {
+
+/// The derivative is dense in joint coordinates, and its LU takes twice the work of a Cholesky factor.
+constexpr std::int32_t most_columns_of_derivative = 200;
+
+bool starts_exact(const DynamicalSystem& system, Jacobian jacobian) {
+    if (jacobian != Jacobian::Automatic) return jacobian == Jacobian::Exact;
+    return system.m() == 0 && system.n() <= most_columns_of_derivative;
+}
+
+}  // namespace
+
 Newton::Newton(DynamicalSystem& system, NewtonSettings settings)
     : system_(system),
       settings_(std::move(settings)),
       linearization_(system, settings_.linearization_limit),
-      exact_(settings_.exact),
+      starts_exact_(starts_exact(system, settings_.jacobian)),
+      exact_(starts_exact_),
       cones_(free_cones(system)),
       n_(system.n()),
       m_(system.m()) {}
@@ -91,18 +104,17 @@ bool finite(const SparseMatrix& A) {
     return std::all_of(A.value.begin(), A.value.end(), [](double value) { return std::isfinite(value); });
 }
 
-/// ½(A + Aᵀ)
-SparseMatrix symmetric_part(const SparseMatrix& A) {
-    std::vector<Triplet> triplets;
-    triplets.reserve(2 * A.value.size());
+/// result ← ½(A + Aᵀ)
+void symmetric_part(const SparseMatrix& A, MatrixAssembler& halves, SparseMatrix& result) {
+    halves.begin(A.rows, A.columns);
     for (std::int32_t row = 0; row < A.rows; ++row) {
         const auto end = static_cast<std::size_t>(A.row_start[static_cast<std::size_t>(row) + 1]);
         for (auto e = static_cast<std::size_t>(A.row_start[static_cast<std::size_t>(row)]); e < end; ++e) {
-            triplets.push_back({row, A.column[e], 0.5 * A.value[e]});
-            triplets.push_back({A.column[e], row, 0.5 * A.value[e]});
+            halves.add(row, A.column[e], 0.5 * A.value[e]);
+            halves.add(A.column[e], row, 0.5 * A.value[e]);
         }
     }
-    return SparseMatrix::from_triplets(A.rows, A.columns, std::move(triplets));
+    halves.finish_into(result);
 }
 
 }  // namespace
@@ -125,7 +137,10 @@ const SparseMatrix& Newton::matrix(const StepPoint& point, StepSlopes slopes) {
 
 void Newton::assemble(const StepPoint& point, StepSlopes slopes) {
     const SparseMatrix& H = matrix(point, slopes);
-    kept_.H = exact_ ? H : symmetric_part(H);
+    if (exact_)
+        kept_.H = H;
+    else
+        symmetric_part(H, halves_, kept_.H);
     kept_.D = jacobian(point.state);
     kept_.slopes = slopes;
     kept_.valid = true;
@@ -215,7 +230,7 @@ public:
         renew_ = !(kept.valid && reuse_ == Reuse::Adaptive && kept.slopes.beta == slopes_.beta &&
                    kept.slopes.gamma == slopes_.gamma);
         if (!renew_) newton_.scale();
-        newton_.exact_ = settings_.exact;
+        newton_.exact_ = newton_.starts_exact_;
         may_become_exact_ = !newton_.exact_ && !settings_.linearized;
         for (int iteration = 0; iteration < settings_.max_iterations; ++iteration) {
             if (may_become_exact_ && iteration >= most_symmetric_iterations) become_exact();
@@ -268,8 +283,9 @@ private:
         try {
             increment_ = solve_linear(std::move(problem), solver_, report_);
         } catch (const Unsupported&) {
-            if (newton_.exact_ == settings_.exact) throw;
-            newton_.exact_ = settings_.exact;
+            if (newton_.exact_ && settings_.jacobian == Jacobian::Automatic) newton_.starts_exact_ = false;
+            if (newton_.exact_ == newton_.starts_exact_) throw;
+            newton_.exact_ = newton_.starts_exact_;
             renew_ = true;
             return false;
         }
@@ -373,7 +389,7 @@ private:
         const double theta = trial_rho_ / rho_;
         const double rest = (theta < 0.5 ? theta / (1.0 - theta) : 1.0) * part_ * size(increment_.x);
         rho_ = trial_rho_;
-        renew_ = reuse_ == Reuse::Full || newton_.exact_ != settings_.exact ||
+        renew_ = reuse_ == Reuse::Full || newton_.exact_ != newton_.starts_exact_ ||
                  theta > (reuse_ == Reuse::Modified ? 0.5 : 0.1);
         return (rho_ <= threshold_ && rest <= threshold_) || rho_ <= rounding_;
     }
@@ -513,17 +529,17 @@ const double* Newton::load(const double* next, const double* end) {
 
 // ---- Options ----
 
-OptionInfo jacobian_option(std::string default_value) {
+OptionInfo jacobian_option(std::string default_value, std::vector<std::string> choices) {
     return {.key = "jacobian",
             .type = DELASSUS_OPTION_CHOICE,
             .default_value = std::move(default_value),
-            .choices = {"symmetric", "exact"},
+            .choices = std::move(choices),
             .doc = "matrix of Newton's method: the derivative, or its symmetric part, which more solvers accept"};
 }
 
 std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
     std::vector<OptionInfo> options = {
-        jacobian_option("symmetric"),
+        jacobian_option("auto", {"auto", "symmetric", "exact"}),
         {.key = "reuse",
          .type = DELASSUS_OPTION_CHOICE,
          .default_value = "full",
@@ -554,7 +570,9 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
 
 NewtonSettings newton_settings(std::string method, const std::vector<OptionValue>& values) {
     return {.method = std::move(method),
-            .exact = values[0].text == "exact",
+            .jacobian = values[0].text == "exact"       ? Jacobian::Exact
+                        : values[0].text == "symmetric" ? Jacobian::Symmetric
+                                                        : Jacobian::Automatic,
             .reuse = values[1].text == "full"       ? Reuse::Full
                      : values[1].text == "modified" ? Reuse::Modified
                                                     : Reuse::Adaptive,

@@ -22,9 +22,16 @@ enum class Reuse {
     Adaptive   ///< kept from step to step while h stays, until an iteration does not take the residual to a tenth
 };
 
+/// The matrix of the iteration.
+enum class Jacobian {
+    Automatic,  ///< the derivative where the problem is small, has no rows, and so goes to no plugin; else symmetric
+    Symmetric,  ///< the symmetric part of the derivative, which more solvers take
+    Exact       ///< the derivative
+};
+
 struct NewtonSettings {
     std::string method;  ///< for messages
-    bool exact = true;
+    Jacobian jacobian = Jacobian::Exact;
     Reuse reuse = Reuse::Full;
     double tolerance = 1e-10;
     int max_iterations = 20;
@@ -98,10 +105,11 @@ private:
     DynamicalSystem& system_;
     NewtonSettings settings_;
     Linearization linearization_;
-    bool exact_;  // the matrix in use: the derivative, or its symmetric part
+    bool starts_exact_;  // a step begins with the derivative, not with its symmetric part
+    bool exact_;         // the one in use
     std::vector<Cone> cones_;
     std::int32_t n_, m_;
-    MatrixAssembler rates_, H_, D_;
+    MatrixAssembler rates_, H_, halves_, D_;
     std::vector<DiagonalBlock3> blocks_;
     Kept kept_;
     Vector load_;
@@ -116,6 +124,6 @@ NewtonSettings newton_settings(std::string method, const std::vector<OptionValue
 constexpr std::size_t newton_option_count = 5;
 
 /// The row of the option `jacobian`.
-OptionInfo jacobian_option(std::string default_value);
+OptionInfo jacobian_option(std::string default_value, std::vector<std::string> choices = {"symmetric", "exact"});
 
 }  // namespace delassus

@@ -32,7 +32,7 @@ Relaxation::Relaxation(DynamicalSystem& system, RelaxationSettings settings)
     : system_(system),
       settings_(settings),
       newton_(system,
-              {.method = "the search for an equilibrium", .exact = false, .max_iterations = 25, .watchdog = true}),
+              {.method = "the search for an equilibrium", .jacobian = Jacobian::Symmetric, .max_iterations = 25, .watchdog = true}),
       n_(system.n()),
       m_(system.m()) {}
 

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <deque>
 #include <functional>
@@ -15,28 +14,17 @@
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
+#include "dynamics/general_factor.hpp"
 #include "dynamics/islands.hpp"
 #include "solver/auto_solver.hpp"
 
 namespace delassus {
 
-namespace {
-
-/// x = H⁻¹ a for an H that is not definite: LU with partial pivoting. Throws StepSolver's sentence if H is singular.
-std::vector<double> solve_by_lu(const PreparedProblem& problem) {
-    const sdk::ProblemView view(problem.raw());
-    const Eigen::SparseLU<sdk::SparseColumns> factor{sdk::SparseColumns(view.H)};
-    if (factor.info() != Eigen::Success) throw InputError("H is singular, and no constraint holds what it leaves free");
-    const sdk::Vector x = factor.solve(view.a);
-    return {x.begin(), x.end()};
-}
-
-}  // namespace
-
 /// What is kept of a part of the problem from one step to the next.
 struct KeptPart {
     Problem data;  // unused where the whole problem is one part
     std::optional<PreparedProblem> prepared;
+    GeneralFactor factor;  // of an H that is not definite, where there are no rows
     Solution solution;
     std::uint64_t identity = 0;  // as RestingParts knows it; 0: not asked about
     bool rests = false;
@@ -321,7 +309,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         if (definite) {
             prepared.meter().velocity_of({}, solution.x);
         } else {
-            solution.x = solve_by_lu(prepared);
+            part(kind, number).factor.solve(sdk::ProblemView(prepared.raw()), prepared.raw(), solution.x);
         }
         solution.lambda.clear();
         return;

@@ -166,11 +166,21 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
                                                MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr, state.t);
+    // Rows of the same bodies, as a joint's are, are summed up before they are added.
+    mechanics::RowColumns common;
+    mechanics::RowMatrix sum;
     self.for_each_row([&](std::int32_t i, const Row& row) {
         const auto columns = row.columns(self.at);
         row.hessian(self.at, state.t, columns, self.hessian);
-        add_local(columns, self.hessian, factor * lambda[i], tangent, H);
+        if (columns.bodies == common.bodies && columns.column == common.column) {
+            sum += factor * lambda[i] * self.hessian;
+            return;
+        }
+        add_local(common, sum, 1.0, tangent, H);
+        common = columns;
+        sum = factor * lambda[i] * self.hessian;
     });
+    add_local(common, sum, 1.0, tangent, H);
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
         for (const auto& [angle, scale] : self.terms_of(gear)) {
             const auto first = self.at[angle.first].column, second = self.at[angle.second].column;

@@ -83,7 +83,7 @@ void MultibodySystem::add_gyroscopic_damping(const State& state, double factor, 
         Matrix3d R = skew(omega) * J - skew(J * omega);
         if (tangent == Tangent::Symmetric) {
             R = (0.5 * (R + R.transpose())).eval();
-            if (std::abs(factor) * R.norm() > 0.25 * J.diagonal().minCoeff()) return;
+            if (std::abs(factor) * R.norm() > 0.25 * J.diagonal().minCoeff()) R.setZero();
         }
         const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> block = R;
         H.add_block(column, column, 3, 3, block.data(), factor);
