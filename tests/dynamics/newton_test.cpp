@@ -222,11 +222,74 @@ TEST(NewtonSearch, HalvesWhatOvershoots) {
     Overshooting system;
     const Registry registry;
     StepSolver solver(registry, {});
-    const auto stepper = make_timestepper("euler_implicit", system, {});
+    const auto stepper = make_timestepper("euler_implicit", system, {{"reuse", "full"}});
     State state = system.initial_state();
     const auto report = stepper->step(state, 10.0, solver);
     EXPECT_NEAR(state.q[0], 1.0, 1e-4);
     EXPECT_LE(report.newton_iterations, 12);
+}
+
+/// Two freedoms without rows: the second pushes the first, so that ∂f/∂q is not symmetric.
+class OneSided : public DynamicalSystem {
+public:
+    [[nodiscard]] std::int32_t n() const override { return 2; }
+    [[nodiscard]] State initial_state() const override { return {0.0, {0.3, 0.5}, {1.0, -0.4}}; }
+    void add_mass(const State&, double factor, MatrixAssembler& M) const override {
+        for (std::int32_t i = 0; i < 2; ++i) M.add(i, i, factor);
+    }
+    void multiply_mass(const State&, double factor, const double* x, double* result) const override {
+        for (int i = 0; i < 2; ++i) result[i] += factor * x[i];
+    }
+    void add_force(const State& s, double factor, double* result) const override {
+        result[0] -= factor * (100.0 * s.q[0] + 300.0 * std::sin(s.q[1]));
+        result[1] -= factor * 100.0 * s.q[1];
+    }
+    void add_stiffness(const State& s, double factor, Tangent tangent, MatrixAssembler& H) const override {
+        Eigen::Matrix2d K;
+        K << 100.0, 300.0 * std::cos(s.q[1]), 0.0, 100.0;
+        add_tangent<2>(K, 0, factor, tangent, H);
+    }
+};
+
+// Without rows no solver has to take the matrix, and the derivative is used: its residuals fall quadratically, those of
+// the symmetric part do not.
+TEST(NewtonJacobian, IsTheDerivativeWhereNoPluginIsNeeded) {
+    OneSided system;
+    const Registry registry;
+    StepSolver solver(registry, {});
+    const auto iterations = [&](const std::string& jacobian) {
+        const auto stepper = make_timestepper("euler_implicit", system, {{"jacobian", jacobian}, {"reuse", "full"}});
+        State state = system.initial_state();
+        const auto report = stepper->step(state, 0.05, solver);
+        // Both end at the same state, where the residual of the implicit Euler step vanishes.
+        const double h = 0.05;
+        EXPECT_NEAR(state.v[1], -0.4 - h * 100.0 * state.q[1], 1e-9) << jacobian;
+        EXPECT_NEAR(state.v[0], 1.0 - h * (100.0 * state.q[0] + 300.0 * std::sin(state.q[1])), 1e-9) << jacobian;
+        return report.newton_iterations;
+    };
+    EXPECT_EQ(iterations("auto"), iterations("exact"));
+    EXPECT_LE(iterations("auto"), 4);
+    EXPECT_GT(iterations("symmetric"), iterations("exact") + 2);
+    EXPECT_EQ(solver.effort().plugin_solves, 0);
+}
+
+// A solver that is to take every problem whole, and takes symmetric ones alone, is given the symmetric part.
+TEST(NewtonJacobian, IsSymmetricWhereEverySolveGoesToAPluginThatWantsIt) {
+    OneSided system;
+    const Registry registry;
+    SolverConfig config;
+    config.name = "minres";
+    StepSolver solver(registry, config);
+    solver.leave_nothing_out();
+    const auto stepper = make_timestepper("euler_implicit", system, {});
+    State state = system.initial_state();
+    try {
+        stepper->step(state, 0.005, solver);
+    } catch (const InputError& error) {
+        GTEST_SKIP() << error.what();  // minres is not built
+    }
+    EXPECT_GT(solver.effort().plugin_solves, 0);
+    EXPECT_NEAR(state.v[1], -0.4 - 0.005 * 100.0 * state.q[1], 1e-9);
 }
 
 TEST(NewtonFailure, SaysWhereAndLeavesTheState) {

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
 #include "support/small_problems.hpp"
@@ -32,6 +34,20 @@ Problem beside(const Problem& first, const Problem& second) {
     return both;
 }
 
+/// Tridiagonal and not symmetric: 4 on the diagonal, 1 above, −1 below.
+Problem circulating(std::int32_t n, double diagonal) {
+    std::vector<Triplet> entries;
+    for (std::int32_t i = 0; i < n; ++i) {
+        entries.push_back({i, i, diagonal});
+        if (i + 1 < n) entries.push_back({i, i + 1, 1.0});
+        if (i > 0) entries.push_back({i, i - 1, -1.0});
+    }
+    Problem problem;
+    problem.H = SparseMatrix::from_triplets(n, n, std::move(entries));
+    for (std::int32_t i = 0; i < n; ++i) problem.a.push_back(std::sin(1.0 + i));
+    return problem;
+}
+
 class StepSolverTest : public testing::Test {
 protected:
     SolverConfig config(const std::string& name) const {
@@ -43,6 +59,20 @@ protected:
     }
     Registry registry;
 };
+
+TEST_F(StepSolverTest, SolvesUnsymmetricProblemsWithoutRowsOfAnySize) {
+    StepSolver solver(registry, {});
+    for (const std::int32_t n : {3, 200, 800}) {
+        for (const double diagonal : {4.0, 5.0}) {
+            const Problem problem = circulating(n, diagonal);
+            Solution solution;
+            EXPECT_TRUE(solver.solve(problem, solution, false));
+            std::vector<double> left = problem.a;
+            problem.H.multiply_add(-1.0, solution.x.data(), left.data());
+            for (const double value : left) ASSERT_NEAR(value, 0.0, 1e-14) << n;
+        }
+    }
+}
 
 TEST_F(StepSolverTest, CallsNoPluginWithoutRows) {
     StepSolver solver(registry, {});
@@ -58,7 +88,16 @@ TEST_F(StepSolverTest, CallsNoPluginWithoutRows) {
     EXPECT_TRUE(solver.solve(problem, solution, false));
     EXPECT_NEAR(solution.x[0], 1.0, 1e-15);
     EXPECT_NEAR(solution.x[1], 1.0, 1e-15);
-    EXPECT_EQ(solver.effort().solves, 2);
+    problem.a = {5.0, 2.0};  // by the factors of before
+    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_NEAR(2.0 * solution.x[0] + solution.x[1], 5.0, 1e-14);
+    EXPECT_NEAR(-solution.x[0] + 4.0 * solution.x[1], 2.0, 1e-14);
+    problem.H.value = {2.0, 1.0, 4.0, 2.0};
+    EXPECT_THROW(solver.solve(problem, solution, false), InputError);
+    problem.H.value = {2.0, 1.0, -2.0, 4.0};
+    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_NEAR(-2.0 * solution.x[0] + 4.0 * solution.x[1], 2.0, 1e-14);
+    EXPECT_EQ(solver.effort().solves, 5);
     EXPECT_EQ(solver.effort().plugin_solves, 0);
     EXPECT_TRUE(solver.loaded().empty());
 }

@@ -500,6 +500,32 @@ TEST(Cables, HaveTheStiffnessAndDampingTheyClaim) {
     check(system);
 }
 
+// The matrices of a step are assembled again and again: entries stay in their places whatever their values.
+TEST(Patterns, LastFromSlowToFastSpins) {
+    MultibodySystem system;
+    const auto a = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
+    const auto b = system.add_body(tumbling("b", {1.0, -0.3, 0.4}));
+    JointParameters joint;
+    joint.kind = JointKind::Spherical;
+    joint.first = a;
+    joint.second = b;
+    joint.point = {0.5, 0.2, 0.1};
+    system.add_joint(joint);
+    system.finish();
+    MatrixAssembler H;
+    for (const double speed : {0.0, 1.0, 1e4}) {
+        State state = displaced(system);
+        for (double& value : state.v) value *= speed;
+        const VectorXd lambda = speed * some_lambda(system);
+        H.begin(system.n(), system.n());
+        system.add_mass(state, 1.0, H);
+        system.add_gyroscopic_damping(state, 1.0, Tangent::Symmetric, H);
+        system.add_constraint_stiffness(state, lambda.data(), 1.0, Tangent::Symmetric, H);
+        EXPECT_GT(H.finish().entries(), 0);
+    }
+    EXPECT_EQ(H.patterns(), 1);
+}
+
 TEST(Group, IncrementsFromTinyToHuge) {
     MultibodySystem system;
     system.add_body(tumbling("a", {0.0, 0.1, 0.2}));

@@ -286,6 +286,33 @@ TEST(Cholmod, EveryFormOrderingAndMethodGivesTheSameVelocities) {
     }
 }
 
+// H couples neighbours, as the stiffness of a chain's joints does: its inverse is dense, and so is the Schur
+// complement.
+TEST(Cholmod, TakesTheFormThatCostsLess) {
+    if (!is_built("cholmod")) GTEST_SKIP() << "cholmod is not built";
+    const std::int32_t n = 120;
+    std::vector<Triplet> H, D;
+    for (std::int32_t i = 0; i < n; ++i) {
+        H.push_back({i, i, 2.1});
+        if (i > 0) H.insert(H.end(), {{i, i - 1, -1.0}, {i - 1, i, -1.0}});
+        if (i > 0) D.insert(D.end(), {{i - 1, i - 1, -1.0}, {i - 1, i, 1.0 + 0.01 * i}});
+    }
+    Problem problem;
+    problem.H = SparseMatrix::from_triplets(n, n, std::move(H));
+    problem.D = SparseMatrix::from_triplets(n - 1, n, std::move(D));
+    problem.a.assign(static_cast<std::size_t>(n), 1.0);
+    problem.b.assign(static_cast<std::size_t>(n) - 1, 0.1);
+    for (std::int32_t i = 0; i + 1 < n; ++i) problem.cones.push_back(Cone::free(1));
+    const auto coupled = solve_with("cholmod", problem, to(1e-10));
+    EXPECT_EQ(coupled.report.status, Status::Solved) << coupled.report.message;
+    EXPECT_EQ(coupled.report.message.rfind("quasi-definite form", 0), 0u) << coupled.report.message;
+    const auto expected = dense_solution(problem);
+    for (std::size_t i = 0; i < coupled.solution.x.size(); ++i)
+        ASSERT_NEAR(coupled.solution.x[i], expected[static_cast<Eigen::Index>(i)], 1e-9);
+    const auto chain = solve_with("cholmod", generate("chain", {{"bodies", 50}}), to(1e-10));
+    EXPECT_EQ(chain.report.message.rfind("Schur complement", 0), 0u) << chain.report.message;
+}
+
 TEST(Cholmod, ElasticBlockWithSupernodalMass) {
     if (!is_built("cholmod")) GTEST_SKIP() << "cholmod is not built";
     const Problem problem = generate("elastic_block", {{"elements", 5}, {"glue", 1}, {"speed", 1.0}});

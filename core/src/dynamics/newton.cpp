@@ -200,7 +200,9 @@ double Newton::merit(const StepResidual& residual, double s) const {
 namespace {
 
 constexpr int most_symmetric_iterations = 10;
-/// Of an increment, where the residual would not fall otherwise.
+/// Of a body in an increment, rad.
+constexpr double furthest_turn = 1.0;
+/// Of what is tried first of an increment, where the residual would not fall otherwise.
 constexpr double shortest_part = 1.0 / 64.0;
 
 }  // namespace
@@ -236,7 +238,7 @@ public:
             if (may_become_exact_ && iteration >= most_symmetric_iterations) become_exact();
             prepare();
             if (!find_increment()) continue;
-            move(1.0);
+            move(settings_.linearized ? 1.0 : longest_part());
             set_threshold();
             if (settings_.linearized) return finish_linearized();
             if (!search()) continue;
@@ -295,6 +297,15 @@ private:
         return true;
     }
 
+    /// All of the increment, unless it turns a body further than any correction of a guess that is worth its name: a
+    /// light link between heavy ones, whose matrix is nearly singular, would be thrown to another end of the step.
+    [[nodiscard]] double longest_part() const {
+        if (std::isinf(settings_.largest_turn)) return 1.0;
+        double turn = 0.0;
+        for (const auto& block : newton_.blocks_) turn = std::max(turn, direction_.segment<3>(block.first).norm());
+        return turn > furthest_turn ? furthest_turn / turn : 1.0;
+    }
+
     /// The trial ← the point and a part of the increment, with its residual.
     void move(double part) {
         part_ = part;
@@ -343,8 +354,8 @@ private:
     [[nodiscard]] bool falls() const { return trial_rho_ <= threshold_ || trial_rho_ <= (1.0 - 1e-4 * part_) * rho_; }
 
     /// The full step as a rule; halved while the residual would not fall. A direction from an old or a symmetric matrix
-    /// need not be one of descent: then false, and the next iteration has a new or the whole one. Else the whole way is
-    /// gone, as Newton's method without a search would.
+    /// need not be one of descent: then false, and the next iteration has a new or the whole one. Else all that was
+    /// tried first is gone, as Newton's method without a search would.
     bool search() {
         if (watched_) return judge_watched();
         if (settings_.watchdog && may_watch_ && !falls() && std::isfinite(trial_rho_)) {
@@ -352,7 +363,8 @@ private:
             return true;
         }
         may_watch_ = true;
-        while (!falls() && part_ > shortest_part) move(0.5 * part_);
+        const double longest = part_;
+        while (!falls() && part_ > shortest_part * longest) move(0.5 * part_);
         if (falls()) return true;
         if (!fresh_) {
             renew_ = true;
@@ -362,7 +374,7 @@ private:
             become_exact();
             return false;
         }
-        move(1.0);
+        move(longest);
         if (!std::isfinite(trial_rho_)) fail("no part of Newton's increment leads to a finite residual");
         return true;
     }
@@ -542,7 +554,7 @@ std::vector<OptionInfo> newton_options(std::vector<OptionInfo> own) {
         jacobian_option("auto", {"auto", "symmetric", "exact"}),
         {.key = "reuse",
          .type = DELASSUS_OPTION_CHOICE,
-         .default_value = "full",
+         .default_value = "modified",
          .choices = {"full", "modified", "adaptive"},
          .doc = "a new matrix in every iteration, once a step, or when the residual falls too slowly"},
         {.key = "newton_tolerance",
