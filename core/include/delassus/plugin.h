@@ -36,7 +36,7 @@ extern "C" {
  * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
  * Major version 1 was never released; its cones had no stride. */
 #define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
-#define DELASSUS_ABI_MINOR 2
+#define DELASSUS_ABI_MINOR 3
 
 #if defined(_WIN32)
 #define DELASSUS_PLUGIN_EXPORT __declspec(dllexport)
@@ -101,6 +101,7 @@ typedef enum delassus_law {
 #define DELASSUS_CAN_REDUNDANT (UINT64_C(1) << 33)   /* rows of D known to depend on one another, where E is zero */
 #define DELASSUS_CAN_WARM_START (UINT64_C(1) << 34)  /* x and λ on entry of solve are used */
 #define DELASSUS_CAN_DISTRIBUTED (UINT64_C(1) << 35) /* works on all processes of an MPI run together */
+#define DELASSUS_CAN_PARTITIONED (UINT64_C(1) << 36) /* takes a problem that no process holds as a whole; since 2.3 */
 
 typedef struct delassus_problem {
     uint32_t struct_size; /* sizeof(delassus_problem) on the host's side */
@@ -127,6 +128,48 @@ typedef struct delassus_problem {
 static inline const delassus_cone* delassus_cone_at(const delassus_problem* problem, int32_t k) {
     return (const delassus_cone*)((const char*)problem->cones + (size_t)k * (size_t)problem->cone_stride);
 }
+
+/* ---- A problem in parts (since 2.3) ------------------------------------------------------------------------------
+ *
+ * The problem of all processes of an MPI run together, of which each holds its own part: the rows of H, a and x of
+ * whole bodies, and the rows of D, E, b and λ of whole cones. Process p owns the numbers column_start[p] to
+ * column_start[p + 1] − 1 of x, and row_start[p] to row_start[p + 1] − 1 of λ. Columns are numbered through all
+ * processes: those of D may be anybody's. A process may own nothing. */
+
+/* Rows of one process, by compressed rows. Columns ascend within a row and do not repeat; all values are finite.
+ * An absent matrix has entries = 0 and a row_start of zeros. */
+typedef struct delassus_local_matrix {
+    int64_t rows;             /* of this process */
+    int64_t columns;          /* of all processes */
+    int64_t entries;          /* = row_start[rows] */
+    const int64_t* row_start; /* rows + 1 */
+    const int64_t* column;    /* entries; numbers through all processes */
+    const double* value;      /* entries */
+} delassus_local_matrix;
+
+typedef struct delassus_local_problem {
+    uint32_t struct_size; /* sizeof(delassus_local_problem) on the host's side */
+    int32_t law;          /* delassus_law */
+    int32_t communicator; /* of these processes: MPI_Comm_f2c(communicator) where processes > 1, else nothing */
+    int32_t processes, process;
+    int32_t cone_stride; /* as in delassus_problem */
+    int64_t n, m;        /* own: the sizes of a and b */
+    int64_t n_all, m_all;
+    const int64_t* column_start;  /* processes + 1, from 0 to n_all */
+    const int64_t* row_start;     /* processes + 1, from 0 to m_all */
+    delassus_local_matrix H;      /* n × n_all, both triangles stored */
+    delassus_local_matrix D;      /* m × n_all */
+    delassus_local_matrix E;      /* m × m_all, both triangles stored */
+    const double* a;              /* n */
+    const double* b;              /* m */
+    int64_t cone_count;           /* own */
+    const delassus_cone* cones;   /* own; first_row counts within this process */
+    int64_t h_block_count;        /* own diagonal blocks of H where H is DIAGONAL or BLOCKS; else 0 */
+    const int64_t* h_block_start; /* h_block_count + 1 positions in h_block_index; NULL where there are none */
+    const int64_t* h_block_index; /* n: the own rows, from 0, of block k, as in delassus_problem */
+    uint64_t needs;               /* DELASSUS_CAN_* bits that a solver must have, DELASSUS_CAN_PARTITIONED among them */
+    uint64_t pattern_id, values_id; /* as in delassus_problem; equal on all processes */
+} delassus_local_problem;
 
 /* ---- Options ------------------------------------------------------------------------------------------------- */
 
@@ -261,6 +304,15 @@ typedef struct delassus_plugin_descriptor {
      * bit.
      */
     void (*use_team)(void* solver, const delassus_team* team);
+
+    /* Since 2.3. What analyze, factorize and solve are for a whole problem; NULL without DELASSUS_CAN_PARTITIONED.
+     * Collective: the host calls each on all processes at once, and all return the same status. x: n, λ: m, both in and
+     * out, own parts. progress is collective too: it is called on all processes for the same iteration, with the own
+     * parts of the iterate, and answers the same on all. */
+    int32_t (*analyze_partitioned)(void* solver, const delassus_local_problem* problem);
+    int32_t (*factorize_partitioned)(void* solver, const delassus_local_problem* problem);
+    int32_t (*solve_partitioned)(void* solver, const delassus_local_problem* problem, const delassus_request* request,
+                                 double* x, double* lambda, delassus_outcome* outcome);
 } delassus_plugin_descriptor;
 
 /* The one exported symbol. */

@@ -34,6 +34,7 @@ constexpr std::array other_capabilities = {
     Capability{DELASSUS_CAN_REDUNDANT, "redundant", "redundant rows"},
     Capability{DELASSUS_CAN_WARM_START, "warm_start", "a warm start"},
     Capability{DELASSUS_CAN_DISTRIBUTED, "distributed", "a distributed run"},
+    Capability{DELASSUS_CAN_PARTITIONED, "partitioned", "a partitioned problem"},
 };
 
 /// The kinds of cones, then the others.

@@ -86,6 +86,10 @@ const char* missing_operation(const delassus_plugin_descriptor& descriptor) {
     if (!descriptor.factorize) return "factorize";
     if (!descriptor.solve) return "solve";
     if (!descriptor.last_error) return "last_error";
+    if ((descriptor.capabilities & DELASSUS_CAN_PARTITIONED) == 0) return nullptr;
+    if (!descriptor.analyze_partitioned) return "analyze_partitioned";
+    if (!descriptor.factorize_partitioned) return "factorize_partitioned";
+    if (!descriptor.solve_partitioned) return "solve_partitioned";
     return nullptr;
 }
 

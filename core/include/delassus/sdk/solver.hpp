@@ -148,7 +148,54 @@ private:
                 &solve,
                 &last_error,
                 &accepts,
-                &use_team};
+                &use_team,
+                analyze_partitioned(),
+                factorize_partitioned(),
+                solve_partitioned()};
+    }
+
+    // ---- Partitioned problems: a class derived from PartitionedSolver (sdk/partitioned_solver.hpp) takes them ----
+
+    using LocalCall = std::int32_t (*)(void*, const delassus_local_problem*);
+    using LocalSolve = std::int32_t (*)(void*, const delassus_local_problem*, const delassus_request*, double*, double*,
+                                        delassus_outcome*);
+
+    static constexpr LocalCall analyze_partitioned() {
+        if constexpr (requires { typename Implementation::LocalView; })
+            return [](void* solver, const delassus_local_problem* problem) -> std::int32_t {
+                auto& instance = *static_cast<Instance*>(solver);
+                return guarded(instance.error, [&] {
+                    instance.solver.analyze(typename Implementation::LocalView(*problem));
+                    return DELASSUS_SOLVED;
+                });
+            };
+        return nullptr;
+    }
+
+    static constexpr LocalCall factorize_partitioned() {
+        if constexpr (requires { typename Implementation::LocalView; })
+            return [](void* solver, const delassus_local_problem* problem) -> std::int32_t {
+                auto& instance = *static_cast<Instance*>(solver);
+                return guarded(instance.error, [&] {
+                    instance.solver.factorize(typename Implementation::LocalView(*problem));
+                    return DELASSUS_SOLVED;
+                });
+            };
+        return nullptr;
+    }
+
+    static constexpr LocalSolve solve_partitioned() {
+        if constexpr (requires { typename Implementation::LocalView; })
+            return [](void* solver, const delassus_local_problem* problem, const delassus_request* request, double* x,
+                      double* lambda, delassus_outcome* outcome) -> std::int32_t {
+                auto& instance = *static_cast<Instance*>(solver);
+                return solve(instance, *outcome, [&] {
+                    return instance.solver.solve(typename Implementation::LocalView(*problem), Request(*request),
+                                                 MutableVectorView(x, problem->n),
+                                                 MutableVectorView(lambda, problem->m));
+                });
+            };
+        return nullptr;
     }
 
     static std::string& creation_error() {
@@ -230,25 +277,32 @@ private:
     static std::int32_t solve(void* solver, const delassus_problem* problem, const delassus_request* request, double* x,
                               double* lambda, delassus_outcome* outcome) {
         auto& instance = *static_cast<Instance*>(solver);
+        return solve(instance, *outcome, [&] {
+            return instance.solver.solve(ProblemView(*problem), Request(*request), MutableVectorView(x, problem->n),
+                                         MutableVectorView(lambda, problem->m));
+        });
+    }
+
+    /// body returns the Outcome of a solve.
+    template <class Body>
+    static std::int32_t solve(Instance& instance, delassus_outcome& outcome, Body&& body) {
         instance.message.clear();
-        outcome->iterations = 0;
-        outcome->residual = std::numeric_limits<double>::quiet_NaN();
-        outcome->message = nullptr;
-        outcome->status = guarded(instance.error, [&]() -> std::int32_t {
-            Outcome result =
-                instance.solver.solve(ProblemView(*problem), Request(*request), MutableVectorView(x, problem->n),
-                                      MutableVectorView(lambda, problem->m));
-            outcome->iterations = result.iterations;
-            outcome->residual = result.residual;
+        outcome.iterations = 0;
+        outcome.residual = std::numeric_limits<double>::quiet_NaN();
+        outcome.message = nullptr;
+        outcome.status = guarded(instance.error, [&]() -> std::int32_t {
+            Outcome result = body();
+            outcome.iterations = result.iterations;
+            outcome.residual = result.residual;
             instance.message = std::move(result.message);
-            if (!instance.message.empty()) outcome->message = instance.message.c_str();
+            if (!instance.message.empty()) outcome.message = instance.message.c_str();
             if (result.status == DELASSUS_ERROR || result.status == DELASSUS_NUMERICAL_FAILURE)
                 instance.error = instance.message.empty() ? "the solver gave no reason" : instance.message;
             return result.status;
         });
-        outcome->analyses = instance.solver.analyses();
-        outcome->factorizations = instance.solver.factorizations();
-        return outcome->status;
+        outcome.analyses = instance.solver.analyses();
+        outcome.factorizations = instance.solver.factorizations();
+        return outcome.status;
     }
 
     static const char* last_error(void* solver) {
