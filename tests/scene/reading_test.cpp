@@ -140,6 +140,22 @@ TEST(Scene, CommandLineComesFirst) {
     EXPECT_EQ(system.step, 0.5);
 }
 
+TEST(Scene, AnIntegratorIsSetPieceByPieceWhereTheFileNamesNone) {
+    const std::string body = "step: 0.1\nend: 1\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
+    SceneOverrides overrides;
+    overrides.values = {{"integrator.name", "hht"}, {"integrator.options.alpha", "-0.2"}};
+    const auto scene = parse_scene(body, "s", overrides);
+    EXPECT_EQ(scene.systems[0].integrator, "hht");
+    EXPECT_EQ(scene.systems[0].integrator_options, (OptionTexts{{"alpha", "-0.2"}}));
+    overrides.values = {{"integrator.options.alpha", "-0.2"}};
+    try {
+        static_cast<void>(parse_scene(body, "s", overrides));
+        FAIL() << "options of what?";
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("lacks the key \"name\""), std::string::npos) << error.what();
+    }
+}
+
 TEST(Scene, CanonicalTextKnowsAllButTheEnd) {
     const std::string body = "bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
     const auto text = [&](const std::string& yaml) { return parse_scene(yaml + body, "s").canonical; };

@@ -73,7 +73,8 @@ void set_value(Source& source, YAML::Node root, const std::string& path, const s
             }
             // solver.tolerance=1e-4 where the file names no solver, or says solver: pgs.
             const YAML::Node known = std::as_const(node)[step];
-            const bool absent = !known.IsDefined() && (step == "solver" || step == "limits" || step == "options");
+            const bool absent = !known.IsDefined() &&
+                                (step == "solver" || step == "integrator" || step == "limits" || step == "options");
             const bool short_form = known.IsDefined() && known.IsScalar() && (step == "solver" || step == "integrator");
             if (absent || short_form) {
                 YAML::Node section(YAML::NodeType::Map);
