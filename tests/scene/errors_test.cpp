@@ -198,6 +198,8 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 6: \"gear_first\" is \"g\", but there is no such joint; there are none"},
         Case{"AliasOfItself", head + "bodies: &all\n  - *all\n",
              "s.yaml, line 3: an item of \"bodies\" must be a map of keys to values"},
+        Case{"ShapeIsNoMap", head + "bodies:\n  - {name: b, fixed: true, shapes: [{box: [1, 1, 1]}]}\n",
+             "s.yaml, line 4: \"box\" must be a map of keys to values; its keys are size"},
         Case{"InvertedElements", head + "elastic_blocks:\n  - {name: e, edges: [1, 1, -1], cells: [1, 1, 1]}\n",
              "s.yaml, line 4: the edges of the elastic block \"e\" must be positive and finite"},
         Case{"FlatConvex",

@@ -63,9 +63,10 @@ using Handler = std::function<void(const YAML::Node&)>;
 /// Hands each key of a map to its handler; refuses other keys, and a key that comes twice.
 inline void read_map(const Source& source, const YAML::Node& map, std::string_view name,
                      const std::vector<std::pair<std::string_view, Handler>>& handlers) {
-    if (!map.IsMap()) source.refuse(map, fmt::format("{} must be a map of keys to values", name));
     std::vector<std::string_view> keys;
     for (const auto& handler : handlers) keys.push_back(handler.first);
+    if (!map.IsMap())
+        source.refuse(map, fmt::format("{} must be a map of keys to values; its keys are {}", name, fmt::join(keys, ", ")));
     std::vector<std::string> seen;
     for (const auto& entry : map) {
         const std::string key = scalar(source, entry.first, "key");
