@@ -13,6 +13,7 @@
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/newton.hpp"
 #include "dynamics/return_to_constraints.hpp"
+#include "dynamics/way_of_step.hpp"
 
 namespace delassus {
 namespace {
@@ -137,6 +138,8 @@ public:
                 {error_v_.data(), static_cast<std::size_t>(error_v_.size())}};
     }
     [[nodiscard]] double error_limit() const override { return settings_.error_limit; }
+    [[nodiscard]] bool has_extension() const override { return true; }
+    void extend(ContinuousExtension& way) const override;
     // A ten-thousandth of what the estimate may be: see dynamics/adaptive_stepping.cpp.
     void choose_steps(double tolerance) override { least_correction_ = 1e-6 * std::pow(tolerance, 0.8); }
     [[nodiscard]] std::vector<double> save() const override;
@@ -179,6 +182,7 @@ private:
     std::vector<Cone> cones_;
     bool known_ = false;
     Last last_;
+    State begin_;  // of the last step
     Vector v_begin_, a_begin_, lambda_begin_;
     std::array<Stage, 3> stages_;
     Vector root_;  // √H_ii of the third stage
@@ -500,10 +504,44 @@ void RadauIIA::finish(State& state, double h, StepSolver& solver, StepReport& re
         return_velocities(system_, "radau_iia", state, end, h, now_.finish(), nearest);
     }
     require_finite(state, end, h, "radau_iia");
+    begin_ = state;
     multipliers_.assign(last_.lambda[2].begin(), last_.lambda[2].end());
     report.multipliers = multipliers_;
     known_ = true;
     state = end;
+}
+
+// ---- The way of the step ----
+//
+// That of the collocation: through 0 and the stages, of degree 3 in Δ and v, through the stages in λ. Its errors are of
+// order 4 in h, as the estimate's. The last stage stands for the end that was returned to the constraints.
+
+void RadauIIA::extend(ContinuousExtension& way) const {
+    way.degree = 0;
+    if (!known_ || begin_.q.empty()) return;
+    way.degree = 3;
+    way.begin = begin_;
+    way.end = last_.end;
+    way.multipliers.assign(last_.lambda[2].begin(), last_.lambda[2].end());
+    Eigen::Matrix3d powers;  // of θ, from 1 on, at the stages
+    for (Eigen::Index i = 0; i < 3; ++i)
+        for (Eigen::Index k = 0; k < 3; ++k) powers(i, k) = std::pow(radau().c[i], static_cast<double>(k + 1));
+    const auto fit = [](const Eigen::Matrix3d& at, const std::array<Vector, 3>& values, std::vector<double>& result) {
+        const Eigen::Matrix3d inverse = at.inverse();
+        result.clear();
+        for (Eigen::Index k = 0; k < 3; ++k)
+            append(result, inverse(k, 0) * values[0] + inverse(k, 1) * values[1] + inverse(k, 2) * values[2]);
+    };
+    std::array<Vector, 3> delta, v;
+    for (std::size_t i = 0; i < 3; ++i) {
+        delta[i] = stages_[i].point.delta;
+        v[i] = last_.v[i] - last_.begin_v;
+    }
+    if (m_ > 0) meet_end(system_, way.begin, way.end, delta[2]);
+    v[2] = as_vector(way.end.v) - last_.begin_v;
+    fit(powers, delta, way.positions);
+    fit(powers, v, way.velocities);
+    if (m_ > 0) fit(radau().c.cwiseInverse().asDiagonal() * powers, last_.lambda, way.multiplier_powers);
 }
 
 // ---- Memory ----

@@ -43,6 +43,9 @@ public:
     /// needed, Unsupported as the stepper; then state is as before and the stepper's memory must be loaded again.
     AdaptiveStepReport step(State& state, double end, StepSolver& solver);
 
+    /// Bounds the steps from now on, > 0; below `smallest` it is that.
+    void set_largest(double largest);
+
     /// The size that the next step tries first.
     [[nodiscard]] double next() const { return next_; }
 

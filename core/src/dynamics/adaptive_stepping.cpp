@@ -305,6 +305,11 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
     }
 }
 
+void AdaptiveStepping::set_largest(double largest) {
+    if (!(largest > 0.0)) throw InputError(fmt::format("the longest step is {}; it must be positive", largest));
+    control_.largest = std::max(largest, control_.smallest);
+}
+
 double AdaptiveStepping::power() const {
     if (embedded_) return stepper_.embedded_order() + 1.0;
     return stepper_.order() + (extrapolates_ ? 1.0 : 0.0);

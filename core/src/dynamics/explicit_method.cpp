@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "dynamics/return_to_constraints.hpp"
+#include "dynamics/way_of_step.hpp"
 
 namespace delassus {
 
@@ -127,6 +128,40 @@ void ExplicitMethod::take_step(State& state, double h, StepSolver& solver, StepR
         error_v_ += h * tableau_.error.back() * last_.x;
     }
     std::swap(state, end_);
+}
+
+// By powers of θ: h k_1, 3 δ − 2 h k_1 − h k_{s+1} + e, h k_1 + h k_{s+1} − 2 δ − 2 e, e with e = h Σ d_i k_i.
+void ExplicitMethod::extend(ContinuousExtension& way) const {
+    way.degree = 0;
+    if (tableau_.dense.empty() || !known_ || end_.q.empty()) return;
+    way.begin = end_;
+    way.end = known_at_;
+    way.degree = 4;
+    way.multipliers.assign(last_.lambda.begin(), last_.lambda.end());
+    way.multiplier_powers.clear();
+    const double h = way.end.t - way.begin.t;
+    const auto as_vector = [](const std::vector<double>& values) {
+        return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
+    };
+    const auto describe = [&](const Vector& first, const std::vector<Vector>& slopes, const Vector& last,
+                              const Vector& delta, std::vector<double>& powers) {
+        Vector fourth = (h * tableau_.dense.front()) * first + (h * tableau_.dense.back()) * last;
+        for (std::size_t i = 1; i < slopes.size(); ++i)
+            if (tableau_.dense[i] != 0.0) fourth += (h * tableau_.dense[i]) * slopes[i];
+        powers.clear();
+        append(powers, h * first);
+        append(powers, 3.0 * delta - 2.0 * h * first - h * last + fourth);
+        append(powers, h * first + h * last - 2.0 * delta - 2.0 * fourth);
+        append(powers, fourth);
+    };
+    Vector delta = increment_;
+    if (m_ > 0) meet_end(system_, way.begin, way.end, delta);
+    std::vector<DiagonalBlock3> blocks;
+    Vector last;
+    system_.inverse_tangent(delta.data(), blocks);
+    multiply_blocks(blocks, as_vector(way.end.v), last);
+    describe(as_vector(way.begin.v), u_, last, delta, way.positions);
+    describe(v_[0], v_, last_.x, as_vector(way.end.v) - as_vector(way.begin.v), way.velocities);
 }
 
 Problem ExplicitMethod::nearest(const State& state) {

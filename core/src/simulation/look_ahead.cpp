@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A step of a given size is a wish for results, not for exactness, where the method estimates its own error. So the
+// method takes steps as long as its estimate allows, and what is shown is read off the way of the last one.
+//
+// What could go wrong with steps longer than those asked for:
+//
+//   - Something short happens within a step and no stage sees it. What time prescribes has corners where it begins and
+//     ends (MultibodySystem::next_corner()), at which steps end. What the state brings about, the estimate sees or
+//     not, as in any method with chosen steps; so they are at most `most_longer` times as long.
+//   - A step ends at a corner and is judged by forces or speeds of beyond. So steps end shortly before, and one of the
+//     smallest size passes the corner. Where corners follow one another more closely than `apart` steps shown, as in a
+//     table that samples a curve, that would cost more than it saves: there steps are no longer than those shown.
+//   - A joint turns by half a turn or more, so that its turns are miscounted (MultibodySystem::follow()). So no body
+//     turns by more than `largest_turn` at the speeds of the beginning, in a step that is longer than those shown.
+#include "simulation/look_ahead.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "delassus/error.hpp"
+
+namespace delassus {
+namespace {
+
+constexpr double most_longer = 20.0;
+constexpr double apart = 4.0;
+constexpr double largest_turn = 1.0;  // rad
+
+}  // namespace
+
+LookAhead::LookAhead(DynamicalSystem& system, const MultibodySystem& bodies, double step, double smallest)
+    : system_(system), bodies_(bodies), step_(step), smallest_(smallest), output_(system) {}
+
+void LookAhead::begin(const State& state) {
+    way_.degree = 0;
+    way_.end = state;
+    way_.multipliers.clear();
+}
+
+double LookAhead::largest(const State& bodies) const {
+    double fastest = 0.0;
+    for (BodyIndex body = 0; body < bodies_.body_count(); ++body) {
+        const Vector3 omega = bodies_.velocities(bodies, body)[1];
+        fastest = std::max(fastest, std::hypot(omega[0], omega[1], omega[2]));
+    }
+    return std::clamp(largest_turn / fastest, step_, most_longer * step_);
+}
+
+AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Timestepper& stepper,
+                                      AdaptiveStepping& control, StepSolver& solver) {
+    State front = way_.end;
+    const double corner = bodies_.next_corner(front.t), before = corner - 0.5 * smallest_;
+    AdaptiveStepReport report;
+    if (corner - front.t <= step_ && bodies_.next_corner(corner) - corner < apart * step_) {
+        control.set_largest(step_);
+        report = control.step(front, to, solver);
+    } else if (front.t < before) {
+        control.set_largest(largest(bodies));
+        report = control.step(front, before, solver);
+    } else {
+        // The size of the next step has nothing to do with this one.
+        const std::vector<double> chosen = control.save();
+        control.set_largest(smallest_);
+        report = control.step(front, corner + 0.5 * smallest_, solver);
+        control.load(chosen);
+    }
+    stepper.extend(way_);
+    way_.end = std::move(front);
+    return report;
+}
+
+void LookAhead::show(double to, State& state, StepSolver& solver, StepReport& report) {
+    output_.at(way_, to, state, solver, report);
+}
+
+void LookAhead::put_back(Memory memory) {
+    way_ = std::move(memory.way);
+    advances_ = memory.advances;
+}
+
+std::vector<double> LookAhead::save() const {
+    std::vector<double> memory = {static_cast<double>(advances_), static_cast<double>(way_.degree),
+                                  static_cast<double>(way_.multipliers.size()),
+                                  static_cast<double>(way_.multiplier_powers.size()), way_.end.t};
+    const auto put = [&](const std::vector<double>& values) {
+        memory.insert(memory.end(), values.begin(), values.end());
+    };
+    put(way_.end.q);
+    put(way_.end.v);
+    put(way_.multipliers);
+    if (way_.degree == 0) return memory;
+    memory.push_back(way_.begin.t);
+    put(way_.begin.q);
+    put(way_.begin.v);
+    put(way_.positions);
+    put(way_.velocities);
+    put(way_.multiplier_powers);
+    return memory;
+}
+
+void LookAhead::load(const std::vector<double>& memory) {
+    constexpr double most_powers = 100.0;
+    std::size_t at = 0;
+    const auto one = [&] {
+        if (at == memory.size()) throw InputError("what the method had ahead is of another system");
+        return memory[at++];
+    };
+    const auto count = [&](double most) {
+        const double number = one();
+        if (!(number >= 0.0 && number <= most)) throw InputError("what the method had ahead is damaged");
+        return static_cast<std::size_t>(number);
+    };
+    const auto take = [&](std::vector<double>& to, std::size_t size) {
+        if (memory.size() - at < size) throw InputError("what the method had ahead is of another system");
+        to.assign(memory.begin() + static_cast<std::ptrdiff_t>(at),
+                  memory.begin() + static_cast<std::ptrdiff_t>(at + size));
+        at += size;
+    };
+    const auto positions = static_cast<std::size_t>(system_.position_size()), n = static_cast<std::size_t>(system_.n());
+    const double m = system_.m();
+    ContinuousExtension way;
+    const auto advances = static_cast<std::int64_t>(count(1e18));
+    const std::size_t degree = count(most_powers), multipliers = count(m), powers = count(most_powers * m);
+    way.degree = static_cast<std::int32_t>(degree);
+    way.end.t = one();
+    take(way.end.q, positions);
+    take(way.end.v, n);
+    take(way.multipliers, multipliers);
+    if (degree > 0) {
+        way.begin.t = one();
+        take(way.begin.q, positions);
+        take(way.begin.v, n);
+        take(way.positions, degree * n);
+        take(way.velocities, degree * n);
+        take(way.multiplier_powers, powers);
+    }
+    if (at != memory.size()) throw InputError("what the method had ahead is of another system");
+    way_ = std::move(way);
+    advances_ = advances;
+}
+
+}  // namespace delassus
