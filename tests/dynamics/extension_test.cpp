@@ -97,10 +97,10 @@ TEST_P(Extension, HasTheOrderClaimed) {
             velocity = std::max(velocity, (Eigen::Map<const VectorXd>(between.v.data(), off.size()) -
                                            Eigen::Map<const VectorXd>(reference.state.v.data(), off.size()))
                                               .norm());
-            ASSERT_EQ(static_cast<std::int32_t>(report.multipliers.size()), system->m());
+            const std::vector<double> lambda = output.multipliers(way, between, solver, report);
+            ASSERT_EQ(static_cast<std::int32_t>(lambda.size()), system->m());
             for (Eigen::Index i = 0; i < reference.lambda.size(); ++i)
-                multiplier = std::max(multiplier,
-                                      std::abs(report.multipliers[static_cast<std::size_t>(i)] - reference.lambda[i]));
+                multiplier = std::max(multiplier, std::abs(lambda[static_cast<std::size_t>(i)] - reference.lambda[i]));
         }
         measured.position.push_back(position);
         measured.velocity.push_back(velocity);
@@ -151,7 +151,7 @@ TEST_P(Extension, MeetsBothEnds) {
     output.at(way, state.t, between, solver, found);
     EXPECT_EQ(between.q, state.q);
     EXPECT_EQ(between.v, state.v);
-    EXPECT_EQ(found.multipliers, report.multipliers);
+    EXPECT_EQ(output.multipliers(way, between, solver, found), report.multipliers);
     EXPECT_THROW(output.at(way, state.t + 1e-3 * h, between, solver, found), InputError);
     EXPECT_THROW(output.at(way, begin.t - 1e-3 * h, between, solver, found), InputError);
 }

@@ -32,11 +32,15 @@ public:
     DenseOutput(const DenseOutput&) = delete;
     DenseOutput& operator=(const DenseOutput&) = delete;
 
-    /// state ← that at time t, begin.t ≤ t ≤ end.t; report.multipliers ← λ there, forces, m. Positions and velocities
-    /// are the nearest ones, in the norm of the mass, at which C = 0 and C_q v + C_t = 0, up to rounding. Adds the
-    /// problems solved to the report. Throws InputError for another time, StepTooLong if the polynomials are so far
-    /// from the constraints that they cannot be returned to them, StepFailure if the state is not finite.
+    /// state ← that at time t, begin.t ≤ t ≤ end.t. Positions and velocities are the nearest ones, in the norm of the
+    /// mass, at which C = 0 and C_q v + C_t = 0, up to rounding. Adds the problems solved to the report. Throws
+    /// InputError for another time, StepTooLong if the polynomials are so far from the constraints that they cannot be
+    /// returned to them, StepFailure if the state is not finite.
     void at(const ContinuousExtension& way, double t, State& state, StepSolver& solver, StepReport& report);
+    /// λ of the bilateral constraints at a state that at() gave, forces, m: by a problem more where way.multipliers and
+    /// multiplier_powers do not tell them.
+    [[nodiscard]] std::vector<double> multipliers(const ContinuousExtension& way, const State& state,
+                                                  StepSolver& solver, StepReport& report);
 
 private:
     struct Implementation;

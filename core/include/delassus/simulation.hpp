@@ -134,7 +134,8 @@ public:
     [[nodiscard]] const State& coordinates() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
-    /// What the last step reported; empty before the first, and where a run goes on.
+    /// What the last step reported; empty before the first, and where a run goes on. The multipliers are empty where
+    /// steps may be longer than those shown: multipliers() has them.
     [[nodiscard]] const StepReport& report() const { return report_.step; }
     /// λ of all rows of joints, motors and attachments (MultibodySystem::joint_rows()) after the last step, forces: 0
     /// in rows that are left out. Empty before the first, and where a run goes on.

@@ -31,6 +31,10 @@ struct DenseOutput::Implementation {
             result = theta * result + Eigen::Map<const Vector>(coefficients.data() + k * size, size);
         if (first == 1) result *= theta;
     }
+    /// θ
+    static double place(const ContinuousExtension& way, double t) {
+        return (t - way.begin.t) / (way.end.t - way.begin.t);
+    }
     void return_to_constraints(const State& begin, State& state, StepSolver& solver, StepReport& report);
 
     DynamicalSystem& system;
@@ -74,7 +78,6 @@ void DenseOutput::at(const ContinuousExtension& way, double t, State& state, Ste
     auto& self = *implementation_;
     if (t == way.end.t) {
         state = way.end;
-        report.multipliers = way.multipliers;
         return;
     }
     if (way.degree == 0 || !(t >= way.begin.t && t <= way.end.t))
@@ -82,7 +85,7 @@ void DenseOutput::at(const ContinuousExtension& way, double t, State& state, Ste
             fmt::format("a state at t = {:.9g} is asked for, which the step does not pass: it goes from {:.9g} to "
                         "{:.9g}",
                         t, way.degree == 0 ? way.end.t : way.begin.t, way.end.t));
-    const double h = way.end.t - way.begin.t, theta = (t - way.begin.t) / h;
+    const double theta = Implementation::place(way, t);
     self.value.resize(self.n);
     Implementation::polynomial(way.positions, 1, theta, self.value);
     state.t = t;
@@ -92,17 +95,21 @@ void DenseOutput::at(const ContinuousExtension& way, double t, State& state, Ste
     state.v = way.begin.v;
     for (std::size_t i = 0; i < state.v.size(); ++i) state.v[i] += self.value[static_cast<Eigen::Index>(i)];
     require_finite(way.begin, state, t - way.begin.t, "dense output");
-    report.multipliers.clear();
-    if (self.m == 0) return;
-    self.return_to_constraints(way.begin, state, solver, report);
+    if (self.m > 0) self.return_to_constraints(way.begin, state, solver, report);
+}
+
+std::vector<double> DenseOutput::multipliers(const ContinuousExtension& way, const State& state, StepSolver& solver,
+                                             StepReport& report) {
+    auto& self = *implementation_;
+    if (self.m == 0) return {};
+    if (state.t == way.end.t && !way.multipliers.empty()) return way.multipliers;
     if (way.multiplier_powers.empty()) {
         self.accelerations.at(state, solver, report, self.solution);
-        report.multipliers.assign(self.solution.lambda.begin(), self.solution.lambda.end());
-    } else {
-        self.value.resize(self.m);
-        Implementation::polynomial(way.multiplier_powers, 0, theta, self.value);
-        report.multipliers.assign(self.value.begin(), self.value.end());
+        return {self.solution.lambda.begin(), self.solution.lambda.end()};
     }
+    self.value.resize(self.m);
+    Implementation::polynomial(way.multiplier_powers, 0, Implementation::place(way, state.t), self.value);
+    return {self.value.begin(), self.value.end()};
 }
 
 // With exp(Δ + T⁻¹(Δ) x) = exp(Δ) ∘ exp(x) + O(x²): Newton's method, of which two iterations are enough where x is a

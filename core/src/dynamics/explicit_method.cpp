@@ -143,16 +143,17 @@ void ExplicitMethod::extend(ContinuousExtension& way) const {
     const auto as_vector = [](const std::vector<double>& values) {
         return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
     };
-    const auto describe = [&](const Vector& first, const std::vector<Vector>& slopes, const Vector& last,
-                              const Vector& delta, std::vector<double>& powers) {
-        Vector fourth = (h * tableau_.dense.front()) * first + (h * tableau_.dense.back()) * last;
+    const auto describe = [&](const auto& first, const std::vector<Vector>& slopes, const auto& last, const auto& delta,
+                              std::vector<double>& powers) {
+        powers.resize(4 * static_cast<std::size_t>(n_));
+        const auto power = [&](Eigen::Index k) { return Eigen::Map<Vector>(powers.data() + (k - 1) * n_, n_); };
+        auto fourth = power(4);
+        fourth = (h * tableau_.dense.front()) * first + (h * tableau_.dense.back()) * last;
         for (std::size_t i = 1; i < slopes.size(); ++i)
             if (tableau_.dense[i] != 0.0) fourth += (h * tableau_.dense[i]) * slopes[i];
-        powers.clear();
-        append(powers, h * first);
-        append(powers, 3.0 * delta - 2.0 * h * first - h * last + fourth);
-        append(powers, h * first + h * last - 2.0 * delta - 2.0 * fourth);
-        append(powers, fourth);
+        power(1) = h * first;
+        power(2) = 3.0 * delta - 2.0 * h * first - h * last + fourth;
+        power(3) = h * first + h * last - 2.0 * delta - 2.0 * fourth;
     };
     Vector delta = increment_;
     if (m_ > 0) meet_end(system_, way.begin, way.end, delta);

@@ -65,13 +65,24 @@ AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Time
         report = control.step(front, corner + 0.5 * smallest_, solver);
         control.load(chosen);
     }
-    stepper.extend(way_);
+    // Steps that end before `to` are not looked at.
+    if (front.t >= to) {
+        stepper.extend(way_);
+    } else {
+        way_.degree = 0;
+        way_.multipliers.clear();
+    }
     way_.end = std::move(front);
     return report;
 }
 
 void LookAhead::show(double to, State& state, StepSolver& solver, StepReport& report) {
     output_.at(way_, to, state, solver, report);
+}
+
+std::vector<double> LookAhead::multipliers(const State& state, StepSolver& solver) {
+    StepReport report;
+    return output_.multipliers(way_, state, solver, report);
 }
 
 void LookAhead::put_back(Memory memory) {

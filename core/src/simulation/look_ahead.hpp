@@ -32,8 +32,10 @@ public:
     /// control.step(); then what was ahead is as before.
     AdaptiveStepReport advance(double to, const State& bodies, const Timestepper& stepper, AdaptiveStepping& control,
                                StepSolver& solver);
-    /// state ← that at `to`, which the method has reached; its multipliers and the problems solved go to the report.
+    /// state ← that at `to`, which the method has reached; the problems solved go to the report.
     void show(double to, State& state, StepSolver& solver, StepReport& report);
+    /// λ of the bilateral constraints at a state that was shown last.
+    [[nodiscard]] std::vector<double> multipliers(const State& state, StepSolver& solver);
 
     [[nodiscard]] std::vector<double> save() const;
     /// Throws InputError if it is of another system.

@@ -240,15 +240,28 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
 void Simulation::advance_ahead(State& state, double end, StepReport& report) {
     report.clear();
     std::int64_t parts = 0;
-    for (; !ahead_->reaches(end); ++parts) {
+    while (!ahead_->reaches(end)) {
+        ++parts;
         AdaptiveStepReport part =
             ahead_->advance(end, bodies_at(ahead_->front(), next_bodies_), *timestepper_, *control_, *solver_);
         system_->system->follow(bodies_at(ahead_->front(), next_bodies_));
         part.step.follow(report);
         std::swap(report, part.step);
     }
-    ahead_->show(end, state, *solver_, report);
     record_.parts = std::max<std::int64_t>(parts, 1);
+    try {
+        ahead_->show(end, state, *solver_, report);
+    } catch (const StepFailure&) {
+        // As where a step leaps over a place at which constraints lose rank: then one ends here.
+        state = now_.state;
+        timestepper_->restart();
+        control_->set_largest(system_->step);
+        advance_within_error(state, end, report);
+        state.t = end;
+        ahead_->begin(state);
+        system_->system->follow(bodies_at(state, next_bodies_));
+    }
+    report.multipliers.clear();
 }
 
 void Simulation::advance_within_error(State& state, double end, StepReport& report) {
@@ -345,9 +358,11 @@ const StepRecord& Simulation::step() {
     } catch (const StepFailure& error) {
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
     }
-    const std::vector<double> memory = timestepper_->save();
+    // Where the state is only read off, the method stays as it is.
+    const bool only_shows = ahead_ && !advances;
+    const std::vector<double> memory = only_shows ? std::vector<double>{} : timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
-    const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
+    const std::vector<double> control = control_ && !only_shows ? control_->save() : std::vector<double>{};
     std::optional<LookAhead::Memory> ahead;
     std::vector<double> turns;
     if (advances) {
@@ -360,6 +375,7 @@ const StepRecord& Simulation::step() {
     solver_->reset_effort();
     const auto undo = [&] {
         record_ = last;
+        if (only_shows) return;
         timestepper_->restart();
         timestepper_->load(memory);
         if (sleeping_) sleeping_->load(sleeping);
@@ -435,8 +451,8 @@ const StepRecord& Simulation::step() {
 
 std::vector<double> Simulation::multipliers() const {
     MultibodySystem& mechanics = *system_->system;
-    const std::vector<double>& kept = report().multipliers;
     if (record_.h == 0.0) return {};
+    const std::vector<double> kept = ahead_ ? ahead_->multipliers(coordinates(), *solver_) : report().multipliers;
     std::vector<double> all = mechanics.all_multipliers(kept);
     if (!joint_) return all;
     std::vector<double> force(static_cast<std::size_t>(mechanics.n()), 0.0);
