@@ -84,15 +84,28 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double largest_turn = 2.0;
 constexpr std::array<const char*, 3> stage_names = {"stage 1", "stage 2", "stage 3"};
 
-struct Stage {
+/// A stage's guess, and (2) there.
+struct StageValues {
     StepPoint point;
     std::vector<DiagonalBlock3> blocks;  // of T⁻¹(Δ)
     Vector velocity_change;              // Σ_j b_ij (V_j − v_n)
     Vector slope, force, reaction;       // w, f, C_qᵀ λ
     Vector rho, momentum;                // ρ, p
     std::vector<double> constraint;      // g
-    SparseMatrix M, K, H, D;             // of the guess: M, K, M + τ R + τ² K, C_q
-    Vector delta_delta, delta_v;         // δΔ, δV
+};
+
+// A solver takes the arrays of a problem and leaves those of the one before in it (StepSolver::solve()). So of two
+// problems with the same matrices the first is given away and the second goes to and fro: it comes back with what went
+// before, which has the same values. Matrices are copied once where they are assembled, not in each of the ten to
+// fifteen solves that they serve.
+struct StageMatrices {
+    SparseMatrix M, K;      // of the guess
+    Problem first, others;  // H = M + τ R + τ² K, D = C_q
+    bool given = false;     // `first` has been
+};
+
+struct Stage : StageValues, StageMatrices {
+    Vector delta_delta, delta_v;  // δΔ, δV
 };
 
 Eigen::Map<const Vector> as_vector(const std::vector<double>& values) {
@@ -153,8 +166,9 @@ private:
     };
     void take_step(State& state, double h, StepSolver& solver, StepReport& report) override;
     void begin(const State& state, StepSolver& solver, StepReport& report);
-    void start_from(const State& state, double h);
+    void start_from(const State& state, double h, const Vector& acceleration);
     void extrapolate(const State& state, double h);
+    [[nodiscard]] bool start(const State& state, double h);
     [[nodiscard]] bool evaluate(const State& state, double h);
     void assemble(double h);
     [[nodiscard]] bool iterate(const State& state, double h, StepSolver& solver, StepReport& report);
@@ -162,8 +176,8 @@ private:
     [[nodiscard]] double threshold(const State& state, double h) const;
     void estimate(const State& state, double h, StepSolver& solver, StepReport& report);
     void finish(State& state, double h, StepSolver& solver, StepReport& report);
-    LinearSolution solve(std::size_t stage, const Vector& a, std::vector<double> b, StepSolver& solver,
-                         StepReport& report) const;
+    LinearSolution solve(std::size_t stage, const Vector& a, const std::vector<double>& b, StepSolver& solver,
+                         StepReport& report);
     [[nodiscard]] double residual_norm() const;
 
     /// What is known of the last step, whose end is the beginning of the next.
@@ -185,6 +199,8 @@ private:
     State begin_;  // of the last step
     Vector v_begin_, a_begin_, lambda_begin_;
     std::array<Stage, 3> stages_;
+    std::array<StageValues, 3> other_guess_;
+    Solution solution_;
     Vector root_;  // √H_ii of the third stage
     Vector error_q_, error_v_;
     double least_correction_ = 0.0;
@@ -194,15 +210,30 @@ private:
 
 // ---- Guesses ----
 
-/// The accelerations of the beginning stay.
-void RadauIIA::start_from(const State& state, double h) {
+/// The better of two guesses without a step before: the accelerations of the beginning stay, or, as h v̇ may be a long
+/// way in a stiff system, the velocities. False if (2) has values at neither.
+bool RadauIIA::start(const State& state, double h) {
+    const auto swap = [&] {
+        for (std::size_t i = 0; i < 3; ++i) std::swap(static_cast<StageValues&>(stages_[i]), other_guess_[i]);
+    };
+    constexpr double none = std::numeric_limits<double>::infinity();
+    start_from(state, h, a_begin_);
+    const double moving = evaluate(state, h) ? residual_norm() : none;
+    swap();
+    start_from(state, h, Vector::Zero(n_));
+    const double steady = evaluate(state, h) ? residual_norm() : none;
+    if (!(steady <= moving)) swap();
+    return std::min(steady, moving) < none;
+}
+
+void RadauIIA::start_from(const State& state, double h, const Vector& acceleration) {
     for (std::size_t i = 0; i < 3; ++i) {
         const double t = radau().c[static_cast<Eigen::Index>(i)] * h;
         auto& point = stages_[i].point;
         point.state = state;
         point.state.t = state.t + t;
-        as_vector(point.state.v) = v_begin_ + t * a_begin_;
-        point.delta = t * v_begin_ + 0.5 * t * t * a_begin_;
+        as_vector(point.state.v) = v_begin_ + t * acceleration;
+        point.delta = t * v_begin_ + 0.5 * t * t * acceleration;
         point.lambda = lambda_begin_;
     }
 }
@@ -283,10 +314,11 @@ bool RadauIIA::evaluate(const State& state, double h) {
     return true;
 }
 
+/// ‖p‖ over the stages.
 double RadauIIA::residual_norm() const {
     double sum = 0.0;
     for (const Stage& stage : stages_) sum += stage.momentum.squaredNorm();
-    return sum;
+    return std::sqrt(sum);
 }
 
 void RadauIIA::assemble(double h) {
@@ -308,12 +340,15 @@ void RadauIIA::assemble(double h) {
         if (system_.has_stiffness()) system_.add_damping(point.state, tau, tangent, H_[i]);
         system_.add_gyroscopic_damping(point.state, tau, tangent, H_[i]);
         H_[i].add_matrix(stage.K, tau * tau);
-        H_[i].finish_into(stage.H);
+        H_[i].finish_into(stage.first.H);
         D_[i].begin(m_, n_);
         if (m_ > 0) system_.add_constraint_jacobian(point.state, 0, D_[i]);
-        D_[i].finish_into(stage.D);
+        D_[i].finish_into(stage.first.D);
+        stage.others.H = stage.first.H;
+        stage.others.D = stage.first.D;
+        stage.given = false;
     }
-    const SparseMatrix& H = stages_[2].H;
+    const SparseMatrix& H = stages_[2].first.H;
     root_.setOnes(n_);
     for (std::int32_t row = 0; row < n_; ++row) {
         double most = 0.0;
@@ -324,15 +359,21 @@ void RadauIIA::assemble(double h) {
     }
 }
 
-LinearSolution RadauIIA::solve(std::size_t stage, const Vector& a, std::vector<double> b, StepSolver& solver,
-                               StepReport& report) const {
-    Problem problem;
-    problem.H = stages_[stage].H;
-    problem.D = stages_[stage].D;
+LinearSolution RadauIIA::solve(std::size_t stage, const Vector& a, const std::vector<double>& b, StepSolver& solver,
+                               StepReport& report) {
+    Stage& of = stages_[stage];
+    Problem& problem = of.given ? of.others : of.first;
+    of.given = true;
+    problem.name = stage_names[stage];
     problem.a.assign(a.begin(), a.end());
-    problem.b = std::move(b);
+    problem.b = b;
     problem.cones = cones_;
-    return solve_linear(std::move(problem), solver, report, stage_names[stage]);
+    if (!solver.solve(std::move(problem), solution_, false)) {
+        report.solved = false;
+        report.message = solver.effort().unsolved;
+    }
+    ++report.newton_iterations;
+    return {as_vector(solution_.x), as_vector(solution_.lambda)};
 }
 
 // ---- Steps ----
@@ -383,11 +424,10 @@ RadauIIA::Correction RadauIIA::correct(double h, StepSolver& solver, StepReport&
     return largest;
 }
 
-/// From the guess to the solution; false if it does not lead there.
+/// From the guess, where (2) is known, to the solution; false if it does not lead there.
 bool RadauIIA::iterate(const State& state, double h, StepSolver& solver, StepReport& report) {
     constexpr double slow = 0.5;
     constexpr int patience = 3, most_renewals = 3;
-    if (!evaluate(state, h)) return false;
     assemble(h);
     int renewals = 0, since = 0;
     double last = 0.0, last_factor = 1.0;
@@ -431,20 +471,9 @@ void RadauIIA::take_step(State& state, double h, StepSolver& solver, StepReport&
     bool found = false;
     if (known_) {
         extrapolate(state, h);
-        found = iterate(state, h, solver, report);
+        found = evaluate(state, h) && iterate(state, h, solver, report);
     }
-    if (!found) {
-        // In a stiff system h v̇ may be a long way: then the velocities stay.
-        start_from(state, h);
-        const double moving = evaluate(state, h) ? residual_norm() : std::numeric_limits<double>::infinity();
-        const Vector acceleration = a_begin_;
-        a_begin_.setZero();
-        start_from(state, h);
-        const bool steady = evaluate(state, h) && residual_norm() <= moving;
-        a_begin_ = acceleration;
-        if (!steady) start_from(state, h);
-        found = iterate(state, h, solver, report);
-    }
+    if (!found) found = start(state, h) && iterate(state, h, solver, report);
     if (!found) {
         known_ = false;
         throw StepTooLong(
