@@ -8,8 +8,9 @@
 //     ends (MultibodySystem::next_corner()), at which steps end. What the state brings about, the estimate sees or
 //     not, as in any method with chosen steps; so they are at most `most_longer` times as long.
 //   - A step ends at a corner and is judged by forces or speeds of beyond. So steps end shortly before, and one of the
-//     smallest size passes the corner. Where corners follow one another more closely than `apart` steps shown, as in a
-//     table that samples a curve, that would cost more than it saves: there steps are no longer than those shown.
+//     smallest size passes the corner. Where `crowd` corners follow one another at less than `apart` steps shown in the
+//     mean, as in a table that samples a curve, that would cost more than it saves: there steps are no longer than
+//     those shown, and end with them.
 //   - A joint turns by half a turn or more, so that its turns are miscounted (MultibodySystem::follow()). So no body
 //     turns by more than `largest_turn` at the speeds of the beginning, in a step that is longer than those shown.
 #include "simulation/look_ahead.hpp"
@@ -24,6 +25,7 @@ namespace delassus {
 namespace {
 
 constexpr double most_longer = 20.0;
+constexpr int crowd = 8;
 constexpr double apart = 4.0;
 constexpr double largest_turn = 1.0;  // rad
 
@@ -47,12 +49,18 @@ double LookAhead::largest(const State& bodies) const {
     return std::clamp(largest_turn / fastest, step_, most_longer * step_);
 }
 
+bool LookAhead::crowded(double corner) const {
+    double last = corner;
+    for (int i = 0; i < crowd; ++i) last = bodies_.next_corner(last);
+    return last - corner < crowd * apart * step_;
+}
+
 AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Timestepper& stepper,
                                       AdaptiveStepping& control, StepSolver& solver) {
     State front = way_.end;
     const double corner = bodies_.next_corner(front.t), before = corner - 0.5 * smallest_;
     AdaptiveStepReport report;
-    if (corner - front.t <= step_ && bodies_.next_corner(corner) - corner < apart * step_) {
+    if (corner - front.t <= step_ && crowded(corner)) {
         control.set_largest(step_);
         report = control.step(front, to, solver);
     } else if (front.t < before) {

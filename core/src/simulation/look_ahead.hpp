@@ -51,6 +51,8 @@ public:
 
 private:
     [[nodiscard]] double largest(const State& bodies) const;
+    /// Whether many corners follow this one closely.
+    [[nodiscard]] bool crowded(double corner) const;
 
     DynamicalSystem& system_;
     const MultibodySystem& bodies_;

@@ -350,7 +350,6 @@ const StepRecord& Simulation::step() {
     State next = now_.state;
     try {
         if (advances) {
-            ahead_->count_advance();
             renew_rows_ahead();
         } else if (!ahead_) {
             renew_rows(next, now_.step);
@@ -367,6 +366,7 @@ const StepRecord& Simulation::step() {
     std::vector<double> turns;
     if (advances) {
         ahead = ahead_->memory();
+        ahead_->count_advance();
         turns = system_->system->turns(bodies_at(ahead_->front(), next_bodies_));
     }
     AdaptiveStepReport& taken = next_report_;
