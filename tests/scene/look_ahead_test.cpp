@@ -307,6 +307,25 @@ TEST(LookAhead, AnInterruptedStepChangesNothing) {
     EXPECT_EQ(run.simulation.state().v, undisturbed.simulation.state().v);
 }
 
+// With a limit that bounds nothing the way of a step may be too far from the joints: then a step ends there.
+TEST(LookAhead, TakesAStepWhereTheWayCannotBeReturnedToTheJoints) {
+    SceneOverrides overrides;
+    overrides.values = {{"coordinates", "maximal"}};
+    overrides.step = 0.05;
+    overrides.integrator = "dormand_prince(error_limit=1e5)";
+    overrides.end = 2;
+    Running run(read_scene(example_scene("double_pendulum"), overrides));
+    int ends = 0;
+    while (!run.simulation.finished()) {
+        const StepRecord& record = run.simulation.step();
+        EXPECT_LE(record.drift, 1e-12);
+        const std::vector<double> ahead = run.simulation.save().ahead;
+        ends += ahead.at(1) == 0.0 && ahead.at(4) == record.t ? 1 : 0;
+    }
+    EXPECT_GE(ends, 1);
+    EXPECT_LT(ends, 10);
+}
+
 // Bars that lie flat, where rows lose rank: forty times in the motion of four bars as a parallelogram.
 TEST(LookAhead, PassesPlacesWhereRowsLoseRank) {
     SceneOverrides overrides;

@@ -96,8 +96,8 @@ public:
     [[nodiscard]] virtual int embedded_order() const { return order() - 1; }
     /// The estimate for the last step; valid until the next. Empty by default.
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
-    /// The tolerance, as StepControl::absolute, by which a step of a fixed size is to be taken in parts. Infinity by
-    /// default: every step is one.
+    /// The tolerance, as StepControl::absolute, by which steps of a fixed size are to be taken in parts, or several at
+    /// once where the method has an extension. Infinity by default: every step is one.
     [[nodiscard]] virtual double error_limit() const { return std::numeric_limits<double>::infinity(); }
 
     /// Whether extend() describes the way of a step, nearly as exactly as the method finds its end. Default: no.
