@@ -29,6 +29,9 @@ namespace delassus {
 namespace {
 
 constexpr double most_longer = 20.0;
+/// Of a step shown: where the next step is shorter than this it ends with it, as longer ones save less than reading
+/// them costs. The control grows slowly: from 1.07 it would come to 1.25.
+constexpr double worth = 1.07;
 constexpr int crowd = 8;
 constexpr double apart = 4.0;
 constexpr double largest_turn = 1.0;  // rad
@@ -68,8 +71,10 @@ AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Time
         control.set_largest(step_);
         report = control.step(front, to, solver);
     } else if (front.t < before) {
-        control.set_largest(largest(bodies), step_);
-        report = control.step(front, before, solver);
+        const double longest = largest(bodies);
+        control.set_largest(longest, step_);
+        const bool pays = std::min(control.next(), longest) >= worth * step_;
+        report = control.step(front, pays ? before : std::min(to, before), solver);
     } else {
         // The size of the next step has nothing to do with this one.
         const std::vector<double> chosen = control.save();
@@ -77,12 +82,12 @@ AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Time
         report = control.step(front, corner + 0.5 * smallest_, solver);
         control.load(chosen);
     }
-    // Steps that end before `to` are not looked at.
-    if (front.t >= to) {
+    // Other steps are not looked into.
+    if (front.t > to) {
         stepper.extend(way_);
     } else {
         way_.degree = 0;
-        way_.multipliers.clear();
+        way_.multipliers = report.step.multipliers;
     }
     way_.end = std::move(front);
     return report;
@@ -103,9 +108,9 @@ void LookAhead::put_back(Memory memory) {
 }
 
 std::vector<double> LookAhead::save() const {
-    std::vector<double> memory = {static_cast<double>(advances_), static_cast<double>(way_.degree),
-                                  static_cast<double>(way_.multipliers.size()),
-                                  static_cast<double>(way_.multiplier_powers.size()), way_.end.t};
+    std::vector<double> memory = {
+        static_cast<double>(advances_), static_cast<double>(way_.degree), static_cast<double>(way_.multipliers.size()),
+        way_.degree == 0 ? 0.0 : static_cast<double>(way_.multiplier_powers.size()), way_.end.t};
     const auto put = [&](const std::vector<double>& values) {
         memory.insert(memory.end(), values.begin(), values.end());
     };
