@@ -29,9 +29,6 @@ namespace delassus {
 namespace {
 
 constexpr double most_longer = 20.0;
-/// Of a step shown: where the next step is shorter than this it ends with it, as longer ones save less than reading
-/// them costs. The control grows slowly: from 1.07 it would come to 1.25.
-constexpr double worth = 1.07;
 constexpr int crowd = 8;
 constexpr double apart = 4.0;
 constexpr double largest_turn = 1.0;  // rad
@@ -73,8 +70,9 @@ AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Time
     } else if (front.t < before) {
         const double longest = largest(bodies);
         control.set_largest(longest, step_);
-        const bool pays = std::min(control.next(), longest) >= worth * step_;
-        report = control.step(front, pays ? before : std::min(to, before), solver);
+        // Shorter steps end where the next state is shown, and need not be looked into.
+        const bool longer = std::min(control.next(), longest) > step_;
+        report = control.step(front, longer ? before : std::min(to, before), solver);
     } else {
         // The size of the next step has nothing to do with this one.
         const std::vector<double> chosen = control.save();
