@@ -29,6 +29,9 @@ namespace delassus {
 namespace {
 
 constexpr double most_longer = 20.0;
+/// Steps from one to this of those shown end with these: what longer ones save is less than reading them costs. (The
+/// control grows slowly; from 1.07 it would come to 1.25.)
+constexpr double worth = 1.07;
 constexpr int crowd = 8;
 constexpr double apart = 4.0;
 constexpr double largest_turn = 1.0;  // rad
@@ -70,9 +73,9 @@ AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Time
     } else if (front.t < before) {
         const double longest = largest(bodies);
         control.set_largest(longest, step_);
-        // Shorter steps end where the next state is shown, and need not be looked into.
-        const bool longer = std::min(control.next(), longest) > step_;
-        report = control.step(front, longer ? before : std::min(to, before), solver);
+        const double next = std::min(control.next(), longest);
+        const bool fits = next >= step_ && next < worth * step_;
+        report = control.step(front, fits ? std::min(to, before) : before, solver);
     } else {
         // The size of the next step has nothing to do with this one.
         const std::vector<double> chosen = control.save();
