@@ -117,6 +117,7 @@ TEST_P(LookAheadOf, ShowsTheMotion) {
     EXPECT_LE(worst_force, 0.05 * largest_force);
     const auto& totals = run.simulation.totals();
     EXPECT_LE(std::abs(totals.energy - totals.start_energy), 1e-3 * std::max(1.0, totals.potential_drop));
+    EXPECT_LE(totals.divided_steps, run.simulation.record().step / 4);
     EXPECT_LE(subject.fewer * static_cast<double>(totals.newton_iterations),
               static_cast<double>(each.simulation.totals().newton_iterations));
 }
@@ -244,6 +245,7 @@ TEST(LookAhead, SeesAShortPush) {
         EXPECT_NEAR(v, t < 1.234 ? 0.0 : 0.5 * 80.0 * 0.01 / 2.0, 1e-10);
     }
     EXPECT_LT(problems, 6 * 100) << "of 300 steps shown";
+    EXPECT_EQ(run.simulation.totals().divided_steps, 0) << "no step was too long";
 }
 
 // A curve by points a step apart: as without.

@@ -83,6 +83,7 @@ AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Time
         report = control.step(front, corner + 0.5 * smallest_, solver);
         control.load(chosen);
     }
+    cut_ = std::abs(front.t - corner) <= smallest_;
     // Other steps are not looked into.
     if (front.t > to) {
         stepper.extend(way_);

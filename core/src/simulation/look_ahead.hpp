@@ -32,6 +32,8 @@ public:
     /// control.step(); then what was ahead is as before.
     AdaptiveStepReport advance(double to, const State& bodies, const Timestepper& stepper, AdaptiveStepping& control,
                                StepSolver& solver);
+    /// Whether a corner made the last step as short as it was.
+    [[nodiscard]] bool cut_by_corner() const { return cut_; }
     /// state ← that at `to`, which the method has reached; the problems solved go to the report.
     void show(double to, State& state, StepSolver& solver, StepReport& report);
     /// λ of the bilateral constraints at a state that was shown last.
@@ -60,6 +62,7 @@ private:
     DenseOutput output_;
     ContinuousExtension way_;
     std::int64_t advances_ = 0;
+    bool cut_ = false;
 };
 
 }  // namespace delassus

@@ -241,10 +241,10 @@ void Simulation::advance_ahead(State& state, double end, StepReport& report) {
     report.clear();
     std::int64_t parts = 0;
     while (!ahead_->reaches(end)) {
-        ++parts;
         AdaptiveStepReport part =
             ahead_->advance(end, bodies_at(ahead_->front(), next_bodies_), *timestepper_, *control_, *solver_);
         system_->system->follow(bodies_at(ahead_->front(), next_bodies_));
+        if (!ahead_->cut_by_corner()) ++parts;
         part.step.follow(report);
         std::swap(report, part.step);
     }
