@@ -13,6 +13,7 @@
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/newton.hpp"
 #include "dynamics/return_to_constraints.hpp"
+#include "dynamics/way_of_step.hpp"
 
 namespace delassus {
 namespace {
@@ -83,15 +84,28 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double largest_turn = 2.0;
 constexpr std::array<const char*, 3> stage_names = {"stage 1", "stage 2", "stage 3"};
 
-struct Stage {
+/// A stage's guess, and (2) there.
+struct StageValues {
     StepPoint point;
     std::vector<DiagonalBlock3> blocks;  // of T⁻¹(Δ)
     Vector velocity_change;              // Σ_j b_ij (V_j − v_n)
     Vector slope, force, reaction;       // w, f, C_qᵀ λ
     Vector rho, momentum;                // ρ, p
     std::vector<double> constraint;      // g
-    SparseMatrix M, K, H, D;             // of the guess: M, K, M + τ R + τ² K, C_q
-    Vector delta_delta, delta_v;         // δΔ, δV
+};
+
+// A solver takes the arrays of a problem and leaves those of the one before in it (StepSolver::solve()). So of two
+// problems with the same matrices the first is given away and the second goes to and fro: it comes back with what went
+// before, which has the same values. Matrices are copied once where they are assembled, not in each of the ten to
+// fifteen solves that they serve.
+struct StageMatrices {
+    SparseMatrix M, K;      // of the guess
+    Problem first, others;  // H = M + τ R + τ² K, D = C_q
+    bool given = false;     // `first` has been
+};
+
+struct Stage : StageValues, StageMatrices {
+    Vector delta_delta, delta_v;  // δΔ, δV
 };
 
 Eigen::Map<const Vector> as_vector(const std::vector<double>& values) {
@@ -137,6 +151,8 @@ public:
                 {error_v_.data(), static_cast<std::size_t>(error_v_.size())}};
     }
     [[nodiscard]] double error_limit() const override { return settings_.error_limit; }
+    [[nodiscard]] bool has_extension() const override { return true; }
+    void extend(ContinuousExtension& way) const override;
     // A ten-thousandth of what the estimate may be: see dynamics/adaptive_stepping.cpp.
     void choose_steps(double tolerance) override { least_correction_ = 1e-6 * std::pow(tolerance, 0.8); }
     [[nodiscard]] std::vector<double> save() const override;
@@ -150,8 +166,9 @@ private:
     };
     void take_step(State& state, double h, StepSolver& solver, StepReport& report) override;
     void begin(const State& state, StepSolver& solver, StepReport& report);
-    void start_from(const State& state, double h);
+    void start_from(const State& state, double h, const Vector& acceleration);
     void extrapolate(const State& state, double h);
+    [[nodiscard]] bool start(const State& state, double h);
     [[nodiscard]] bool evaluate(const State& state, double h);
     void assemble(double h);
     [[nodiscard]] bool iterate(const State& state, double h, StepSolver& solver, StepReport& report);
@@ -159,8 +176,8 @@ private:
     [[nodiscard]] double threshold(const State& state, double h) const;
     void estimate(const State& state, double h, StepSolver& solver, StepReport& report);
     void finish(State& state, double h, StepSolver& solver, StepReport& report);
-    LinearSolution solve(std::size_t stage, const Vector& a, std::vector<double> b, StepSolver& solver,
-                         StepReport& report) const;
+    LinearSolution solve(std::size_t stage, const Vector& a, const std::vector<double>& b, StepSolver& solver,
+                         StepReport& report);
     [[nodiscard]] double residual_norm() const;
 
     /// What is known of the last step, whose end is the beginning of the next.
@@ -179,8 +196,11 @@ private:
     std::vector<Cone> cones_;
     bool known_ = false;
     Last last_;
+    State begin_;  // of the last step
     Vector v_begin_, a_begin_, lambda_begin_;
     std::array<Stage, 3> stages_;
+    std::array<StageValues, 3> other_guess_;
+    Solution solution_;
     Vector root_;  // √H_ii of the third stage
     Vector error_q_, error_v_;
     double least_correction_ = 0.0;
@@ -190,15 +210,30 @@ private:
 
 // ---- Guesses ----
 
-/// The accelerations of the beginning stay.
-void RadauIIA::start_from(const State& state, double h) {
+/// The better of two guesses without a step before: the accelerations of the beginning stay, or, as h v̇ may be a long
+/// way in a stiff system, the velocities. False if (2) has values at neither.
+bool RadauIIA::start(const State& state, double h) {
+    const auto swap = [&] {
+        for (std::size_t i = 0; i < 3; ++i) std::swap(static_cast<StageValues&>(stages_[i]), other_guess_[i]);
+    };
+    constexpr double none = std::numeric_limits<double>::infinity();
+    start_from(state, h, a_begin_);
+    const double moving = evaluate(state, h) ? residual_norm() : none;
+    swap();
+    start_from(state, h, Vector::Zero(n_));
+    const double steady = evaluate(state, h) ? residual_norm() : none;
+    if (!(steady <= moving)) swap();
+    return std::min(steady, moving) < none;
+}
+
+void RadauIIA::start_from(const State& state, double h, const Vector& acceleration) {
     for (std::size_t i = 0; i < 3; ++i) {
         const double t = radau().c[static_cast<Eigen::Index>(i)] * h;
         auto& point = stages_[i].point;
         point.state = state;
         point.state.t = state.t + t;
-        as_vector(point.state.v) = v_begin_ + t * a_begin_;
-        point.delta = t * v_begin_ + 0.5 * t * t * a_begin_;
+        as_vector(point.state.v) = v_begin_ + t * acceleration;
+        point.delta = t * v_begin_ + 0.5 * t * t * acceleration;
         point.lambda = lambda_begin_;
     }
 }
@@ -279,10 +314,11 @@ bool RadauIIA::evaluate(const State& state, double h) {
     return true;
 }
 
+/// ‖p‖ over the stages.
 double RadauIIA::residual_norm() const {
     double sum = 0.0;
     for (const Stage& stage : stages_) sum += stage.momentum.squaredNorm();
-    return sum;
+    return std::sqrt(sum);
 }
 
 void RadauIIA::assemble(double h) {
@@ -304,12 +340,15 @@ void RadauIIA::assemble(double h) {
         if (system_.has_stiffness()) system_.add_damping(point.state, tau, tangent, H_[i]);
         system_.add_gyroscopic_damping(point.state, tau, tangent, H_[i]);
         H_[i].add_matrix(stage.K, tau * tau);
-        H_[i].finish_into(stage.H);
+        H_[i].finish_into(stage.first.H);
         D_[i].begin(m_, n_);
         if (m_ > 0) system_.add_constraint_jacobian(point.state, 0, D_[i]);
-        D_[i].finish_into(stage.D);
+        D_[i].finish_into(stage.first.D);
+        stage.others.H = stage.first.H;
+        stage.others.D = stage.first.D;
+        stage.given = false;
     }
-    const SparseMatrix& H = stages_[2].H;
+    const SparseMatrix& H = stages_[2].first.H;
     root_.setOnes(n_);
     for (std::int32_t row = 0; row < n_; ++row) {
         double most = 0.0;
@@ -320,15 +359,21 @@ void RadauIIA::assemble(double h) {
     }
 }
 
-LinearSolution RadauIIA::solve(std::size_t stage, const Vector& a, std::vector<double> b, StepSolver& solver,
-                               StepReport& report) const {
-    Problem problem;
-    problem.H = stages_[stage].H;
-    problem.D = stages_[stage].D;
+LinearSolution RadauIIA::solve(std::size_t stage, const Vector& a, const std::vector<double>& b, StepSolver& solver,
+                               StepReport& report) {
+    Stage& of = stages_[stage];
+    Problem& problem = of.given ? of.others : of.first;
+    of.given = true;
+    problem.name = stage_names[stage];
     problem.a.assign(a.begin(), a.end());
-    problem.b = std::move(b);
+    problem.b = b;
     problem.cones = cones_;
-    return solve_linear(std::move(problem), solver, report, stage_names[stage]);
+    if (!solver.solve(std::move(problem), solution_, false)) {
+        report.solved = false;
+        report.message = solver.effort().unsolved;
+    }
+    ++report.newton_iterations;
+    return {as_vector(solution_.x), as_vector(solution_.lambda)};
 }
 
 // ---- Steps ----
@@ -379,11 +424,10 @@ RadauIIA::Correction RadauIIA::correct(double h, StepSolver& solver, StepReport&
     return largest;
 }
 
-/// From the guess to the solution; false if it does not lead there.
+/// From the guess, where (2) is known, to the solution; false if it does not lead there.
 bool RadauIIA::iterate(const State& state, double h, StepSolver& solver, StepReport& report) {
     constexpr double slow = 0.5;
     constexpr int patience = 3, most_renewals = 3;
-    if (!evaluate(state, h)) return false;
     assemble(h);
     int renewals = 0, since = 0;
     double last = 0.0, last_factor = 1.0;
@@ -427,20 +471,9 @@ void RadauIIA::take_step(State& state, double h, StepSolver& solver, StepReport&
     bool found = false;
     if (known_) {
         extrapolate(state, h);
-        found = iterate(state, h, solver, report);
+        found = evaluate(state, h) && iterate(state, h, solver, report);
     }
-    if (!found) {
-        // In a stiff system h v̇ may be a long way: then the velocities stay.
-        start_from(state, h);
-        const double moving = evaluate(state, h) ? residual_norm() : std::numeric_limits<double>::infinity();
-        const Vector acceleration = a_begin_;
-        a_begin_.setZero();
-        start_from(state, h);
-        const bool steady = evaluate(state, h) && residual_norm() <= moving;
-        a_begin_ = acceleration;
-        if (!steady) start_from(state, h);
-        found = iterate(state, h, solver, report);
-    }
+    if (!found) found = start(state, h) && iterate(state, h, solver, report);
     if (!found) {
         known_ = false;
         throw StepTooLong(
@@ -500,10 +533,44 @@ void RadauIIA::finish(State& state, double h, StepSolver& solver, StepReport& re
         return_velocities(system_, "radau_iia", state, end, h, now_.finish(), nearest);
     }
     require_finite(state, end, h, "radau_iia");
+    begin_ = state;
     multipliers_.assign(last_.lambda[2].begin(), last_.lambda[2].end());
     report.multipliers = multipliers_;
     known_ = true;
     state = end;
+}
+
+// ---- The way of the step ----
+//
+// That of the collocation: through 0 and the stages, of degree 3 in Δ and v, through the stages in λ. Its errors are of
+// order 4 in h, as the estimate's. The last stage stands for the end that was returned to the constraints.
+
+void RadauIIA::extend(ContinuousExtension& way) const {
+    way.degree = 0;
+    if (!known_ || begin_.q.empty()) return;
+    way.degree = 3;
+    way.begin = begin_;
+    way.end = last_.end;
+    way.multipliers.assign(last_.lambda[2].begin(), last_.lambda[2].end());
+    Eigen::Matrix3d powers;  // of θ, from 1 on, at the stages
+    for (Eigen::Index i = 0; i < 3; ++i)
+        for (Eigen::Index k = 0; k < 3; ++k) powers(i, k) = std::pow(radau().c[i], static_cast<double>(k + 1));
+    const auto fit = [](const Eigen::Matrix3d& at, const std::array<Vector, 3>& values, std::vector<double>& result) {
+        const Eigen::Matrix3d inverse = at.inverse();
+        result.clear();
+        for (Eigen::Index k = 0; k < 3; ++k)
+            append(result, inverse(k, 0) * values[0] + inverse(k, 1) * values[1] + inverse(k, 2) * values[2]);
+    };
+    std::array<Vector, 3> delta, v;
+    for (std::size_t i = 0; i < 3; ++i) {
+        delta[i] = stages_[i].point.delta;
+        v[i] = last_.v[i] - last_.begin_v;
+    }
+    if (m_ > 0) meet_end(system_, way.begin, way.end, delta[2]);
+    v[2] = as_vector(way.end.v) - last_.begin_v;
+    fit(powers, delta, way.positions);
+    fit(powers, v, way.velocities);
+    if (m_ > 0) fit(radau().c.cwiseInverse().asDiagonal() * powers, last_.lambda, way.multiplier_powers);
 }
 
 // ---- Memory ----

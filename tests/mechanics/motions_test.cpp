@@ -128,5 +128,71 @@ TEST(Ramp, HasAsManyContinuousDerivativesAsItSays) {
     EXPECT_THROW(static_cast<void>(Motion::ramp(0.0, 1.0, 0.0, 1.0, 3)), InputError);
 }
 
+TEST(Corners, AreWhereMotionsAreNotSmooth) {
+    EXPECT_TRUE(Motion::constant(1.0).corners.empty());
+    EXPECT_TRUE(Motion::linear(1.0, 2.0).corners.empty());
+    EXPECT_TRUE(Motion::sine(1.0, 2.0).corners.empty());
+    EXPECT_TRUE(Motion::polynomial({1.0, 2.0}).corners.empty());
+    EXPECT_EQ(Motion::ramp(0.0, 1.0, 2.0, 0.5).corners, (std::vector<double>{2.0, 2.5}));
+    const Motion table = Motion::table({1.0, 2.0, 4.0}, {3.0, 5.0, 3.0}, Interpolation::Linear, true);
+    EXPECT_EQ(table.corners, (std::vector<double>{1.0, 2.0, 4.0}));
+    EXPECT_EQ(table.period, 3.0);
+    EXPECT_TRUE(table.foreseeable);
+    EXPECT_FALSE(Motion().foreseeable);
+}
+
+// A motor, an actuator, a load and a body that moves as it is told.
+TEST(Corners, OfASystemAreThoseOfAllItsMotions) {
+    MultibodySystem system;
+    BodyParameters body;
+    body.name = "told";
+    body.motion = BodyMotion{};
+    body.motion->translation[1] = Motion::ramp(0.0, 1.0, 0.3, 0.5);
+    body.motion->angle = Motion::table({0.0, 7.0}, {0.0, 1.0});
+    static_cast<void>(system.add_body(body));
+    body = {};
+    body.name = "b";
+    body.inertia = {1.0, 1.0, 1.0};
+    const BodyIndex b = system.add_body(body);
+    JointParameters joint;
+    joint.kind = JointKind::Revolute;
+    joint.second = b;
+    const std::int32_t hinge = system.add_joint(joint);
+    EXPECT_EQ(system.next_corner(0.8), 7.0);
+    MotorParameters motor;
+    motor.name = "m";
+    motor.joint = hinge;
+    motor.motion = Motion::table({1.0, 2.0, 2.5}, {0.0, 1.0, 0.0}, Interpolation::Linear, true);
+    system.add_motor(motor);
+    ActuatorParameters actuator;
+    actuator.name = "a";
+    actuator.joint = hinge;
+    actuator.kp = 1.0;
+    actuator.position = Motion::ramp(0.0, 1.0, 1.2, 1.0);
+    system.add_actuator(actuator);
+    LoadParameters load;
+    load.name = "l";
+    load.body = b;
+    load.torque[2] = Motion::table({0.5, 6.1}, {0.0, 1.0});
+    system.add_load(load);
+    EXPECT_TRUE(system.foreseeable());
+    // The motor repeats from the time 1 on, and before it.
+    const std::vector<double> expected = {0.3, 0.5, 0.8, 1.0, 1.2, 2.0, 2.2, 2.5,
+                                          3.5, 4.0, 5.0, 5.5, 6.1, 6.5, 7.0, 8.0};
+    double t = 0.1;
+    for (const double corner : expected) {
+        t = system.next_corner(t);
+        EXPECT_NEAR(t, corner, 1e-15);
+    }
+    load.name = "own";
+    load.force[0] = Motion{[](double) { return 1.0; }, {}, {}, {}};
+    system.add_load(load);
+    EXPECT_FALSE(system.foreseeable());
+    system.finish();
+    const std::uint64_t before = system.revision();
+    system.set_gravity({0.0, 0.0, 0.0});
+    EXPECT_GT(system.revision(), before);
+}
+
 }  // namespace
 }  // namespace delassus::motions_test

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,10 @@ public:
     /// needed, Unsupported as the stepper; then state is as before and the stepper's memory must be loaded again.
     AdaptiveStepReport step(State& state, double end, StepSolver& solver);
 
+    /// Bounds the steps from now on, > 0; below `smallest` it is that. Those longer than `common` may err by a tenth of
+    /// the tolerance.
+    void set_largest(double largest, double common = std::numeric_limits<double>::infinity());
+
     /// The size that the next step tries first.
     [[nodiscard]] double next() const { return next_; }
 
@@ -73,7 +78,11 @@ private:
     [[nodiscard]] AdaptiveStepReport take_impact(State& state, double h, double end, StepSolver& solver);
     [[nodiscard]] double impact_step() const;
     [[nodiscard]] double power() const;
-    [[nodiscard]] double growth(bool shrunk) const;
+    /// The factor for the step after one of size h with the estimate `error`, over the tolerance.
+    [[nodiscard]] double growth(double error, double h, bool shrunk) const;
+    [[nodiscard]] double growth(double error, double last, double most) const;
+    /// What the estimate of a step of this size is multiplied by.
+    [[nodiscard]] double strictness(double h) const;
     void restore(const std::vector<double>& memory);
     void count(const StepReport& report);
 
@@ -82,6 +91,7 @@ private:
     StepControl control_;
     std::string advice_;
     bool extrapolates_, embedded_;
+    double common_ = std::numeric_limits<double>::infinity();
     double next_;
     double last_error_ = 1.0;
     double impacts_ = 0.0;  // short steps for impacts since the last long one

@@ -49,6 +49,11 @@ enum class Interpolation {
 struct Motion {
     std::function<double(double)> value, rate, acceleration;
     std::function<double(double)> integral;  ///< needed of the speed of a motor without force limit
+    std::vector<double> corners = {};        ///< ascending times where a value or a derivative of these jumps, s
+    double period = 0.0;                     ///< after which the corners repeat, s; 0: they do not
+    /// Whether nothing but t decides the functions, and whether they are smooth between the corners: those made below
+    /// are. Where a motion is not, no step looks ahead of what is shown.
+    bool foreseeable = false;
     DELASSUS_API static Motion constant(double value);
     DELASSUS_API static Motion linear(double start, double rate);
     /// offset + amplitude sin(2π frequency t + phase)
@@ -437,6 +442,15 @@ public:
     void set_load_factor(double factor);
     /// Replaces initial_state(); after assemble().
     void set_start(const State& state);
+    /// Grows whenever the gravity, the load factor or the kept rows are set: what was found before may not hold.
+    [[nodiscard]] std::uint64_t revision() const;
+
+    // ---- When what is prescribed is not smooth ----
+    /// The first time after t, s, at which a motion of a motor, actuator, load or body has a corner; infinity if there
+    /// is none.
+    [[nodiscard]] double next_corner(double t) const;
+    /// Whether all these motions are Motion::foreseeable.
+    [[nodiscard]] bool foreseeable() const;
 
     // ---- Reading states ----
     [[nodiscard]] std::int32_t body_count() const;

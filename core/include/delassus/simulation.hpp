@@ -87,11 +87,13 @@ struct SimulationState {
     std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps that nothing divides
     std::vector<std::int32_t>
         rows_left_out;             ///< of the bilateral constraints (MultibodySystem::kept_rows()); ascending
+    std::vector<double> ahead;     ///< where the method is ahead of `state`, and how it came there; empty: it is not
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
     SimulationTotals totals;
 };
 
 class EnergyGuard;
+class LookAhead;
 
 /// One system of a scene, advanced step by step by its timestepper and its solver.
 ///
@@ -132,7 +134,8 @@ public:
     [[nodiscard]] const State& coordinates() const { return now_.state; }
     [[nodiscard]] const SimulationTotals& totals() const { return now_.totals; }
     [[nodiscard]] const SceneSystem& system() const { return *system_; }
-    /// What the last step reported; empty before the first, and where a run goes on.
+    /// What the last step reported; empty before the first, and where a run goes on. The multipliers are empty where
+    /// steps may be longer than those shown: multipliers() has them.
     [[nodiscard]] const StepReport& report() const { return report_.step; }
     /// λ of all rows of joints, motors and attachments (MultibodySystem::joint_rows()) after the last step, forces: 0
     /// in rows that are left out. Empty before the first, and where a run goes on.
@@ -166,6 +169,8 @@ private:
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     /// memory: of the timestepper, before the step.
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
+    /// A state that is shown, by steps that are as long as their errors allow.
+    void advance_ahead(State& state, double end, StepReport& report);
     /// A fixed step in parts, whose sizes follow from their errors.
     void advance_within_error(State& state, double end, StepReport& report);
     /// A fixed step that the timestepper could not take, in parts. Throws StepFailure where that does not help.
@@ -175,13 +180,20 @@ private:
     void add_unilateral_forces(std::vector<double>& force) const;
     /// The timestepper and what controls its steps.
     void make_method();
-    /// Has the system choose anew which rows to keep where it must; the method then starts anew.
-    void renew_rows(State& state);
+    /// Has the system choose anew which rows to keep where it must; the method then starts anew. steps: so far. Returns
+    /// whether it did.
+    bool renew_rows(State& state, std::int64_t steps);
+    /// The same where the method has come to.
+    void renew_rows_ahead();
+    /// Forgets what is ahead of the state shown if the system was changed since.
+    void notice_changes();
 
     SceneSystem* system_;
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the parts of fixed ones; or empty
+    std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
+    std::uint64_t revision_ = 0;                 // of the system, that the method knows
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     Assembly assembly_;
     std::shared_ptr<const Equilibrium> equilibrium_;

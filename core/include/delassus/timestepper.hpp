@@ -68,6 +68,8 @@ struct EmbeddedError {
     std::span<const double> positions, velocities;
 };
 
+struct ContinuousExtension;
+
 /// A method, made for one system. It keeps what belongs to the method (accelerations, multipliers) from step to step.
 class DELASSUS_API Timestepper {
 public:
@@ -94,9 +96,15 @@ public:
     [[nodiscard]] virtual int embedded_order() const { return order() - 1; }
     /// The estimate for the last step; valid until the next. Empty by default.
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
-    /// The tolerance, as StepControl::absolute, by which a step of a fixed size is to be taken in parts. Infinity by
-    /// default: every step is one.
+    /// The tolerance, as StepControl::absolute, by which steps of a fixed size are to be taken in parts, or several at
+    /// once where the method has an extension. Infinity by default: every step is one.
     [[nodiscard]] virtual double error_limit() const { return std::numeric_limits<double>::infinity(); }
+
+    /// Whether extend() describes the way of a step, nearly as exactly as the method finds its end. Default: no.
+    [[nodiscard]] virtual bool has_extension() const { return false; }
+    /// way ← that of the last step, until the next one, whatever load() and restart() did since; its degree is 0 where
+    /// there is none, the default. DenseOutput (delassus/continuous_extension.hpp) finds states on it.
+    virtual void extend(ContinuousExtension& way) const;
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
     [[nodiscard]] virtual double reaction_growth() const { return 0.0; }

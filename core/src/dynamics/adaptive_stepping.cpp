@@ -42,6 +42,8 @@ namespace {
 constexpr double most_growth = 4.0, least_growth = 0.2, safety = 0.9;
 /// Of the tolerance, in a step of an embedded method.
 constexpr double share_of_step = 0.01;
+/// Of an estimate, where a step is longer than `common`.
+constexpr double strict = 10.0;
 /// Remaining times within this fraction of a step are whole steps that rounding spoiled.
 constexpr double rounding_of_step = 1e-9;
 
@@ -274,10 +276,13 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
             ++report_.rejected;
             continue;
         }
-        report_.error = trial.error;
+        report_.error = strictness(h) * trial.error;
         if (report_.error > 1.0) {
             if (!smallest) {
-                proposed = h * std::max(safety * std::pow(report_.error, -1.0 / power()), least_growth);
+                const auto shorter = [&](double error) {
+                    return h * std::max(safety * std::pow(error, -1.0 / power()), least_growth);
+                };
+                proposed = std::max(shorter(report_.error), std::min(shorter(trial.error), common_));
                 shrunk = true;
                 ++report_.rejected;
                 continue;
@@ -286,9 +291,9 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         }
         restore(trial.memory);
         // A step cut by the end or by an impact says less than the one that it was to be.
-        const double next = h * growth(shrunk);
+        const double next = h * growth(trial.error, h, shrunk);
         next_ = std::clamp(h < tried ? std::max(next, tried) : next, control_.smallest, control_.largest);
-        last_error_ = std::max(report_.error, 1e-4);
+        last_error_ = std::max(trial.error, 1e-4);
         if (h > impact_step()) impacts_ = 0.0;
         report_.step.solved = trial.first.solved && trial.second.solved;
         report_.step.message = trial.first.solved ? trial.second.message : trial.first.message;
@@ -305,15 +310,31 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
     }
 }
 
+void AdaptiveStepping::set_largest(double largest, double common) {
+    if (!(largest > 0.0)) throw InputError(fmt::format("the longest step is {}; it must be positive", largest));
+    control_.largest = std::max(largest, control_.smallest);
+    common_ = common;
+}
+
 double AdaptiveStepping::power() const {
     if (embedded_) return stepper_.embedded_order() + 1.0;
     return stepper_.order() + (extrapolates_ ? 1.0 : 0.0);
 }
 
-double AdaptiveStepping::growth(bool shrunk) const {
-    const double error = std::max(report_.error, 1e-10);
-    return std::clamp(safety * std::pow(error, -0.7 / power()) * std::pow(last_error_, 0.4 / power()), least_growth,
-                      shrunk ? 1.0 : most_growth);
+double AdaptiveStepping::growth(double error, double last, double most) const {
+    return std::clamp(safety * std::pow(std::max(error, 1e-10), -0.7 / power()) * std::pow(last, 0.4 / power()),
+                      least_growth, most);
+}
+
+// A step longer than `common` has to be allowed by the stricter bound, or else it is that long.
+double AdaptiveStepping::growth(double error, double h, bool shrunk) const {
+    const double most = shrunk ? 1.0 : most_growth, free = growth(error, last_error_, most);
+    if (h * free <= common_) return free;
+    return std::max(growth(strict * error, strict * last_error_, most), std::min(free, common_ / h));
+}
+
+double AdaptiveStepping::strictness(double h) const {
+    return h > (1.0 + rounding_of_step) * common_ ? strict : 1.0;
 }
 
 std::vector<double> AdaptiveStepping::save() const {

@@ -17,7 +17,9 @@ inline OptionInfo error_limit_option() {
             .minimum = std::numeric_limits<double>::min(),
             .maximum = HUGE_VAL,
             .unit = "m, rad",
-            .doc = "a tolerance: a step of a fixed size is taken in as many parts as steps by tolerance would be"};
+            .doc =
+                "a tolerance for steps of a fixed size: the method takes them in parts or several at once, as long as "
+                "steps by tolerance would be"};
 }
 
 }  // namespace delassus

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "dynamics/return_to_constraints.hpp"
+#include "dynamics/way_of_step.hpp"
 
 namespace delassus {
 
@@ -127,6 +128,41 @@ void ExplicitMethod::take_step(State& state, double h, StepSolver& solver, StepR
         error_v_ += h * tableau_.error.back() * last_.x;
     }
     std::swap(state, end_);
+}
+
+// By powers of θ: h k_1, 3 δ − 2 h k_1 − h k_{s+1} + e, h k_1 + h k_{s+1} − 2 δ − 2 e, e with e = h Σ d_i k_i.
+void ExplicitMethod::extend(ContinuousExtension& way) const {
+    way.degree = 0;
+    if (tableau_.dense.empty() || !known_ || end_.q.empty()) return;
+    way.begin = end_;
+    way.end = known_at_;
+    way.degree = 4;
+    way.multipliers.assign(last_.lambda.begin(), last_.lambda.end());
+    way.multiplier_powers.clear();
+    const double h = way.end.t - way.begin.t;
+    const auto as_vector = [](const std::vector<double>& values) {
+        return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
+    };
+    const auto describe = [&](const auto& first, const std::vector<Vector>& slopes, const auto& last, const auto& delta,
+                              std::vector<double>& powers) {
+        powers.resize(4 * static_cast<std::size_t>(n_));
+        const auto power = [&](Eigen::Index k) { return Eigen::Map<Vector>(powers.data() + (k - 1) * n_, n_); };
+        auto fourth = power(4);
+        fourth = (h * tableau_.dense.front()) * first + (h * tableau_.dense.back()) * last;
+        for (std::size_t i = 1; i < slopes.size(); ++i)
+            if (tableau_.dense[i] != 0.0) fourth += (h * tableau_.dense[i]) * slopes[i];
+        power(1) = h * first;
+        power(2) = 3.0 * delta - 2.0 * h * first - h * last + fourth;
+        power(3) = h * first + h * last - 2.0 * delta - 2.0 * fourth;
+    };
+    Vector delta = increment_;
+    if (m_ > 0) meet_end(system_, way.begin, way.end, delta);
+    std::vector<DiagonalBlock3> blocks;
+    Vector last;
+    system_.inverse_tangent(delta.data(), blocks);
+    multiply_blocks(blocks, as_vector(way.end.v), last);
+    describe(as_vector(way.begin.v), u_, last, delta, way.positions);
+    describe(v_[0], v_, last_.x, as_vector(way.end.v) - as_vector(way.begin.v), way.velocities);
 }
 
 Problem ExplicitMethod::nearest(const State& state) {

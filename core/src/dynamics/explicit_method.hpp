@@ -22,6 +22,8 @@ struct ButcherTableau {
     /// b less that of an embedded method of order − 1, over s + 1 stages of which the last is the beginning of the next
     /// step; empty: there is none.
     std::span<const double> error;
+    /// Of the continuous extension, over as many; empty: there is none.
+    std::span<const double> dense = {};
 };
 
 // Within a step the position is q(t) = q_n ∘ exp(u(t)) with u(t_n) = 0. q̇ = v means that q(t + dt) = q(t) ∘ exp(v dt),
@@ -46,6 +48,15 @@ struct ButcherTableau {
 //
 // These changes are of the size of the local error, so that the order stays (Hairer and Wanner, Solving Ordinary
 // Differential Equations II, sec. VII.2).
+//
+// Between, u and v are polynomials of θ = (t − t_n)/h. The cubic one with the values and slopes of both ends, and one
+// term more,
+//
+//     y(θ) = y_n + θ δ + θ (1 − θ) ((1 − θ) (h k_1 − δ) − θ (h k_{s+1} − δ)) + θ² (1 − θ)² h Σ d_i k_i,
+//     δ = y_{n+1} − y_n
+//
+// has order 4 where Σ d_i k_i is y⁗ h³/24 up to O(h⁴) (`dense`; Hairer, Nørsett and Wanner, sec. II.6). It meets the
+// end that was returned to the constraints, as δ and k_{s+1} are those of it.
 class ExplicitMethod : public Timestepper {
 public:
     /// system outlives it; the tableau's arrays too.
@@ -57,6 +68,8 @@ public:
     [[nodiscard]] bool has_embedded_error() const override { return !tableau_.error.empty(); }
     [[nodiscard]] EmbeddedError embedded_error() const override;
     [[nodiscard]] double error_limit() const override { return error_limit_; }
+    [[nodiscard]] bool has_extension() const override { return !tableau_.dense.empty(); }
+    void extend(ContinuousExtension& way) const override;
     // What is known at the end of the last step: the state, its accelerations and multipliers.
     [[nodiscard]] std::vector<double> save() const override;
     void load(const std::vector<double>& memory) override;
@@ -79,7 +92,7 @@ private:
     LinearSolution last_;        // accelerations there
     std::vector<Vector> u_, v_;  // slopes of the stages
     Vector increment_, stage_v_, error_q_, error_v_;
-    State stage_, end_;
+    State stage_, end_;  // end_: since the step, its beginning
     std::vector<DiagonalBlock3> blocks_;
     LinearSolution solution_;
     MatrixAssembler M_, D_;

@@ -125,8 +125,9 @@ void MultibodySystem::Implementation::add_joint_forces(std::int32_t index) {
 
 std::vector<double> MultibodySystem::turns(const State& state) const {
     const auto& self = *implementation_;
-    self.place(state);
     std::vector<double> result;
+    if (self.counted.empty()) return result;
+    self.place(state);
     for (const auto& one : self.counted) {
         const double angle = self.joints[static_cast<std::size_t>(one.joint)].angle.value(self.at);
         result.push_back(std::round((*one.reference - angle) / (2.0 * M_PI)));
@@ -139,6 +140,7 @@ void MultibodySystem::set_turns(const State& state, const std::vector<double>& t
     if (!turns.empty() && turns.size() != self.counted.size())
         throw InputError(fmt::format("the turns of {} joints were given; the system counts those of {}", turns.size(),
                                      self.counted.size()));
+    if (self.counted.empty()) return;
     self.place(state);
     for (std::size_t k = 0; k < self.counted.size(); ++k) {
         const auto& one = self.counted[k];

@@ -12,26 +12,39 @@
 
 namespace delassus {
 
+namespace {
+
+Motion smooth(std::function<double(double)> value, std::function<double(double)> rate,
+              std::function<double(double)> acceleration, std::function<double(double)> integral) {
+    return {.value = std::move(value),
+            .rate = std::move(rate),
+            .acceleration = std::move(acceleration),
+            .integral = std::move(integral),
+            .foreseeable = true};
+}
+
+}  // namespace
+
 Motion Motion::constant(double value) {
-    return {[=](double) { return value; }, [](double) { return 0.0; }, [](double) { return 0.0; },
-            [=](double t) { return value * t; }};
+    return smooth([=](double) { return value; }, [](double) { return 0.0; }, [](double) { return 0.0; },
+                  [=](double t) { return value * t; });
 }
 
 Motion Motion::linear(double start, double slope) {
-    return {[=](double t) { return start + slope * t; }, [=](double) { return slope; }, [](double) { return 0.0; },
-            [=](double t) { return start * t + 0.5 * slope * t * t; }};
+    return smooth([=](double t) { return start + slope * t; }, [=](double) { return slope; },
+                  [](double) { return 0.0; }, [=](double t) { return start * t + 0.5 * slope * t * t; });
 }
 
 Motion Motion::sine(double amplitude, double frequency, double phase, double offset) {
     const double omega = 2.0 * std::numbers::pi * frequency;
-    return {[=](double t) { return offset + amplitude * std::sin(omega * t + phase); },
-            [=](double t) { return amplitude * omega * std::cos(omega * t + phase); },
-            [=](double t) { return -amplitude * omega * omega * std::sin(omega * t + phase); },
-            [=](double t) {
-                const double swing =
-                    omega == 0.0 ? std::sin(phase) * t : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
-                return offset * t + amplitude * swing;
-            }};
+    return smooth([=](double t) { return offset + amplitude * std::sin(omega * t + phase); },
+                  [=](double t) { return amplitude * omega * std::cos(omega * t + phase); },
+                  [=](double t) { return -amplitude * omega * omega * std::sin(omega * t + phase); },
+                  [=](double t) {
+                      const double swing =
+                          omega == 0.0 ? std::sin(phase) * t : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
+                      return offset * t + amplitude * swing;
+                  });
 }
 
 namespace {
@@ -110,10 +123,13 @@ struct Piecewise {
 Motion motion_of(Piecewise given) {
     const auto pieces = std::make_shared<const Piecewise>(std::move(given));
     const double start = pieces->from_start(0.0);
-    return {[=](double t) { return pieces->value_at(t); },
-            [=](double t) { return pieces->outside(t) ? 0.0 : pieces->of(pieces->rate, t); },
-            [=](double t) { return pieces->outside(t) ? 0.0 : pieces->of(pieces->acceleration, t); },
-            [=](double t) { return pieces->from_start(t) - start; }};
+    Motion result = smooth([=](double t) { return pieces->value_at(t); },
+                           [=](double t) { return pieces->outside(t) ? 0.0 : pieces->of(pieces->rate, t); },
+                           [=](double t) { return pieces->outside(t) ? 0.0 : pieces->of(pieces->acceleration, t); },
+                           [=](double t) { return pieces->from_start(t) - start; });
+    result.corners = pieces->times;
+    if (pieces->periodic) result.period = pieces->period();
+    return result;
 }
 
 // A cubic spline has the slopes m_i at which its second derivative is continuous: with h_i = t_{i+1} − t_i and
@@ -192,9 +208,10 @@ Motion Motion::polynomial(const std::vector<double>& coefficients) {
         throw InputError("a polynomial needs one finite coefficient or more");
     const auto rate = derivative(coefficients), acceleration = derivative(rate),
                integral = antiderivative(coefficients);
-    return {[coefficients](double t) { return horner(coefficients, t); }, [rate](double t) { return horner(rate, t); },
-            [acceleration](double t) { return horner(acceleration, t); },
-            [integral](double t) { return horner(integral, t); }};
+    return smooth([coefficients](double t) { return horner(coefficients, t); },
+                  [rate](double t) { return horner(rate, t); },
+                  [acceleration](double t) { return horner(acceleration, t); },
+                  [integral](double t) { return horner(integral, t); });
 }
 
 // With s from 0 to 1: 3 s² − 2 s³ has rate 0 at both ends, 10 s³ − 15 s⁴ + 6 s⁵ also the second derivative 0.

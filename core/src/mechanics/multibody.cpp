@@ -67,6 +67,7 @@ void MultibodySystem::Implementation::check_body(BodyIndex body, const std::stri
 void MultibodySystem::set_gravity(const Vector3& gravity) {
     refuse_unless(finite(gravity), "the value", "gravity", "is not finite");
     implementation_->gravity = gravity;
+    ++implementation_->revision;
 }
 
 BodyIndex MultibodySystem::add_body(const BodyParameters& parameters) {
@@ -88,6 +89,8 @@ BodyIndex MultibodySystem::add_body(const BodyParameters& parameters) {
         refuse_unless(finite(motion.axis) && vector(motion.axis).norm() > 0.0, "the axis of the motion of body", name,
                       "has no direction");
         refuse_unless(!motion.point || finite(*motion.point), "the point of the motion of body", name, "is not finite");
+        self.motion_corners.add(motion.translation);
+        self.motion_corners.add(motion.angle);
         body.prescribed = std::make_shared<mechanics::PrescribedMotion>(motion, body.parameters.pose);
         body.parameters.pose = body.prescribed->pose(0.0);
         refuse_unless(finite(body.parameters.pose.position) && std::isfinite(body.parameters.pose.orientation[0]),
@@ -157,6 +160,7 @@ void MultibodySystem::add_motor(const MotorParameters& motor) {
     refuse_unless(motor.motion.value && motor.motion.rate && motor.motion.acceleration, "the motor", name,
                   "has no motion");
     refuse_unless(motor.force_limit >= 0.0, "the force limit of the motor", name, "must not be negative");
+    self.motion_corners.add(motor.motion);
     if (std::isinf(motor.force_limit)) {
         mechanics::drive_joint(joint, motor, self.motions);
     } else {
@@ -181,6 +185,8 @@ void MultibodySystem::add_actuator(const ActuatorParameters& actuator) {
     refuse_unless(position == (actuator.kp > 0.0), "the actuator", name,
                   position ? "has a position to go to, but no kp" : "has a kp, but no position to go to");
     refuse_unless(position || speed, "the actuator", name, "has neither a position nor a speed to go to");
+    self.motion_corners.add(actuator.position);
+    self.motion_corners.add(actuator.speed);
     const auto zero = [](double) { return 0.0; };
     const Motion& place = position ? actuator.position : Motion{zero, zero, zero, zero};
     const auto rate = speed ? actuator.speed.value : actuator.position.rate;
@@ -231,6 +237,8 @@ void MultibodySystem::add_bushing(const BushingParameters& bushing) {
 void MultibodySystem::add_load(const LoadParameters& load) {
     auto& self = *implementation_;
     self.must_not_be_finished();
+    self.motion_corners.add(load.force);
+    self.motion_corners.add(load.torque);
     if (!load.nodes.empty()) {
         for (const auto& [node, share] : load.nodes) self.check_node(node, fmt::format("the load \"{}\"", load.name));
         const bool turns = load.torque[0].value || load.torque[1].value || load.torque[2].value;
@@ -455,11 +463,22 @@ std::int32_t MultibodySystem::body_column(BodyIndex index) const {
 void MultibodySystem::set_load_factor(double factor) {
     implementation_->must_be_finished();
     implementation_->load_factor = factor;
+    ++implementation_->revision;
 }
 
 void MultibodySystem::set_start(const State& state) {
     implementation_->must_be_finished();
     implementation_->assembled = state;
+}
+
+std::uint64_t MultibodySystem::revision() const {
+    return implementation_->revision;
+}
+double MultibodySystem::next_corner(double t) const {
+    return implementation_->motion_corners.after(t);
+}
+bool MultibodySystem::foreseeable() const {
+    return !implementation_->motion_corners.unknown();
 }
 
 const Vector3& MultibodySystem::gravity() const {

@@ -145,6 +145,7 @@ void MultibodySystem::keep_rows(const std::vector<std::int32_t>& rows) {
     std::fill(self.place_of_row.begin(), self.place_of_row.end(), -1);
     for (const auto row : rows) self.place_of_row[static_cast<std::size_t>(row)] = 0;
     self.number_rows();
+    ++self.revision;
 }
 
 void MultibodySystem::hold_rows(const std::vector<std::int32_t>& held) {

@@ -10,6 +10,7 @@
 #include "mechanics/cable.hpp"
 #include "mechanics/linkage.hpp"
 #include "mechanics/model.hpp"
+#include "mechanics/motion_corners.hpp"
 #include "mechanics/solid_element.hpp"
 
 namespace delassus {
@@ -43,6 +44,8 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::BoundedMotor> bounded_motors;
     std::vector<mechanics::BoundedActuator> bounded_actuators;
     mechanics::Motions motions;
+    mechanics::MotionCorners motion_corners;  // of all motions
+    std::uint64_t revision = 0;
     std::vector<Shape> shapes;
     std::vector<std::int32_t> shape_material;  // of shapes, then of node contacts
     struct NodeContact {

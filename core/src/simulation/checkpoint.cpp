@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 4;
+constexpr int version = 5;
 constexpr std::size_t digits = 16;
 
 // Numbers are their 64 bits in hexadecimal, one after the other: no digit is lost, and zeros keep their signs.
@@ -103,6 +103,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"turns", bits(simulation.turns)},
                                    {"memory", bits(simulation.memory)},
                                    {"control", bits(simulation.control)},
+                                   {"ahead", bits(simulation.ahead)},
                                    {"rows_left_out", simulation.rows_left_out},
                                    {"sleeping", bits(simulation.sleeping)},
                                    {"totals", json_of(simulation.totals)},
@@ -129,6 +130,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             system.simulation.turns = numbers(one.at("turns"));
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
+            system.simulation.ahead = numbers(one.at("ahead"));
             system.simulation.sleeping = numbers(one.at("sleeping"));
             one.at("rows_left_out").get_to(system.simulation.rows_left_out);
             system.simulation.totals = totals_of(one.at("totals"));

@@ -8,9 +8,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
+#include "simulation/look_ahead.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
 #include "simulation/touching.hpp"
@@ -130,6 +132,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
             make_method();
         });
     now_.state = dynamics().initial_state();
+    if (ahead_) ahead_->begin(now_.state);
     system.system->set_turns(bodies_at(now_.state, bodies_), {});
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
@@ -144,6 +147,8 @@ Simulation::Simulation(Simulation&&) noexcept = default;
 
 void Simulation::make_method() {
     control_.reset();
+    ahead_.reset();
+    revision_ = system_->system->revision();
     timestepper_ = make_timestepper(system_->integrator, dynamics(), system_->integrator_options);
     if (system_->control) {
         control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
@@ -157,6 +162,8 @@ void Simulation::make_method() {
             fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
                         "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
                         system_->integrator));
+        if (timestepper_->has_extension() && system_->system->foreseeable())
+            ahead_ = std::make_unique<LookAhead>(dynamics(), *system_->system, step, shortest * step);
     }
 }
 
@@ -171,18 +178,34 @@ const State& Simulation::bodies_at(const State& state, State& memory) const {
     return memory;
 }
 
-void Simulation::renew_rows(State& state) {
+void Simulation::notice_changes() {
+    if (!ahead_ || revision_ == system_->system->revision()) return;
+    revision_ = system_->system->revision();
+    ahead_->begin(now_.state);
+    timestepper_->restart();
+}
+
+void Simulation::renew_rows_ahead() {
+    LookAhead::Memory memory = ahead_->memory();
+    if (!renew_rows(memory.way.end, memory.advances)) return;
+    memory.way.degree = 0;
+    memory.way.multipliers.clear();
+    ahead_->put_back(std::move(memory));
+}
+
+bool Simulation::renew_rows(State& state, std::int64_t steps) {
     /// MultibodySystem::renew_rows() does nothing in other steps, as long as nothing has drifted further.
     constexpr std::int64_t every = 10;
     constexpr double drifted = 1e-4;
     MultibodySystem& mechanics = *system_->system;
     const std::int32_t held = joint_ ? joint_->rows_saved() : 0;
-    if (mechanics.m() + held == mechanics.constraint_rows() || (now_.step % every != 0 && record_.drift < drifted))
-        return;
-    if (joint_ ? !joint_->renew_rows(state, now_.step) : !mechanics.renew_rows(state, now_.step)) return;
+    if (mechanics.m() + held == mechanics.constraint_rows() || (steps % every != 0 && record_.drift < drifted))
+        return false;
+    if (joint_ ? !joint_->renew_rows(state, steps) : !mechanics.renew_rows(state, steps)) return false;
     const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
     make_method();
     if (control_) control_->load(control);
+    return true;
 }
 
 bool Simulation::finished() const {
@@ -199,7 +222,9 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     report.h = step.h;
     if (sleeping_) sleeping_->begin_step(report.h);
     record_.parts = 1;
-    if (control_) {
+    if (ahead_) {
+        advance_ahead(state, step.end, report.step);
+    } else if (control_) {
         advance_within_error(state, step.end, report.step);
     } else {
         try {
@@ -210,6 +235,33 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     }
     state.t = step.end;
     if (sleeping_) sleeping_->end_step(now_.state, state);
+}
+
+void Simulation::advance_ahead(State& state, double end, StepReport& report) {
+    report.clear();
+    std::int64_t parts = 0;
+    while (!ahead_->reaches(end)) {
+        AdaptiveStepReport part =
+            ahead_->advance(end, bodies_at(ahead_->front(), next_bodies_), *timestepper_, *control_, *solver_);
+        system_->system->follow(bodies_at(ahead_->front(), next_bodies_));
+        if (!ahead_->cut_by_corner()) ++parts;
+        part.step.follow(report);
+        std::swap(report, part.step);
+    }
+    record_.parts = std::max<std::int64_t>(parts, 1);
+    try {
+        ahead_->show(end, state, *solver_, report);
+    } catch (const StepFailure&) {
+        // As where a step leaps over a place at which constraints lose rank: then one ends here.
+        state = now_.state;
+        timestepper_->restart();
+        control_->set_largest(system_->step);
+        advance_within_error(state, end, report);
+        state.t = end;
+        ahead_->begin(state);
+        system_->system->follow(bodies_at(state, next_bodies_));
+    }
+    report.multipliers.clear();
 }
 
 void Simulation::advance_within_error(State& state, double end, StepReport& report) {
@@ -293,25 +345,44 @@ const StepRecord& Simulation::step() {
     const auto where = [&] {
         return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
     };
+    notice_changes();
+    const bool advances = ahead_ && !ahead_->reaches(fixed_step(now_.state.t, system_->end, system_->step).end);
     State next = now_.state;
     try {
-        renew_rows(next);
+        if (advances) {
+            renew_rows_ahead();
+        } else if (!ahead_) {
+            renew_rows(next, now_.step);
+        }
     } catch (const StepFailure& error) {
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
     }
-    const std::vector<double> memory = timestepper_->save();
+    // Where the state is only read off, the method stays as it is.
+    const bool only_shows = ahead_ && !advances;
+    const std::vector<double> memory = only_shows ? std::vector<double>{} : timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
-    const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
+    const std::vector<double> control = control_ && !only_shows ? control_->save() : std::vector<double>{};
+    std::optional<LookAhead::Memory> ahead;
+    std::vector<double> turns;
+    if (advances) {
+        ahead = ahead_->memory();
+        ahead_->count_advance();
+        turns = system_->system->turns(bodies_at(ahead_->front(), next_bodies_));
+    }
     AdaptiveStepReport& taken = next_report_;
     SimulationTotals judged = now_.totals;
     const StepRecord last = record_;
     solver_->reset_effort();
     const auto undo = [&] {
         record_ = last;
+        if (only_shows) return;
         timestepper_->restart();
         timestepper_->load(memory);
         if (sleeping_) sleeping_->load(sleeping);
         if (control_) control_->load(control);
+        if (!ahead) return;
+        ahead_->put_back(std::move(*ahead));
+        system_->system->set_turns(bodies_at(ahead_->front(), next_bodies_), turns);
     };
     try {
         advance(next, taken, memory);
@@ -337,7 +408,7 @@ const StepRecord& Simulation::step() {
     const std::string place = where();
     now_.state = std::move(next);
     std::swap(bodies_, next_bodies_);
-    system_->system->follow(state());
+    if (!ahead_) system_->system->follow(state());
     now_.totals = std::move(judged);
     ++now_.step;
 
@@ -380,8 +451,8 @@ const StepRecord& Simulation::step() {
 
 std::vector<double> Simulation::multipliers() const {
     MultibodySystem& mechanics = *system_->system;
-    const std::vector<double>& kept = report().multipliers;
     if (record_.h == 0.0) return {};
+    const std::vector<double> kept = ahead_ ? ahead_->multipliers(coordinates(), *solver_) : report().multipliers;
     std::vector<double> all = mechanics.all_multipliers(kept);
     if (!joint_) return all;
     std::vector<double> force(static_cast<std::size_t>(mechanics.n()), 0.0);
@@ -497,6 +568,7 @@ SimulationState Simulation::save() const {
     result.turns = mechanics.turns(state());
     result.memory = timestepper_->save();
     if (control_) result.control = control_->save();
+    if (ahead_) result.ahead = ahead_->save();
     if (sleeping_) result.sleeping = sleeping_->save();
     return result;
 }
@@ -522,12 +594,18 @@ void Simulation::load(SimulationState state) {
     make_method();
     timestepper_->load(state.memory);
     if (control_) control_->load(state.control);
+    if (ahead_ && state.ahead.empty()) ahead_->begin(state.state);
+    if (ahead_ && !state.ahead.empty()) {
+        ahead_->load(state.ahead);
+        system_->system->follow(bodies_at(ahead_->front(), next_bodies_));
+    }
     if (sleeping_) sleeping_->load(state.sleeping);
     now_ = std::move(state);
     now_.turns.clear();
     now_.memory.clear();
     now_.rows_left_out.clear();
     now_.control.clear();
+    now_.ahead.clear();
     now_.sleeping.clear();
     record_ = {};
     report_ = {};
