@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <deque>
 #include <functional>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -132,8 +133,13 @@ struct StepSolver::Implementation {
     /// Whether the velocities without reactions vanish in rounding, so that no reactions are the answer: what recovers
     /// a penetration at constant speed is such a case. Errors relative to them say nothing. solution: that answer then.
     static bool moves_freely(const PreparedProblem& part, Solution& solution);
+    /// Whether the velocities without reactions move the rows by no more than their own rounding, so that no reactions
+    /// are the answer. solution: that answer then.
+    static bool rows_feel_nothing(const PreparedProblem& part, Solution& solution);
     /// Whether x = 0 without reactions is the answer, but for numbers too small to be squared.
     static bool is_at_rest(const Problem& problem);
+    /// Whether no reactions are within all bounds.
+    static bool hold_zero(std::span<const Cone> cones);
     /// Whether the rows hold as well as rounding lets them. A body that is pushed along at a constant speed needs next
     /// to no reaction: errors are relative to it, and the speed's own rounding is large beside it.
     static bool rows_are_rounding(const Errors& error) {
@@ -329,6 +335,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         solution.lambda.clear();
         return;
     }
+    if (leaves_out && rows_feel_nothing(prepared, solution)) return;
     Instance& by = instance(kind, number);
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
@@ -380,11 +387,39 @@ bool StepSolver::Implementation::is_at_rest(const Problem& problem) {
     const auto vanish = [](const std::vector<double>& values) {
         return std::all_of(values.begin(), values.end(), [](double value) { return std::abs(value) < nothing; });
     };
-    const auto hold_zero = [](const Cone& cone) {
-        return std::all_of(cone.lo.begin(), cone.lo.end(), [](double bound) { return bound <= 0.0; }) &&
-               std::all_of(cone.hi.begin(), cone.hi.end(), [](double bound) { return bound >= 0.0; });
-    };
-    return vanish(problem.a) && vanish(problem.b) && std::all_of(problem.cones.begin(), problem.cones.end(), hold_zero);
+    return vanish(problem.a) && vanish(problem.b) && hold_zero(problem.cones);
+}
+
+bool StepSolver::Implementation::hold_zero(std::span<const Cone> cones) {
+    return std::ranges::all_of(cones, [](const Cone& cone) {
+        return std::ranges::all_of(cone.lo, [](double bound) { return bound <= 0.0; }) &&
+               std::ranges::all_of(cone.hi, [](double bound) { return bound >= 0.0; });
+    });
+}
+
+// A mechanism that falls freely does not move its rows, whether they are joints or contacts between its bodies. What D
+// x
+// + b is then comes from the rounding of x = H⁻¹ a, and errors relative to it say nothing. |S D x| ≤ √m ‖x‖_H, and
+// ‖x‖_H = √(aᵀx): rows that move by less than 10⁻¹² of that are still. The diagonal of H tells most others apart.
+bool StepSolver::Implementation::rows_feel_nothing(const PreparedProblem& part, Solution& solution) {
+    constexpr double rounding = 1e-12, suspicious = 1e-9;
+    const Structure structure = part.structure();
+    if (structure != Structure::Diagonal && structure != Structure::Blocks && structure != Structure::Definite)
+        return false;
+    const Problem& problem = part.problem();
+    const double moved = part.meter().reference(), rows = std::sqrt(problem.m());
+    double energy = 0.0;
+    for (std::int32_t i = 0; i < problem.H.rows; ++i)
+        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
+            if (problem.H.column[e] == i) energy += problem.a[i] * problem.a[i] / problem.H.value[e];
+    if (!(moved <= suspicious * rows * std::sqrt(energy)) || !hold_zero(problem.cones)) return false;
+    Solution free;
+    free.lambda.assign(static_cast<std::size_t>(problem.m()), 0.0);
+    part.meter().velocity_of(free.lambda, free.x);
+    const double twice_energy = std::inner_product(free.x.begin(), free.x.end(), problem.a.begin(), 0.0);
+    if (!(moved <= rounding * rows * std::sqrt(std::max(twice_energy, 0.0)))) return false;
+    solution = std::move(free);
+    return true;
 }
 
 bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solution& solution) {

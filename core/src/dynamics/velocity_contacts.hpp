@@ -69,6 +69,9 @@ public:
     /// The least gap that the block may have at the end of the step: 0, or less where it penetrated at the beginning.
     [[nodiscard]] double least_gap(std::uint64_t key) const;
 
+    /// Whether something penetrated at the beginning of the step, beyond the resolution of gaps.
+    [[nodiscard]] bool begins_deep() const { return deepest_ < -gap_resolution_; }
+
     /// The impulses kept from step to step, for checkpoints.
     void append_to(std::vector<double>& memory) const { kept_.append_to(memory); }
     void load(std::span<const double> memory) { kept_.load(memory); }
