@@ -63,6 +63,7 @@ public:
     }
 
     [[nodiscard]] int order() const override { return 2; }
+    void choose_steps(double tolerance) override { limit_ = tolerance; }
 
     void restart() override {
         multipliers_.clear();
@@ -252,13 +253,15 @@ private:
     // ---- Flight ----
 
     AdaptiveStepping& control(double h) {
-        constexpr double smallest = 1e-6;
+        constexpr double smallest = 1e-6, largest = 1e6;
         if (!control_) {
             control_step_ = h;
-            control_ = std::make_unique<AdaptiveStepping>(
-                system_, *flight_,
-                StepControl{
-                    .absolute = limit_, .initial = h, .smallest = smallest * h, .largest = h, .finds_impacts = false});
+            control_ = std::make_unique<AdaptiveStepping>(system_, *flight_,
+                                                          StepControl{.absolute = limit_,
+                                                                      .initial = h,
+                                                                      .smallest = smallest * h,
+                                                                      .largest = largest * h,
+                                                                      .finds_impacts = false});
         }
         return *control_;
     }

@@ -270,6 +270,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         } catch (const StepFailure& error) {
             if (smallest) throw;
             failure = error.what();
+            impacts_ = std::max(impacts_ - 2.0, 0.0);  // steps for impacts get shorter as well
             proposed = 0.25 * h;
             shrunk = true;
             ++report_.rejected;
