@@ -133,6 +133,8 @@ struct StepSolver::Implementation {
     /// Whether the velocities without reactions vanish in rounding, so that no reactions are the answer: what recovers
     /// a penetration at constant speed is such a case. Errors relative to them say nothing. solution: that answer then.
     static bool moves_freely(const PreparedProblem& part, Solution& solution);
+    /// How fast the velocities without reactions move the rows, as a share of the motion as a whole, about.
+    static double share_of_rows(const PreparedProblem& part);
     /// Whether the velocities without reactions move the rows by no more than their own rounding, so that no reactions
     /// are the answer. solution: that answer then.
     static bool rows_feel_nothing(const PreparedProblem& part, Solution& solution);
@@ -335,12 +337,20 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         solution.lambda.clear();
         return;
     }
-    if (leaves_out && rows_feel_nothing(prepared, solution)) return;
+    constexpr double suspicious = 1e-5, rounding_of_motion = 1e-13;
+    const double share = share_of_rows(prepared);
+    if (leaves_out && share < suspicious && rows_feel_nothing(prepared, solution)) return;
     Instance& by = instance(kind, number);
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
     set_tolerance(prepared, columns, part_settings);
+    if (share < suspicious) {
+        const double least = rounding_of_motion / share;
+        part_settings.tolerance = std::max(part_settings.tolerance, least);
+        if (part_settings.needed > 0.0) part_settings.needed = std::max(part_settings.needed, least);
+        if (part_settings.usable > 0.0) part_settings.usable = std::max(part_settings.usable, least);
+    }
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
     if (may_repeat && part_settings.warm_start) by.before = solution;
@@ -399,25 +409,30 @@ bool StepSolver::Implementation::hold_zero(std::span<const Cone> cones) {
 
 // A mechanism that falls freely does not move its rows, whether they are joints or contacts between its bodies. What D
 // x
-// + b is then comes from the rounding of x = H⁻¹ a, and errors relative to it say nothing. |S D x| ≤ √m ‖x‖_H, and
-// ‖x‖_H = √(aᵀx): rows that move by less than 10⁻¹² of that are still. The diagonal of H tells most others apart.
+// + b is then comes from the rounding of x = H⁻¹ a, and errors relative to it say nothing. |S D x| ≤ √m ‖x‖_H with
+// ‖x‖_H = √(aᵀx), of which √(aᵀ diag(H)⁻¹ a) is a first guess. Rows that move by less than 10⁻¹² of that are still.
+double StepSolver::Implementation::share_of_rows(const PreparedProblem& part) {
+    const Problem& problem = part.problem();
+    double twice_energy = 0.0;
+    for (std::int32_t i = 0; i < problem.H.rows; ++i)
+        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
+            if (problem.H.column[e] == i && problem.H.value[e] > 0.0)
+                twice_energy += problem.a[i] * problem.a[i] / problem.H.value[e];
+    return twice_energy > 0.0 ? part.meter().reference() / std::sqrt(problem.m() * twice_energy) : 1.0;
+}
+
 bool StepSolver::Implementation::rows_feel_nothing(const PreparedProblem& part, Solution& solution) {
-    constexpr double rounding = 1e-12, suspicious = 1e-9;
+    constexpr double rounding = 1e-12;
+    const Problem& problem = part.problem();
     const Structure structure = part.structure();
     if (structure != Structure::Diagonal && structure != Structure::Blocks && structure != Structure::Definite)
         return false;
-    const Problem& problem = part.problem();
-    const double moved = part.meter().reference(), rows = std::sqrt(problem.m());
-    double energy = 0.0;
-    for (std::int32_t i = 0; i < problem.H.rows; ++i)
-        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
-            if (problem.H.column[e] == i) energy += problem.a[i] * problem.a[i] / problem.H.value[e];
-    if (!(moved <= suspicious * rows * std::sqrt(energy)) || !hold_zero(problem.cones)) return false;
+    if (!hold_zero(problem.cones)) return false;
     Solution free;
     free.lambda.assign(static_cast<std::size_t>(problem.m()), 0.0);
     part.meter().velocity_of(free.lambda, free.x);
     const double twice_energy = std::inner_product(free.x.begin(), free.x.end(), problem.a.begin(), 0.0);
-    if (!(moved <= rounding * rows * std::sqrt(std::max(twice_energy, 0.0)))) return false;
+    if (!(part.meter().reference() <= rounding * std::sqrt(problem.m() * std::max(twice_energy, 0.0)))) return false;
     solution = std::move(free);
     return true;
 }
