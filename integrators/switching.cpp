@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "delassus/adaptive_stepping.hpp"
@@ -50,8 +49,10 @@ public:
         : system_(system),
           flight_name_(values[0].text),
           limit_(values[1].real),
-          contact_(system, contact_settings(system, values)),
-          inelastic_(system, without_restitution(contact_settings(system, values))),
+          contact_(system, ThetaSettings{.name = "switching",
+                                         .iterations = static_cast<int>(values[2].integer),
+                                         .contacts = velocity_contact_settings(system, values[3], values[4]),
+                                         .linearization_limit = values[5].real}),
           resolution_(system.gap_resolution()),
           fall_(system.free_fall()) {
         const auto& table = timesteppers();
@@ -139,54 +140,10 @@ private:
 
     // ---- Contact ----
 
-    static ThetaSettings contact_settings(const DynamicalSystem& system, const std::vector<OptionValue>& values) {
-        return {.name = "switching",
-                .theta = 0.5,
-                .iterations = static_cast<int>(values[2].integer),
-                .contacts = velocity_contact_settings(system, values[3], values[4]),
-                .linearization_limit = values[5].real};
-    }
-    static ThetaSettings without_restitution(ThetaSettings settings) {
-        settings.contacts.restitution_speed = std::numeric_limits<double>::infinity();
-        return settings;
-    }
-
-    [[nodiscard]] double kinetic_energy(const State& state) {
-        momentum_.assign(state.v.size(), 0.0);
-        system_.multiply_mass(state, 1.0, state.v.data(), momentum_.data());
-        return 0.5 * std::inner_product(state.v.begin(), state.v.end(), momentum_.begin(), 0.0);
-    }
-
-    // Newton's law of impact may ask for what a mechanism between several contacts and stops cannot do, or for an
-    // energy that nothing supplies (Kane and Levinson 1985, Dynamics, section 5.8). Then nothing bounces.
-    void take_contact(double h, StepSolver& solver) {
-        constexpr double rounding = 1e-6;
-        const State begin = now_;
-        const bool impact = h <= impact_share * h_;
-        try {
-            contact_.step(now_, h, solver, part_);
-            if (!impact || kinetic_energy(now_) <= (1.0 + rounding) * kinetic_energy(begin)) return;
-        } catch (const StepTooLong&) {
-            contact_.restart();
-            inelastic_.restart();
-            try {
-                inelastic_.step(now_ = begin, h, solver, part_);
-            } catch (const StepTooLong&) {
-                now_ = begin;
-            }
-            if (now_.t > begin.t) return;
-            throw;
-        }
-        contact_.restart();
-        inelastic_.restart();
-        now_ = begin;
-        inelastic_.step(now_, h, solver, part_);
-    }
-
     /// A step of the contact method.
     void touch(double h, StepSolver& solver, StepReport& report) {
         const double end = h == end_ - now_.t ? end_ : now_.t + h;
-        take_contact(h, solver);
+        contact_.step(now_, h, solver, part_);
         now_.t = end;
         pushed_.clear();
         for (const auto& [key, force] : part_.reactions)
@@ -394,7 +351,7 @@ private:
     std::string flight_name_;
     double limit_;
     std::unique_ptr<Timestepper> flight_;
-    ThetaMethod contact_, inelastic_;
+    ThetaMethod contact_;
     double resolution_, fall_;
     std::unique_ptr<AdaptiveStepping> control_;  // of flights; made in the first one
     double control_step_ = 0.0;                  // the step for which it was made
@@ -406,7 +363,6 @@ private:
     std::vector<std::uint64_t> deep_;  // keys of gaps that are below 0 where a flight begins; ascending
     std::vector<Acted> acted_;
     StepReport part_;
-    std::vector<double> momentum_;
     // The last look:
     UnilateralRows rows_;
     State seen_;
