@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "delassus/adaptive_stepping.hpp"
@@ -70,13 +71,14 @@ public:
         contact_.restart();
         control_.reset();
         pushed_.clear();
+        longest_ = std::numeric_limits<double>::infinity();
         seen_known_ = false;
     }
 
-    // The step of the control, and what it keeps; how many numbers the flight keeps, and these; how many blocks pushed,
-    // and their keys; what the contact method keeps.
+    // The longest step of contact; the step of the control, and what it keeps; how many numbers the flight keeps, and
+    // these; how many blocks pushed, and their keys; what the contact method keeps.
     [[nodiscard]] std::vector<double> save() const override {
-        std::vector<double> memory = {control_ ? control_step_ : 0.0};
+        std::vector<double> memory = {std::isfinite(longest_) ? longest_ : 0.0, control_ ? control_step_ : 0.0};
         const auto append = [&](const std::vector<double>& values) {
             memory.insert(memory.end(), values.begin(), values.end());
         };
@@ -100,6 +102,7 @@ public:
             const auto taken = take_from(rest, static_cast<std::size_t>(count), "switching");
             return std::vector<double>(taken.begin(), taken.end());
         };
+        if (const double longest = take(1)[0]; longest > 0.0) longest_ = longest;
         if (const double step = take(1)[0]; step > 0.0) {
             control(step);
             control_->load(take(3));
@@ -140,11 +143,63 @@ private:
 
     // ---- Contact ----
 
-    /// A step of the contact method.
-    void touch(double h, StepSolver& solver, StepReport& report) {
-        const double end = h == end_ - now_.t ? end_ : now_.t + h;
-        contact_.step(now_, h, solver, part_);
-        now_.t = end;
+    // The midpoint rule and the trapezoidal rule differ by h³ v‴/12 · ½, and the first errs by half as much. It is
+    // compared with the velocities in the norm of the mass, for accelerations without contacts.
+    /// By what factor a step of contact from `begin` to `end` errs more than it may; 0 where the system does not know
+    /// its accelerations.
+    [[nodiscard]] double error_of_contact(const State& begin, const State& end) {
+        constexpr double most = 1e-3;
+        const double h = end.t - begin.t;
+        trial_ = begin;
+        trial_.t += 0.5 * h;
+        for (std::size_t i = 0; i < trial_.v.size(); ++i) trial_.v[i] = 0.5 * (begin.v[i] + end.v[i]);
+        change_.assign(trial_.v.begin(), trial_.v.end());
+        for (double& entry : change_) entry *= 0.5 * h;
+        system_.increment(begin.q.data(), change_.data(), trial_.q.data());
+        std::fill(change_.begin(), change_.end(), 0.0);
+        acceleration_.resize(change_.size());
+        for (const auto& [state, factor] : {std::pair(&begin, 0.5), {&end, 0.5}, {&std::as_const(trial_), -1.0}}) {
+            if (!system_.accelerate(*state, acceleration_.data())) return 0.0;
+            for (std::size_t i = 0; i < change_.size(); ++i) change_[i] += h * factor * acceleration_[i];
+        }
+        const double moving = std::max(energy_norm(trial_, begin.v), energy_norm(trial_, end.v));
+        return moving > 0.0 ? energy_norm(trial_, change_) / (most * moving) : 0.0;
+    }
+
+    [[nodiscard]] double energy_norm(const State& at, const std::vector<double>& v) {
+        acceleration_.assign(v.size(), 0.0);
+        system_.multiply_mass(at, 1.0, v.data(), acceleration_.data());
+        return std::sqrt(std::max(std::inner_product(v.begin(), v.end(), acceleration_.begin(), 0.0), 0.0));
+    }
+
+    /// now_ ← after a step of the contact method, which may be as short as its error wants it. Its size.
+    double take_contact(double h, StepSolver& solver) {
+        constexpr double shortest = 1.0 / 64.0, most_growth = 2.0;
+        const double least = shortest * h_;
+        double tried = longest_ < h ? h / std::ceil(h / longest_) : h;
+        while (true) {
+            State next = now_;
+            const std::vector<double> memory = contact_.save();
+            contact_.step(next, tried, solver, part_);
+            const double error = error_of_contact(now_, next);
+            if (!(error > 1.0) || tried <= least) {
+                const double wanted = tried * std::min(most_growth, 0.9 / std::sqrt(std::max(error, 1e-6)));
+                longest_ = wanted < h_ ? std::max(wanted, least) : std::numeric_limits<double>::infinity();
+                std::swap(now_, next);
+                return tried;
+            }
+            contact_.restart();
+            contact_.load(memory);
+            longest_ = std::max(tried * std::max(0.9 / std::sqrt(error), 0.25), least);
+            tried = tried / std::ceil(tried / longest_);
+        }
+    }
+
+    /// A step of the contact method of at most this size.
+    void touch(double longest, StepSolver& solver, StepReport& report) {
+        const double rest = end_ - now_.t, begin = now_.t;
+        const double h = take_contact(longest, solver);
+        now_.t = h == rest ? end_ : begin + h;
         pushed_.clear();
         for (const auto& [key, force] : part_.reactions)
             if (force[0] > 0.0) pushed_.push_back(key);
@@ -356,6 +411,7 @@ private:
     std::unique_ptr<AdaptiveStepping> control_;  // of flights; made in the first one
     double control_step_ = 0.0;                  // the step for which it was made
     std::vector<std::uint64_t> pushed_;  // keys of what pushed in the last step of the contact method; ascending
+    double longest_ = std::numeric_limits<double>::infinity();  // step of contact, s
     // Of the step that is taken:
     double h_ = 0.0, end_ = 0.0;
     int impacts_ = 0;
@@ -363,6 +419,8 @@ private:
     std::vector<std::uint64_t> deep_;  // keys of gaps that are below 0 where a flight begins; ascending
     std::vector<Acted> acted_;
     StepReport part_;
+    State trial_;
+    std::vector<double> change_, acceleration_;
     // The last look:
     UnilateralRows rows_;
     State seen_;
