@@ -81,7 +81,7 @@ bool PositionProjection::assemble(const State& end, double h, const VelocityCont
 
 /// E of the gaps, behind rows without one.
 void PositionProjection::make_compliant() {
-    constexpr double share = 1e-3;
+    constexpr double share = 1e-3, least = 1e-6;
     SparseMatrix& E = problem_.E;
     const SparseMatrix& D = problem_.D;
     E.rows = E.columns = D.rows;
@@ -89,6 +89,7 @@ void PositionProjection::make_compliant() {
     E.column.clear();
     E.value.clear();
     diagonal_of(problem_.H, diagonal_);
+    const double floor = least / *std::max_element(diagonal_.begin(), diagonal_.end());
     for (std::int32_t row = m_; row < D.rows; ++row) {
         double mobility = 0.0;
         for (auto e = D.row_start[static_cast<std::size_t>(row)]; e < D.row_start[static_cast<std::size_t>(row) + 1];
@@ -97,7 +98,7 @@ void PositionProjection::make_compliant() {
             mobility += D.value[entry] * D.value[entry] / diagonal_[static_cast<std::size_t>(D.column[entry])];
         }
         E.column.push_back(row);
-        E.value.push_back(share * mobility);
+        E.value.push_back(std::max(share * mobility, floor));
         E.row_start.push_back(static_cast<std::int32_t>(E.value.size()));
     }
 }
