@@ -242,25 +242,40 @@ TEST_F(Touching, WhatJointsHoldTogetherStaysTogether) {
     EXPECT_LE(totals.growth, 1e-2 * totals.potential_drop);
 }
 
-// Newton's law with friction asks an arm nearly jammed between the ground and its links for more energy than it had.
+// Newton's law with friction asks links that are nearly jammed between two contacts for more energy than they have:
+// after 0.13 s sixteen times as much as all that can move. The scene was found by trying mechanisms at random.
 TEST_F(Touching, ImpactsGainNoEnergy) {
-    auto run = run_of(
-        "step: 0.00517\nend: 1.03\n" + material(0.8, 0.7) + "bodies:\n" + ground +
-        "- {name: b0, density: 500, position: [0, 0, 0.42], shapes: [{box: {size: [0.12, 0.09, 0.07]}, material: m}]}\n"
-        "- {name: b1, density: 2000, position: [0.11, 0.04, 0.31], shapes: [{sphere: {radius: 0.05}, material: m}]}\n"
-        "- {name: b2, density: 8000, position: [0.19, -0.05, 0.36], shapes: [{capsule: {radius: 0.04, length: 0.1}, "
-        "material: m}]}\n"
-        "- {name: b3, density: 500, position: [0.26, 0.02, 0.28], shapes: [{box: {size: [0.1, 0.1, 0.05]}, material: "
-        "m}]}\n"
-        "joints:\n- {name: j1, kind: universal, first: b0, second: b1, point: [0.06, 0.02, 0.37], axis: [1, 0, 0], "
-        "second_axis: [0, 1, 0]}\n"
-        "- {name: j2, kind: revolute, first: b1, second: b2, point: [0.15, 0, 0.33], axis: [0.3, -0.8, 1.2], lower: "
-        "-0.5, upper: 0.5}\n"
-        "- {name: j3, kind: cylindrical, first: b2, second: b3, point: [0.22, -0.02, 0.32], axis: [0.8, -0.7, 0.1]}\n");
-    double highest = run.simulation.totals().start_energy;
-    while (!run.simulation.finished()) highest = std::max(highest, run.simulation.step().energy);
+    auto run = run_of(R"(step: 0.00517
+end: 0.5
+materials: {m: {friction: 0.8, restitution: 0.7}}
+bodies:
+- {name: floor, fixed: true, shapes: [{plane: {}, material: m}]}
+- {name: b0, density: 8000, position: [0.000000, 0.000000, 0.495092], velocity: [0.0000, 0.0000, 0.0000], shapes: [{capsule: {radius: 0.0369, length: 0.1055}, material: m}]}
+- {name: b1, density: 500, position: [0.037455, -0.005344, 0.247972], velocity: [0.0000, 0.0000, 0.0000], shapes: [{capsule: {radius: 0.0467, length: 0.1334}, material: m}]}
+- {name: b2, density: 8000, position: [0.217397, 0.114228, 0.448289], velocity: [0.0000, 0.0000, 0.0000], shapes: [{capsule: {radius: 0.0491, length: 0.1403}, material: m}]}
+- {name: b3, density: 8000, position: [0.036253, -0.008174, 0.327026], velocity: [0.0000, 0.0000, 0.0000], shapes: [{box: {size: [0.0742, 0.0557, 0.0445]}, material: m}]}
+- {name: b4, density: 8000, position: [-0.117546, -0.193462, 0.192416], velocity: [0.0000, 0.0000, 0.0000], shapes: [{box: {size: [0.0692, 0.0519, 0.0415]}, material: m}]}
+- {name: b5, density: 8000, position: [-0.019425, 0.086013, 0.102240], velocity: [0.0000, 0.0000, 0.0000], shapes: [{sphere: {radius: 0.0496}, material: m}]}
+- {name: b6, density: 2000, position: [0.135925, -0.103381, 0.386197], velocity: [0.0000, 0.0000, 0.0000], shapes: [{box: {size: [0.1378, 0.1034, 0.0827]}, material: m}]}
+- {name: b7, density: 8000, position: [-0.167706, 0.095540, 0.081696], velocity: [0.0000, 0.0000, 0.0000], shapes: [{sphere: {radius: 0.0582}, material: m}]}
+joints:
+- {name: j0, kind: spherical, first: world, second: b0, point: [0.000000000, 0.000000000, 0.595092157], axis: [1.571779370, -0.372468025, -0.912449729]}
+- {name: j1, kind: revolute, first: b0, second: b1, point: [0.018727512, -0.002671950, 0.371531884], axis: [1.377792131, 0.598989042, -0.505740509]}
+- {name: j2, kind: cylindrical, first: b0, second: b2, point: [0.108698630, 0.057113759, 0.471690741], axis: [0.586865096, -1.799608307, 0.671684800]}
+- {name: j3, kind: revolute, first: b2, second: b3, point: [0.126825200, 0.053026809, 0.387657857], axis: [0.485014956, 0.870524384, -0.473275412], lower: -0.5, upper: 0.5}
+- {name: j4, kind: prismatic, first: b1, second: b4, point: [-0.040045375, -0.099402866, 0.220193938], axis: [0.194976540, 0.320980110, -1.535060537], spring: {stiffness: 200}}
+- {name: j5, kind: revolute, first: b3, second: b5, point: [0.008413913, 0.038919368, 0.214633322], axis: [1.467821882, 1.651062266, -1.446619797], lower: -0.5, upper: 0.5}
+- {name: j6, kind: universal, first: b3, second: b6, point: [0.086089114, -0.055777334, 0.356611667], axis: [0.053225389, -0.284434671, -1.692613535], second_axis: [-0.447114024, 1.802113399, -0.316895344]}
+- {name: j7, kind: revolute, first: b5, second: b7, point: [-0.093565686, 0.090776401, 0.091968372], axis: [1.691607483, -0.817176601, 1.974822961]}
+)");
+    EXPECT_EQ(run.simulation.system().integrator, "switching");
+    while (!run.simulation.finished()) {
+        const double before = run.simulation.record().energy, given = run.simulation.totals().recovered;
+        const StepRecord& record = run.simulation.step();
+        const double scale = record.kinetic + run.simulation.totals().potential_drop;
+        EXPECT_LE(record.energy, before + run.simulation.totals().recovered - given + 0.02 * scale) << record.t;
+    }
     const auto& totals = run.simulation.totals();
-    EXPECT_LE(highest, totals.start_energy + 1e-3 * totals.potential_drop + totals.recovered);
     EXPECT_EQ(totals.unsolved_steps, 0);
     EXPECT_GT(totals.most_contacts, 1);
 }
