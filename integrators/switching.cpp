@@ -144,7 +144,8 @@ private:
     // ---- Contact ----
 
     // The midpoint rule and the trapezoidal rule differ by h³ v‴/12 · ½, and the first errs by half as much. It is
-    // compared with the velocities in the norm of the mass, for accelerations without contacts.
+    // compared with the velocities, or with what accelerations give in the step, in the norm of the mass; accelerations
+    // are those without contacts.
     /// By what factor a step of contact from `begin` to `end` errs more than it may; 0 where the system does not know
     /// its accelerations.
     [[nodiscard]] double error_of_contact(const State& begin, const State& end) {
@@ -160,9 +161,12 @@ private:
         acceleration_.resize(change_.size());
         for (const auto& [state, factor] : {std::pair(&begin, 0.5), {&end, 0.5}, {&std::as_const(trial_), -1.0}}) {
             if (!system_.accelerate(*state, acceleration_.data())) return 0.0;
-            for (std::size_t i = 0; i < change_.size(); ++i) change_[i] += h * factor * acceleration_[i];
+            given_.assign(acceleration_.begin(), acceleration_.end());
+            for (double& entry : given_) entry *= h;
+            for (std::size_t i = 0; i < change_.size(); ++i) change_[i] += factor * given_[i];
         }
-        const double moving = std::max(energy_norm(trial_, begin.v), energy_norm(trial_, end.v));
+        const double moving =
+            std::max({energy_norm(trial_, begin.v), energy_norm(trial_, end.v), energy_norm(trial_, given_)});
         return moving > 0.0 ? energy_norm(trial_, change_) / (most * moving) : 0.0;
     }
 
@@ -420,7 +424,7 @@ private:
     std::vector<Acted> acted_;
     StepReport part_;
     State trial_;
-    std::vector<double> change_, acceleration_;
+    std::vector<double> change_, given_, acceleration_;
     // The last look:
     UnilateralRows rows_;
     State seen_;

@@ -28,8 +28,9 @@ constexpr double most_explicit_rate = 50.0;
 constexpr double most_explicit_rate_of_elements = 1.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
-/// A damping that flights take in explicit parts leaves contacts of order 2 nothing to vibrate.
-constexpr double most_damping_beside_contacts = most_explicit_rate;
+/// Beside contacts, where the flights between them are taken in explicit parts and contacts in parts by their error
+/// (measured on servos of an arm).
+constexpr double most_motion_beside_contacts = 10.0, most_damping_beside_contacts = most_explicit_rate;
 /// m and rad.
 constexpr const char* error_limit = "1e-4";
 
@@ -186,9 +187,10 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         system.method_reason = "bodies may touch, and most of these have no joints";
         return;
     }
-    const bool switches = touching && !system.control && !always_acts(system);
+    const bool switches = touching && !system.control, flies = switches && !always_acts(system);
     const std::string stiff =
-        why_stiff(system, {most_rate_of_order_2, switches ? most_damping_beside_contacts : most_rate_of_order_2});
+        why_stiff(system, flies ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
+                                : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2});
     if (!stiff.empty()) {
         system.method_reason = stiff;
         return;
@@ -198,12 +200,10 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         system.integrator = "moreau_jean";
         system.method_reason =
             "nothing can touch, joints have stops, dry friction or forces with limits, and no force is stiff";
-    } else if (!switches) {
-        system.integrator = "moreau_jean";
-        system.method_reason = "bodies with joints may touch, and no force is stiff";
     } else {
-        system.integrator = "switching";
-        system.method_reason = "bodies with joints may touch but do not all the time, and no force is stiff";
+        system.integrator = switches ? "switching" : "moreau_jean";
+        system.method_reason = "bodies with joints may touch, and no force is stiff";
+        if (!switches) return;
         system.integrator_options.insert_or_assign("error_limit", error_limit);
     }
 }
