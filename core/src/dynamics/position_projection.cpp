@@ -110,8 +110,11 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     problem_.name = "position";
     problem_.law = Law::Associated;
     problem_.H = H;
-    problem_.E = {};
-    if (contacts.begins_deep()) make_compliant();
+    if (contacts.begins_deep()) {
+        make_compliant();
+    } else if (problem_.E.rows > 0) {
+        problem_.E = {};
+    }
     problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.lambda.assign(problem_.b.size(), 0.0);
