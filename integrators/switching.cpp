@@ -42,8 +42,9 @@ namespace {
 // closed. With its speed a Newton step gives the time, and a step of the flight from the beginning of the part the
 // state there; a bracket keeps Newton's iteration safe where gaps have corners. It ends on the open side, with a gap
 // within its resolution. Parts are no longer than 1.02 times what the first gap needs to close at the speeds of their
-// beginning, so that shapes are not passed through. What closes and opens again within a part is not seen: at most
-// a r²/8 deep at the relative acceleration a.
+// beginning, and no coordinate goes further than half a unit (rad or m), as what is ahead is looked for along straight
+// lines: so shapes are not passed through. What closes and opens again within a part is not seen: at most a r²/8 deep
+// at the relative acceleration a.
 class Switching : public Timestepper {
 public:
     Switching(DynamicalSystem& system, const std::vector<OptionValue>& values)
@@ -326,13 +327,15 @@ private:
 
     /// A part of a flight from now_, and the impact in which it ends, if there is one.
     void fly(StepSolver& solver, StepReport& report) {
-        constexpr double beyond = 1.02, shortest = 1.0 / 64.0;
+        constexpr double beyond = 1.02, turn = 0.5, shortest = 1.0 / 64.0;
         deep_.clear();
         for_each_gap([&](const UnilateralRows::Block& block, double gap) {
             if (gap < -resolution_) deep_.push_back(block.key);
         });
         std::sort(deep_.begin(), deep_.end());
-        const double reach = std::max(beyond * time_to_closing(), shortest * h_);
+        double fastest = 0.0;
+        for (const double speed : now_.v) fastest = std::max(fastest, std::abs(speed));
+        const double reach = std::max(std::min(beyond * time_to_closing(), turn / fastest), shortest * h_);
         State next = now_;
         AdaptiveStepReport taken;
         try {

@@ -205,6 +205,24 @@ TEST_F(Touching, ADoorAndABallDoNotDependOnTheStep) {
         for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(coarse[body][i], fine[body][i], 1e-6);
 }
 
+// The end of an arm goes round by up to two metres a step and stops at a plate of 5 mm, a radius before it.
+TEST_F(Touching, NothingPassesThroughAThinPlate) {
+    for (const double rate : {17.3, 57.3, 103.7, 211.3})
+        for (const double step : {0.003, 0.0071, 0.01}) {
+            auto run = run_of(fmt::format(
+                "step: {}\nend: 0.2\ngravity: [0, 0, 0]\nmaterials: {{m: {{}}}}\nbodies:\n"
+                "- {{name: plate, fixed: true, position: [0, 1, 0], shapes: [{{box: {{size: [0.005, 0.4, 0.4]}}, "
+                "material: m}}]}}\n"
+                "- {{name: tip, mass: 1, position: [1, 0, 0], velocity: [0, {}, 0], angular_velocity: [0, 0, {}], "
+                "shapes: [{{sphere: {{radius: 0.02}}, material: m}}]}}\n"
+                "joints: [{{name: h, kind: revolute, second: tip, point: [0, 0, 0], axis: [0, 0, 1]}}]\n",
+                step, rate, rate));
+            run.finish();
+            EXPECT_NEAR(run.pose("tip").position[0], 0.0225, 1e-9) << rate << ' ' << step;
+            EXPECT_NEAR(run.velocities("tip")[0][0], 0.0, 1e-9);
+        }
+}
+
 // ---- Robustness ----
 
 // Links that lie in the ground by their radius rise at the recovery speed, and nothing flies off.
