@@ -95,7 +95,8 @@ INSTANTIATE_TEST_SUITE_P(Methods, Memory,
                                          Method{"generalized_alpha", {{"reuse", "adaptive"}}},
                                          Method{"generalized_alpha", {{"reuse", "modified"}}},
                                          Method{"moreau_jean", {}}, Method{"nonsmooth_generalized_alpha", {}},
-                                         Method{"linearly_implicit_trapezoidal", {}}),
+                                         Method{"linearly_implicit_trapezoidal", {}}, Method{"switching", {}},
+                                         Method{"switching", {{"flight", "radau_iia"}}}),
                          [](const auto& chosen) { return testing::PrintToString(chosen.param); });
 
 TEST(MemoryErrors, AMemoryThatDoesNotFitIsRefused) {
@@ -127,7 +128,7 @@ TEST(Refusals, ExplicitEulerTakesNoConstraints) {
     const std::string others =
         " takes no constraints; the system has 1 rows of them. Can: dormand_prince, euler_implicit, "
         "euler_implicit_linearized, generalized_alpha, hht, linearly_implicit_trapezoidal, moreau_jean, newmark, "
-        "nonsmooth_generalized_alpha, radau_iia, rk4, trapezoidal, "
+        "nonsmooth_generalized_alpha, radau_iia, rk4, switching, trapezoidal, "
         "trapezoidal_linearized";
     expect_refusal("euler_explicit", pendulum, {}, "euler_explicit" + others);
 }
@@ -142,7 +143,8 @@ TEST(Refusals, OthersTakeNoContacts) {
             info.name, system, {},
             info.name +
                 " takes no contacts, stops, dry friction of joints or force limits, which the system has. Can: "
-                "euler_implicit_linearized, linearly_implicit_trapezoidal, moreau_jean, nonsmooth_generalized_alpha");
+                "euler_implicit_linearized, linearly_implicit_trapezoidal, moreau_jean, nonsmooth_generalized_alpha, "
+                "switching");
     }
 }
 

@@ -74,6 +74,29 @@ TEST_F(StepSolverTest, SolvesUnsymmetricProblemsWithoutRowsOfAnySize) {
     }
 }
 
+// Two bodies that a damper couples and a joint holds together fall freely. The joint holds at the speeds of the step
+// before as well, which are the start: they are no answer, for they do not balance.
+TEST_F(StepSolverTest, LetsAMechanismFall) {
+    constexpr double h = 0.004, g = 9.81;
+    Problem problem;
+    problem.H = SparseMatrix::from_triplets(2, 2, {{0, 0, 2.1}, {0, 1, -0.1}, {1, 0, -0.1}, {1, 1, 3.1}});
+    problem.a = {2.0 * -h * g, 3.0 * -h * g};
+    for (const bool contact : {false, true}) {
+        problem.D = SparseMatrix::from_triplets(1, 2, {{0, 0, -1.0}, {0, 1, 1.0}});
+        problem.b = {0.0};
+        problem.cones = {contact ? Cone::nonnegative(1) : Cone::free(1)};
+        for (const double rounding : {0.0, 1e-17, -1e-17}) {
+            problem.b = {rounding};
+            StepSolver solver(registry, {});
+            Solution solution{{0.0, 0.0}, {0.0}};
+            EXPECT_TRUE(solver.solve(problem, solution, true));
+            EXPECT_NEAR(solution.x[0], -h * g, 1e-15);
+            EXPECT_NEAR(solution.x[1], -h * g, 1e-15);
+            EXPECT_NEAR(solution.lambda[0], 0.0, 1e-15);
+        }
+    }
+}
+
 TEST_F(StepSolverTest, CallsNoPluginWithoutRows) {
     StepSolver solver(registry, {});
     Problem problem;

@@ -14,11 +14,12 @@ namespace delassus {
 
 /// What a step's size may be, and the error that chooses it (docs/integrators.md, "Steps by tolerance").
 struct StepControl {
-    double absolute = 1e-4;  ///< in units of positions, as a rule m and rad; > 0
-    double relative = 0.0;   ///< of the way that a coordinate goes in a unit of time; ≥ 0
-    double initial = 1e-4;   ///< first step to try, as a rule s; > 0
-    double smallest = 1e-7;  ///< > 0. A smooth step below it fails; impacts closer together are not told apart
-    double largest = 0.1;    ///< ≥ initial
+    double absolute = 1e-4;     ///< in units of positions, as a rule m and rad; > 0
+    double relative = 0.0;      ///< of the way that a coordinate goes in a unit of time; ≥ 0
+    double initial = 1e-4;      ///< first step to try, as a rule s; > 0
+    double smallest = 1e-7;     ///< > 0. A smooth step below it fails; impacts closer together are not told apart
+    double largest = 0.1;       ///< ≥ initial
+    bool finds_impacts = true;  ///< false: contacts and stops are somebody else's, as if the system had none
 };
 
 /// What a step with a chosen size did.
@@ -91,6 +92,7 @@ private:
     StepControl control_;
     std::string advice_;
     bool extrapolates_, embedded_;
+    bool unilateral_;  // contacts and stops count
     double common_ = std::numeric_limits<double>::infinity();
     double next_;
     double last_error_ = 1.0;

@@ -57,6 +57,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
       advice_(std::move(advice)),
       extrapolates_(stepper.damps_at_once() && system.m() == 0),
       embedded_(stepper.has_embedded_error()),
+      unilateral_(control.finds_impacts && system.has_unilateral()),
       next_(control.initial) {
     const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
     if (!positive(control.absolute) || !(control.relative >= 0.0) || !std::isfinite(control.relative))
@@ -180,7 +181,7 @@ double AdaptiveStepping::time_to_closing(const Trial& trial) {
 }
 
 double AdaptiveStepping::impact_in(const Trial& trial, double h) {
-    if (!system_.has_unilateral()) return std::numeric_limits<double>::infinity();
+    if (!unilateral_) return std::numeric_limits<double>::infinity();
     if (trial.first.impact_speed > control_.absolute) return trial.first.impact_time;
     if (trial.second.impact_speed > control_.absolute) return 0.5 * h + trial.second.impact_time;
     if (trial.whole.impact_speed > control_.absolute) return trial.whole.impact_time;
@@ -251,7 +252,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
             throw StepFailure(
                 fmt::format("the step fell below {:.3g} at t = {:.9g}; {}", control_.smallest, state.t, failure));
         };
-        if (smallest && !system_.has_unilateral()) fell_below();
+        if (smallest && !unilateral_) fell_below();
         const double tried = std::max(proposed, control_.smallest), remaining = end - state.t;
         double h = remaining <= (1.0 + rounding_of_step) * tried ? remaining
                    : remaining < 2.0 * tried                     ? 0.5 * remaining
@@ -271,6 +272,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         } catch (const StepFailure& error) {
             if (smallest) throw;
             failure = error.what();
+            impacts_ = std::max(impacts_ - 2.0, 0.0);  // steps for impacts get shorter as well
             proposed = 0.25 * h;
             shrunk = true;
             ++report_.rejected;

@@ -8,6 +8,11 @@
 // which Gear, Gupta and Leimkuhler's is the one without contacts. H contains the stiffness, so that elastic bodies move
 // as a whole. What is solved for is the speed x/h. g_least bounds how fast a penetration is undone that the step began
 // with. The energy that it gives is −f·x.
+//
+// A mechanism may start with bodies that overlap and that its joints do not let apart: then no x is there. And where
+// they let them apart by a long way only, that way is no answer either. So where a step begins with a penetration its
+// gaps are compliant, g + D_n x + E ν ≥ g_least with E = 10⁻³ D_n diag(H)⁻¹ D_nᵀ by rows: what can be undone is, but
+// for a thousandth of a part, and what cannot stays.
 #include "dynamics/position_projection.hpp"
 
 #include <fmt/format.h>
@@ -74,6 +79,30 @@ bool PositionProjection::assemble(const State& end, double h, const VelocityCont
     return problem_.b.size() > m || off > resolution_;
 }
 
+/// E of the gaps, behind rows without one.
+void PositionProjection::make_compliant() {
+    constexpr double share = 1e-3, least = 1e-6;
+    SparseMatrix& E = problem_.E;
+    const SparseMatrix& D = problem_.D;
+    E.rows = E.columns = D.rows;
+    E.row_start.assign(static_cast<std::size_t>(m_) + 1, 0);
+    E.column.clear();
+    E.value.clear();
+    diagonal_of(problem_.H, diagonal_);
+    const double floor = least / *std::max_element(diagonal_.begin(), diagonal_.end());
+    for (std::int32_t row = m_; row < D.rows; ++row) {
+        double mobility = 0.0;
+        for (auto e = D.row_start[static_cast<std::size_t>(row)]; e < D.row_start[static_cast<std::size_t>(row) + 1];
+             ++e) {
+            const auto entry = static_cast<std::size_t>(e);
+            mobility += D.value[entry] * D.value[entry] / diagonal_[static_cast<std::size_t>(D.column[entry])];
+        }
+        E.column.push_back(row);
+        E.value.push_back(std::max(share * mobility, floor));
+        E.row_start.push_back(static_cast<std::int32_t>(E.value.size()));
+    }
+}
+
 void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
                                  const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
                                  std::string_view method) {
@@ -81,6 +110,11 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     problem_.name = "position";
     problem_.law = Law::Associated;
     problem_.H = H;
+    if (contacts.begins_deep()) {
+        make_compliant();
+    } else if (problem_.E.rows > 0) {
+        problem_.E = {};
+    }
     problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.lambda.assign(problem_.b.size(), 0.0);

@@ -27,6 +27,7 @@ public:
 
 private:
     [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+    void make_compliant();
     void require_nearer(const State& begin, const State& end, double h, std::string_view method);
 
     DynamicalSystem& system_;
@@ -37,7 +38,7 @@ private:
     MatrixAssembler D_;
     Problem problem_;
     Solution solution_;
-    std::vector<double> constraint_, delta_, force_;
+    std::vector<double> constraint_, delta_, force_, diagonal_;
 };
 
 }  // namespace delassus

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <deque>
 #include <functional>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -120,14 +121,24 @@ struct StepSolver::Implementation {
     /// Whether the velocities without reactions vanish in rounding, so that no reactions are the answer: what recovers
     /// a penetration at constant speed is such a case. Errors relative to them say nothing. solution: that answer then.
     static bool moves_freely(const PreparedProblem& part, Solution& solution);
+    /// How fast the velocities without reactions move the rows, as a share of the motion as a whole, about.
+    static double share_of_rows(const PreparedProblem& part);
+    /// Whether the velocities without reactions move the rows by no more than their own rounding, so that no reactions
+    /// are the answer. solution: that answer then.
+    static bool rows_feel_nothing(const PreparedProblem& part, Solution& solution);
     /// Whether x = 0 without reactions is the answer, but for numbers too small to be squared.
     static bool is_at_rest(const Problem& problem);
-    /// Whether the answer is as near as rounding lets it be. A body that is pushed along at a constant speed needs next
+    /// Whether no reactions are within all bounds.
+    static bool hold_zero(std::span<const Cone> cones);
+    /// Whether the rows hold as well as rounding lets them. A body that is pushed along at a constant speed needs next
     /// to no reaction: errors are relative to it, and the speed's own rounding is large beside it.
-    static bool is_rounding(const Errors& error) {
+    static bool rows_are_rounding(const Errors& error) {
         constexpr double slack = 32.0;
-        return error.natural <= slack * error.rounding && error.balance <= slack * error.rounding;
+        return error.natural <= slack * error.rounding;
     }
+    /// The same of an answer that also balances. That error is relative to the momenta, whatever the reactions are: a
+    /// mechanism that falls freely has rows that hold at the speeds of the step before, too.
+    static bool is_rounding(const Errors& error) { return rows_are_rounding(error) && error.balance <= rounding_limit; }
 
     /// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
     static constexpr double rounding_limit = 1e-8;
@@ -314,11 +325,20 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         solution.lambda.clear();
         return;
     }
+    constexpr double suspicious = 1e-5, rounding_of_motion = 1e-13;
+    const double share = share_of_rows(prepared);
+    if (leaves_out && share < suspicious && rows_feel_nothing(prepared, solution)) return;
     Instance& by = instance(kind, number);
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
     set_tolerance(prepared, columns, part_settings);
+    if (share < suspicious) {
+        const double least = rounding_of_motion / share;
+        part_settings.tolerance = std::max(part_settings.tolerance, least);
+        if (part_settings.needed > 0.0) part_settings.needed = std::max(part_settings.needed, least);
+        if (part_settings.usable > 0.0) part_settings.usable = std::max(part_settings.usable, least);
+    }
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
     if (may_repeat && part_settings.warm_start) by.before = solution;
@@ -365,11 +385,44 @@ bool StepSolver::Implementation::is_at_rest(const Problem& problem) {
     const auto vanish = [](const std::vector<double>& values) {
         return std::all_of(values.begin(), values.end(), [](double value) { return std::abs(value) < nothing; });
     };
-    const auto hold_zero = [](const Cone& cone) {
-        return std::all_of(cone.lo.begin(), cone.lo.end(), [](double bound) { return bound <= 0.0; }) &&
-               std::all_of(cone.hi.begin(), cone.hi.end(), [](double bound) { return bound >= 0.0; });
-    };
-    return vanish(problem.a) && vanish(problem.b) && std::all_of(problem.cones.begin(), problem.cones.end(), hold_zero);
+    return vanish(problem.a) && vanish(problem.b) && hold_zero(problem.cones);
+}
+
+bool StepSolver::Implementation::hold_zero(std::span<const Cone> cones) {
+    return std::ranges::all_of(cones, [](const Cone& cone) {
+        return std::ranges::all_of(cone.lo, [](double bound) { return bound <= 0.0; }) &&
+               std::ranges::all_of(cone.hi, [](double bound) { return bound >= 0.0; });
+    });
+}
+
+// A mechanism that falls freely does not move its rows, whether they are joints or contacts between its bodies. What D
+// x
+// + b is then comes from the rounding of x = H⁻¹ a, and errors relative to it say nothing. |S D x| ≤ √m ‖x‖_H with
+// ‖x‖_H = √(aᵀx), of which √(aᵀ diag(H)⁻¹ a) is a first guess. Rows that move by less than 10⁻¹² of that are still.
+double StepSolver::Implementation::share_of_rows(const PreparedProblem& part) {
+    const Problem& problem = part.problem();
+    double twice_energy = 0.0;
+    for (std::int32_t i = 0; i < problem.H.rows; ++i)
+        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
+            if (problem.H.column[e] == i && problem.H.value[e] > 0.0)
+                twice_energy += problem.a[i] * problem.a[i] / problem.H.value[e];
+    return twice_energy > 0.0 ? part.meter().reference() / std::sqrt(problem.m() * twice_energy) : 1.0;
+}
+
+bool StepSolver::Implementation::rows_feel_nothing(const PreparedProblem& part, Solution& solution) {
+    constexpr double rounding = 1e-12;
+    const Problem& problem = part.problem();
+    const Structure structure = part.structure();
+    if (structure != Structure::Diagonal && structure != Structure::Blocks && structure != Structure::Definite)
+        return false;
+    if (!hold_zero(problem.cones)) return false;
+    Solution free;
+    free.lambda.assign(static_cast<std::size_t>(problem.m()), 0.0);
+    part.meter().velocity_of(free.lambda, free.x);
+    const double twice_energy = std::inner_product(free.x.begin(), free.x.end(), problem.a.begin(), 0.0);
+    if (!(part.meter().reference() <= rounding * std::sqrt(problem.m() * std::max(twice_energy, 0.0)))) return false;
+    solution = std::move(free);
+    return true;
 }
 
 bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solution& solution) {
@@ -386,7 +439,7 @@ bool StepSolver::Implementation::moves_freely(const PreparedProblem& part, Solut
     part.meter().velocity_of(free.lambda, free.x);
     const Errors error = part.meter().measure(free.x, free.lambda);
     constexpr double no_digits = 1e-3;  // of rounding: what is measured has three digits at most
-    if (!(error.rounding > no_digits && is_rounding(error))) return false;
+    if (!(error.rounding > no_digits && rows_are_rounding(error))) return false;
     solution = std::move(free);
     return true;
 }

@@ -51,6 +51,7 @@ private:
     void set_constraint_rows(const State& begin, double h);
     void impulse_of_forces(double h);
     void set_b_of_contacts(int iteration, const StepSolver& solver);
+    [[nodiscard]] bool contacts_gain(const State& begin);
     void scale();
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);

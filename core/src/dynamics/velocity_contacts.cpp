@@ -63,6 +63,14 @@ namespace delassus {
 // (dynamics/theta_method.cpp has the same for constraints). u⁻ counts up to that size; more of it is a contact that
 // closes, and b = 0.
 //
+// ---- Energy ----
+//
+// What contacts do in a step is P·u_θ. For θ = ½ a contact that bounces has P_n (u⁻ + u⁺)/2 ≤ 0, and so have all
+// without friction. With friction Newton's law may ask for an impulse that gains energy (Kane and Levinson 1985,
+// Dynamics, section 5.8), without a bound where a mechanism is nearly jammed between contacts; and rows that turn far
+// in a step are not those of its end. A step whose contacts gain more than a hundredth of the kinetic energy is solved
+// again without restitution and with D̄ for both sides: then u⁺ = 0 where P_n > 0.
+//
 // ---- Friction ----
 //
 // The associated law on the level of velocities would lift a sliding contact at the speed μ |u_t| in each step. So
@@ -393,6 +401,37 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
         if (impulse[0] <= share_of_momentum * scale || contact.change <= share * opening)
             std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
     }
+}
+
+double VelocityContacts::work(const Problem& problem, const Solution& solution, std::span<const double> mean) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        if (!contact.along_normal) continue;
+        for (std::size_t row = contact.row; row < contact.row + static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
+             ++row) {
+            const double impulse = solution.lambda[first_row_ + row];
+            if (impulse == 0.0) continue;
+            const auto row_of_problem = static_cast<std::int32_t>(first_row_ + row);
+            sum += impulse * (problem.D.row_times(row_of_problem, mean.data()) + rows_.rows()[row].rate);
+        }
+    }
+    return sum;
+}
+
+bool VelocityContacts::only_take() {
+    bool changed = false;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[k];
+        if (!contact.along_normal) continue;
+        changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
+        contact.turns = contact.bounces = false;
+        contact.moved = contact.wanted = 0.0;
+        contact.sliding = -1.0;
+        const double gap = contact.gap - std::clamp(contact.gap, -gap_resolution_, gap_resolution_);
+        contact.normal = gap > 0.0 ? std::max(gap - (1.0 - theta_) * h_ * contact.approach, 0.0) / (theta_ * h_) : 0.0;
+    }
+    return changed;
 }
 
 void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,

@@ -63,11 +63,20 @@ public:
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
+    /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n. solution: of the whole problem.
+    [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
+    /// For the rest of the step nothing bounces, and rows stay as they are in the middle of it: such contacts take
+    /// energy only. Whether that changes anything.
+    bool only_take();
+
     /// result += D_Aᵀ P of what pushed steadily: not of impacts. P: impulses, `lambda` of the whole problem; n.
     void add_steady_impulse(const Problem& problem, const std::vector<double>& lambda, double* result) const;
 
     /// The least gap that the block may have at the end of the step: 0, or less where it penetrated at the beginning.
     [[nodiscard]] double least_gap(std::uint64_t key) const;
+
+    /// Whether something penetrated at the beginning of the step, beyond the resolution of gaps.
+    [[nodiscard]] bool begins_deep() const { return deepest_ < -gap_resolution_; }
 
     /// The impulses kept from step to step, for checkpoints.
     void append_to(std::vector<double>& memory) const { kept_.append_to(memory); }

@@ -89,9 +89,14 @@ struct JointCoordinates::Implementation {
             loaded.pop_back();
             const Link& link = tree.links()[k];
             const LinkMotion& motion = tree.motion(k);
-            for (std::int32_t j = link.freedoms; j-- > 0;)
-                entries.push_back({link.column + j, motion.angular.col(j).dot(wrench.angular) +
-                                                        motion.linear.col(j).dot(wrench.linear)});
+            for (std::int32_t j = link.freedoms; j-- > 0;) {
+                const double entry =
+                    motion.angular.col(j).dot(wrench.angular) + motion.linear.col(j).dot(wrench.linear);
+                // What a joint does not move by more than rounding it does not move: a row of rounding has no answer.
+                const double size = motion.angular.col(j).norm() * wrench.angular.norm() +
+                                    motion.linear.col(j).norm() * wrench.linear.norm();
+                entries.push_back({link.column + j, std::abs(entry) <= rounding * size ? 0.0 : entry});
+            }
             if (link.parent == 0) continue;
             const auto parent = static_cast<std::size_t>(link.parent);
             const mechanics::Spatial moved{wrench.angular + motion.d.cross(wrench.linear), wrench.linear};

@@ -13,7 +13,7 @@ namespace {
 
 // ---- Which method pays ----
 //
-// Where nothing can touch, motions are smooth, and methods of order 5 take them for the price of a few implicit steps
+// Where nothing touches, motions are smooth, and methods of order 5 take them for the price of a few implicit steps
 // of order 1 with errors smaller by orders. An explicit one pays as long as its steps are limited by accuracy. Its
 // stability limit is h ω ≈ 1 to 3 for the fastest motion ω, and a step beyond it is divided, so that h ω says into how
 // many parts. Beyond that an implicit one does, whose steps cost some fifteen explicit parts. With joints the
@@ -28,6 +28,9 @@ constexpr double most_explicit_rate = 50.0;
 constexpr double most_explicit_rate_of_elements = 1.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
+/// Beside contacts, where the flights between them are taken in explicit parts and contacts in parts by their error
+/// (measured on servos of an arm).
+constexpr double most_motion_beside_contacts = 10.0, most_damping_beside_contacts = most_explicit_rate;
 /// m and rad.
 constexpr const char* error_limit = "1e-4";
 
@@ -52,8 +55,14 @@ public:
         M_.compute(assembled(n_, n_, [&](MatrixAssembler& target) { mechanics_.add_mass(start_, 1.0, target); }));
     }
 
-    /// The fastest that stiffness, damping and spins make, 1/s.
-    [[nodiscard]] double fastest() const {
+    /// The fastest that stiffness and spins make, and that damping does, 1/s.
+    struct Fastest {
+        double motion, damping;
+        [[nodiscard]] bool within(const Fastest& limits, double step) const {
+            return motion * step <= limits.motion && damping * step <= limits.damping;
+        }
+    };
+    [[nodiscard]] Fastest fastest() const {
         const auto radius = [&](auto add) {
             return spectral_radius(assembled(
                 n_, n_, [&](MatrixAssembler& target) { (mechanics_.*add)(start_, 1.0, Tangent::Symmetric, target); }));
@@ -62,8 +71,8 @@ public:
         for (BodyIndex body = 0; body < mechanics_.body_count(); ++body)
             if (const auto column = mechanics_.body_column(body); column >= 0)
                 spin = std::max(spin, Eigen::Map<const Eigen::Vector3d>(start_.v.data() + column + 3).norm());
-        return std::max(
-            {std::sqrt(radius(&MultibodySystem::add_stiffness)), radius(&MultibodySystem::add_damping), spin});
+        return {std::max(std::sqrt(radius(&MultibodySystem::add_stiffness)), spin),
+                radius(&MultibodySystem::add_damping)};
     }
 
     /// From now on velocities are those that joints allow, if that can be found out. Rows that repeat each other make
@@ -122,20 +131,81 @@ std::string why_default(const SceneSystem& system) {
     if (system.sleeping) return "bodies may sleep";
     if (mechanics.n() == 0) return "nothing moves";
     if (!mechanics.cables().empty()) return "it has cables, which go slack";
-    if (mechanics.detects_contacts()) return "bodies may touch";
     return {};
 }
 
-/// How fast forces are, for a method that takes h ω up to `most`; empty: it takes them.
-std::string why_stiff(const SceneSystem& system, double most) {
+/// Whether something acts in a joint at any time, whatever its coordinate is: dry friction, or a force with a limit.
+bool always_acts(const SceneSystem& system) {
+    const auto rubs = [](const JointParameters& joint) {
+        return joint.slide.friction > 0.0 || joint.turn.friction > 0.0;
+    };
+    const auto limited = [](double limit) { return std::isfinite(limit); };
+    return std::ranges::any_of(system.joints, rubs) ||
+           std::ranges::any_of(system.motors, limited, &MotorParameters::force_limit) ||
+           std::ranges::any_of(system.actuators, limited, &ActuatorParameters::force_limit);
+}
+
+/// Whether of the moving bodies that may touch more than half are held by no joint.
+bool mostly_without_joints(const SceneSystem& system) {
+    std::vector<char> held(system.bodies.size(), 0), touches(system.bodies.size(), 0);
+    for (const JointParameters& joint : system.joints)
+        for (const BodyIndex body : {joint.first, joint.second})
+            if (body != world_body) held[static_cast<std::size_t>(body)] = 1;
+    for (const Shape& shape : system.system->shapes())
+        if (shape.body != world_body && system.system->body_column(shape.body) >= 0)
+            touches[static_cast<std::size_t>(shape.body)] = 1;
+    std::size_t alone = 0, all = 0;
+    for (std::size_t body = 0; body < held.size(); ++body)
+        if (touches[body]) {
+            ++all;
+            if (!held[body]) ++alone;
+        }
+    return 2 * alone > all;
+}
+
+/// How fast forces are, for a method that takes h ω up to these limits; empty: it takes them.
+std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
     // A tolerance chooses its steps; these are as long as its users take them.
     const double step = system.control ? std::min(system.control->largest, 0.01) : system.step;
     Rates rates(*system.system);
-    if (rates.fastest() * step <= most) return {};
+    if (rates.fastest().within(most, step)) return {};
     if (system.system->m() > 0) rates.hold_joints();
-    const double rate = rates.fastest();
-    if (rate * step <= most) return {};
+    const Rates::Fastest found = rates.fastest();
+    if (found.within(most, step)) return {};
+    const double rate = std::max(found.motion, found.damping);
     return fmt::format("forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
+}
+
+/// For a system with contacts, stops or forces with limits.
+void choose_with_unilateral(SceneSystem& system, bool in_joints) {
+    const bool touching = system.system->detects_contacts();
+    if (!in_joints || (system.control && !touching)) {
+        system.method_reason = touching ? "bodies may touch" : "joints have stops, dry friction or forces with limits";
+        return;
+    }
+    if (touching && mostly_without_joints(system)) {
+        system.method_reason = "bodies may touch, and most of these have no joints";
+        return;
+    }
+    const bool switches = touching && !system.control, flies = switches && !always_acts(system);
+    const std::string stiff =
+        why_stiff(system, flies ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
+                                : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2});
+    if (!stiff.empty()) {
+        system.method_reason = stiff;
+        return;
+    }
+    system.coordinates = Coordinates::Joint;
+    if (!touching) {
+        system.integrator = "moreau_jean";
+        system.method_reason =
+            "nothing can touch, joints have stops, dry friction or forces with limits, and no force is stiff";
+    } else {
+        system.integrator = switches ? "switching" : "moreau_jean";
+        system.method_reason = "bodies with joints may touch, and no force is stiff";
+        if (!switches) return;
+        system.integrator_options.insert_or_assign("error_limit", error_limit);
+    }
 }
 
 }  // namespace
@@ -150,25 +220,13 @@ void choose_method(SceneSystem& system) {
                            system.system->node_count() == 0 && !system.system->has_consistent_mass() &&
                            std::any_of(system.joints.begin(), system.joints.end(),
                                        [&](const JointParameters& joint) { return can_be_in_a_tree(system, joint); });
-    const bool unilateral = system.system->has_unilateral();
-    if (unilateral && (!in_joints || system.control)) {
-        system.method_reason = "joints have stops, dry friction or forces with limits";
+    if (system.system->has_unilateral()) {
+        choose_with_unilateral(system, in_joints);
         return;
     }
-    const std::string stiff = why_stiff(system, unilateral                        ? most_rate_of_order_2
-                                                : system.system->node_count() > 0 ? most_explicit_rate_of_elements
-                                                                                  : most_explicit_rate);
-    if (unilateral && !stiff.empty()) {
-        system.method_reason = stiff;
-        return;
-    }
+    const double most = system.system->node_count() > 0 ? most_explicit_rate_of_elements : most_explicit_rate;
+    const std::string stiff = why_stiff(system, {most, most});
     if (in_joints) system.coordinates = Coordinates::Joint;
-    if (unilateral) {
-        system.integrator = "moreau_jean";
-        system.method_reason =
-            "nothing can touch, joints have stops, dry friction or forces with limits, and no force is stiff";
-        return;
-    }
     system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";
     system.method_reason = "nothing can touch, and " + (stiff.empty() ? "no force is stiff" : stiff);
     if (!system.control) system.integrator_options.insert_or_assign("error_limit", error_limit);
