@@ -33,23 +33,7 @@ PartMeter::PartMeter(const PreparedPart::Implementation& part) : part_(part) {
     std::int32_t largest = 0;
     for (const auto& cone : part_.cones) largest = std::max(largest, cone.rows);
     work_.resize(3 * static_cast<std::size_t>(largest));
-    // |diag H| with the mean of the others for a zero, where H⁻¹ does not exist.
-    if (part_.stands_in()) {
-        magnitude_.assign(static_cast<std::size_t>(part_.problem.n()), 0.0);
-        std::vector<double> sums = {0.0, 0.0};
-        for (std::int64_t i = 0; i < part_.problem.n(); ++i) {
-            double& own = magnitude_[static_cast<std::size_t>(i)];
-            for_entries(part_.problem.H, i, [&](std::int64_t j, double value) {
-                if (j == part_.raw.column_start[part_.raw.process] + i) own = std::abs(value);
-            });
-            sums[0] += own;
-            sums[1] += own > 0.0 ? 1.0 : 0.0;
-        }
-        part_.communicator->sum(sums);
-        const double mean = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
-        for (double& own : magnitude_)
-            if (!(own > 0.0)) own = mean;
-    }
+    if (part_.stands_in()) magnitude_ = part_.magnitude_of_diagonal();
     set_scaling(diagonal_of_N());
     renew();
 }
@@ -118,6 +102,49 @@ void PartMeter::add_squares_of_rows(std::vector<double>& diagonal) const {
     }
 }
 
+// Blocks of rows of D are right-hand sides: each process has of each row what lies in its columns, solves with the
+// others, and multiplies what it has of the solution by what it has of the row.
+void PartMeter::add_squares_by_solves(std::vector<double>& diagonal) const {
+    const auto& problem = part_.problem;
+    const Communicator& run = *part_.communicator;
+    const auto rank = static_cast<std::size_t>(run.rank()), processes = static_cast<std::size_t>(run.size());
+    const auto n = static_cast<std::size_t>(problem.n());
+    struct Entry {
+        std::int64_t row, column;
+        double value;
+    };
+    constexpr std::int64_t largest_block = 8 << 20;  // entries of the right-hand sides on one process
+    const std::int64_t at_once =
+        std::clamp<std::int64_t>(largest_block / std::max<std::int64_t>(1, part_.largest(problem.n())), 1, 128);
+    const std::int64_t first_own = problem.row_start[rank], first_column = problem.column_start[rank];
+    std::vector<double> right, solved, sums;
+    for (std::int64_t first = 0; first < problem.m_all(); first += at_once) {
+        const std::int64_t last = std::min(first + at_once, problem.m_all());
+        const auto count = static_cast<std::size_t>(last - first);
+        std::vector<std::vector<Entry>> leaving(processes);
+        for (std::int64_t row = std::max(first, first_own); row < std::min(last, first_own + problem.m()); ++row)
+            for_entries(problem.D, row - first_own, [&](std::int64_t j, double value) {
+                leaving[part_.columns.owner(j)].push_back({row - first, j, value});
+            });
+        std::vector<Bytes> to(processes);
+        for (std::size_t p = 0; p < processes; ++p) put(to[p], leaving[p]);
+        right.assign(n * count, 0.0);
+        for (const Bytes& bytes : run.exchange(to))
+            for (const Entry& entry : ByteReader(bytes).next<Entry>()) {
+                const auto i = static_cast<std::size_t>(entry.column - first_column);
+                right[static_cast<std::size_t>(entry.row) * n + i] = part_.C[i] * entry.value;
+            }
+        solved = right;
+        part_.factors->apply(solved.data(), static_cast<std::int32_t>(count));
+        sums.assign(count, 0.0);
+        for (std::size_t k = 0; k < count; ++k)
+            for (std::size_t i = 0; i < n; ++i) sums[k] += right[k * n + i] * solved[k * n + i];
+        run.sum(sums);
+        for (std::int64_t row = std::max(first, first_own); row < std::min(last, first_own + problem.m()); ++row)
+            diagonal[static_cast<std::size_t>(row - first_own)] += sums[static_cast<std::size_t>(row - first)];
+    }
+}
+
 std::vector<double> PartMeter::diagonal_of_N() const {
     const auto& problem = part_.problem;
     std::vector<double> diagonal(static_cast<std::size_t>(problem.m()), 0.0);
@@ -129,7 +156,7 @@ std::vector<double> PartMeter::diagonal_of_N() const {
                 diagonal[static_cast<std::size_t>(row)] += value * value / h[part_.columns.place(j)];
             });
     } else if (part_.structure != Structure::Reduced) {
-        add_squares_of_rows(diagonal);
+        part_.coupled ? add_squares_by_solves(diagonal) : add_squares_of_rows(diagonal);
     }
     const std::int64_t first = problem.row_start[static_cast<std::size_t>(part_.communicator->rank())];
     if (part_.compliant)
@@ -166,9 +193,7 @@ void PartMeter::renew() {
     if (part_.stands_in()) {
         for (std::size_t i = 0; i < n; ++i) v[i] /= magnitude_[i];
     } else if (part_.structure != Structure::Reduced) {
-        sdk::Vector own = sdk::VectorView(v.data(), problem.n());
-        part_.inverse->apply(own);
-        std::copy(own.begin(), own.end(), v.begin());
+        part_.apply_inverse(v);
     }
     part_.columns.fetch(*part_.communicator, v);
     std::vector<double> sums = {0.0, 0.0};
@@ -257,7 +282,7 @@ Errors PartMeter::measure(const double* x, const double* lambda) {
 
 double PartMeter::natural(const double* x, const double* lambda) {
     const auto& problem = part_.problem;
-    sdk::Vector own;
+    std::vector<double> own;
     if (!x && part_.structure != Structure::Reduced) {
         if (part_.stands_in()) return std::numeric_limits<double>::quiet_NaN();
         impulse_.assign(part_.columns.size(), 0.0);
@@ -265,8 +290,9 @@ double PartMeter::natural(const double* x, const double* lambda) {
             for_entries(problem.D, row,
                         [&](std::int64_t j, double value) { impulse_[part_.columns.place(j)] += value * lambda[row]; });
         part_.columns.add(*part_.communicator, impulse_);
-        own = sdk::VectorView(impulse_.data(), problem.n()) + sdk::VectorView(problem.a.data(), problem.n());
-        part_.inverse->apply(own);
+        own = problem.a;
+        for (std::size_t i = 0; i < own.size(); ++i) own[i] += impulse_[i];
+        part_.apply_inverse(own);
         x = own.data();
     }
     take_x(x);

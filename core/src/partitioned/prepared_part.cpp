@@ -13,6 +13,7 @@
 #include "problem/need_of.hpp"
 #include "problem/symmetry.hpp"
 #include "support/finite.hpp"
+#include "support/module.hpp"
 
 namespace delassus {
 
@@ -119,6 +120,8 @@ PreparedPart::PreparedPart(std::shared_ptr<const Communicator> communicator, Par
     self.derive_needs();
     self.identify();
 }
+
+CoupledInverse::~CoupledInverse() = default;
 
 PreparedPart::~PreparedPart() = default;
 PreparedPart::PreparedPart(PreparedPart&&) noexcept = default;
@@ -303,7 +306,7 @@ void PreparedPart::Implementation::detect_structure() {
         structure = Structure::Unsymmetric;
         return;
     }
-    if (coupled) throw InputError("H couples columns of different processes; its errors cannot be measured yet");
+    if (coupled) return factorize_coupled();
     together(*communicator, [&] {
         H = own_square(problem.H, problem.column_start[static_cast<std::size_t>(communicator->rank())]);
         blocks = connected_components(H);
@@ -335,6 +338,68 @@ void PreparedPart::Implementation::detect_structure() {
     std::int64_t negative = 0;
     together(*communicator, [&] { negative = structure_of_singular(H, blocks) == Structure::Indefinite ? 1 : 0; });
     structure = largest(negative) > 0 ? Structure::Indefinite : Structure::Semidefinite;
+}
+
+std::vector<double> PreparedPart::Implementation::magnitude_of_diagonal() const {
+    std::vector<double> magnitude(static_cast<std::size_t>(problem.n()), 0.0);
+    const std::int64_t first = problem.column_start[static_cast<std::size_t>(communicator->rank())];
+    std::array<double, 2> sums = {0.0, 0.0};
+    for (std::size_t i = 0; i < magnitude.size(); ++i) {
+        for (auto k = static_cast<std::size_t>(problem.H.row_start[i]);
+             k < static_cast<std::size_t>(problem.H.row_start[i + 1]); ++k)
+            if (problem.H.column[k] == first + static_cast<std::int64_t>(i))
+                magnitude[i] = std::abs(problem.H.value[k]);
+        sums[0] += magnitude[i];
+        sums[1] += magnitude[i] > 0.0 ? 1.0 : 0.0;
+    }
+    communicator->sum(sums);
+    const double mean = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
+    for (double& one : magnitude)
+        if (!(one > 0.0)) one = mean;
+    return magnitude;
+}
+
+// With C = |diag H|^(−½), the pivots of C H C are the relative ones of H. A matrix without negative ones, of which some
+// are null, is semidefinite if it is definite after a shift by 1e-10 of the diagonal: see structure_of_singular().
+void PreparedPart::Implementation::factorize_coupled() {
+    constexpr double semidefinite_shift = 1e-10;
+    const auto make = reinterpret_cast<DelassusCoupledInverse>(module_symbol(
+        "delassus_petsc_inverse", "delassus_petsc_inverse_make",
+        "an H that couples bodies of different processes cannot be factored", "PETSc", "; start one process"));
+    LocalMatrix scaled = problem.H;
+    C = magnitude_of_diagonal();
+    for (double& c : C) c = 1.0 / std::sqrt(c);
+    std::vector<double> factor = C;
+    columns.fetch(*communicator, factor);
+    const std::int64_t first = problem.column_start[static_cast<std::size_t>(communicator->rank())];
+    for (std::size_t i = 0; i < C.size(); ++i)
+        for (auto k = static_cast<std::size_t>(scaled.row_start[i]);
+             k < static_cast<std::size_t>(scaled.row_start[i + 1]); ++k)
+            scaled.value[k] *= C[i] * factor[columns.place(scaled.column[k])];
+    const delassus_local_matrix raw_rows = raw_of_local(scaled);
+    make(raw.communicator, raw_rows, first, factors);
+    structure = Structure::Definite;
+    if (factors->negative_pivots() == 0 && factors->null_pivots() == 0) return;
+    for (std::size_t i = 0; i < C.size(); ++i)
+        for (auto k = static_cast<std::size_t>(scaled.row_start[i]);
+             k < static_cast<std::size_t>(scaled.row_start[i + 1]); ++k)
+            if (scaled.column[k] == first + static_cast<std::int64_t>(i)) scaled.value[k] += semidefinite_shift;
+    factors.reset();
+    make(raw.communicator, raw_rows, first, factors);
+    structure = factors->negative_pivots() == 0 ? Structure::Semidefinite : Structure::Indefinite;
+    factors.reset();
+}
+
+void PreparedPart::Implementation::apply_inverse(std::vector<double>& v) const {
+    if (!coupled) {
+        sdk::Vector own = sdk::VectorView(v.data(), problem.n());
+        inverse->apply(own);
+        std::copy(own.begin(), own.end(), v.begin());
+        return;
+    }
+    for (std::size_t i = 0; i < C.size(); ++i) v[i] *= C[i];
+    factors->apply(v.data(), 1);
+    for (std::size_t i = 0; i < C.size(); ++i) v[i] *= C[i];
 }
 
 void PreparedPart::Implementation::derive_needs() {

@@ -7,6 +7,7 @@
 
 #include "delassus/partitioned_solver.hpp"
 #include "delassus/sdk/cones.hpp"
+#include "partitioned/coupled_inverse.hpp"
 #include "partitioned/halo.hpp"
 #include "partitioned/local_inverse.hpp"
 #include "problem/structure.hpp"
@@ -34,13 +35,20 @@ struct PreparedPart::Implementation {
     /// Cones of all processes, rows for those of kinds whose rows separate, by kind.
     std::array<std::int64_t, sdk::cone_table.size()> counts = {};
     delassus_local_problem raw{};
-    /// Where H is definite and not coupled.
+    /// Where H is definite: this, or, where it is coupled, the factors of C H C with C = |diag H|^(−½), own entries.
     std::unique_ptr<LocalInverse> inverse;
+    std::unique_ptr<CoupledInverse> factors;
+    std::vector<double> C;
     mutable std::unique_ptr<PartMeter> meter;
 
     void find_halos();
     void check_symmetry() const;
     void detect_structure();
+    void factorize_coupled();
+    /// v ← H⁻¹ v, own entries. Collective.
+    void apply_inverse(std::vector<double>& v) const;
+    /// |diag H| with the mean of the others for a zero, own entries; 1 where all are zero.
+    [[nodiscard]] std::vector<double> magnitude_of_diagonal() const;
     void lay_out();
     void count_cones();
     void derive_needs();
