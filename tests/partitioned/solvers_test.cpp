@@ -167,7 +167,7 @@ TEST_P(PartitionedPlugins, TakeOneBodyThatTouchesAll) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, PartitionedPlugins,
-                         testing::Values(Case{"apgd_petsc", 1e-12, 5000, 50, {Law::Associated}}),
+                         testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}}),
                          [](const auto& each) { return std::string(each.param.plugin); });
 
 }  // namespace
