@@ -103,8 +103,8 @@ void ScaledPart::factorize(const sdk::LocalProblemView& problem) {
     if (has_compliance_) fill_compliance(problem);
 }
 
-// The rows' diagonal of N, P, and Ŵ. A row whose diagonal is zero has no entry in Ŵ; its p (NaN until scale_rest) follows
-// from other blocks.
+// The rows' diagonal of N, P, and Ŵ. A row whose diagonal is zero has no entry in Ŵ; its p (NaN until scale_rest)
+// follows from other blocks.
 void ScaledPart::whiten(const sdk::LocalProblemView& problem, Slice& slice, std::int64_t first_cone,
                         std::int64_t last_cone) {
     LocalRows local;
@@ -162,9 +162,8 @@ void ScaledPart::fill_compliance(const sdk::LocalProblemView& problem) {
     processes().together([&] {
         LocalRows local;
         for (Slice& slice : slices_)
-            slice.compliance =
-                sdk::BlockRows(local.view(problem.E, rows_, slice.first, slice.first + slice.rows), slice.groups,
-                               p_.data() + slice.first, right.data());
+            slice.compliance = sdk::BlockRows(local.view(problem.E, rows_, slice.first, slice.first + slice.rows),
+                                              slice.groups, p_.data() + slice.first, right.data());
     });
 }
 
@@ -191,8 +190,8 @@ void ScaledPart::load(const sdk::LocalProblemView& problem) {
         square += s * s * r.segment(cone.first_row, cone.rows).squaredNorm();
         if (!kind.is_separable()) {
             const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
-            contacts_.push_back({friction ? sdk::friction_coefficient(cone) : 0.0, cone.first_row,
-                                 friction ? cone.rows : 0});
+            contacts_.push_back(
+                {friction ? sdk::friction_coefficient(cone) : 0.0, cone.first_row, friction ? cone.rows : 0});
             if (others > 0) rest_.push_back({cone, kind.is_cone ? 1.0 : p_[cone.first_row]});
             continue;
         }
@@ -210,7 +209,8 @@ void ScaledPart::load(const sdk::LocalProblemView& problem) {
     divide();
 }
 
-// Cuts the rows into parts of at least part_rows, where no block, interval or group is cut, and no part crosses a slice.
+// Cuts the rows into parts of at least part_rows, where no block, interval or group is cut, and no part crosses a
+// slice.
 void ScaledPart::divide() {
     parts_.clear();
     Part part;

@@ -45,7 +45,8 @@ public:
     [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
 
     /// before(part) for all parts, a product of N̂ with λ̂, made by before, and after(part), which calls finish_product.
-    /// The sums over all processes of the First numbers of before and the Second of after, by one reduction. Collective.
+    /// The sums over all processes of the First numbers of before and the Second of after, by one reduction.
+    /// Collective.
     template <std::size_t First, std::size_t Second, class Before, class After>
     [[nodiscard]] std::array<double, First + Second> sums_about_product(const sdk::Vector& lambda, const Before& before,
                                                                         const After& after) const {
@@ -128,14 +129,14 @@ private:
     std::vector<std::int64_t> first_cone_;  // of each slice, and the end
     std::vector<Part> parts_;
     std::vector<Contact> contacts_;
-    std::vector<Block> rest_;               // by number of contact where rows is 0, else unused; empty if all are friction
+    std::vector<Block> rest_;  // by number of contact where rows is 0, else unused; empty if all are friction
     std::vector<Interval> intervals_;
-    std::vector<double> trace_;             // mean diagonal of N in a cone, by cones; until scale_rest()
-    sdk::Vector r_;                         // r̂
-    sdk::Vector p_, ratio_;                 // ratio: s of the row's block over p of the row
-    sdk::Vector lower_, upper_;             // of the rows of intervals; empty if there are none
+    std::vector<double> trace_;  // mean diagonal of N in a cone, by cones; until scale_rest()
+    sdk::Vector r_;              // r̂
+    sdk::Vector p_, ratio_;      // ratio: s of the row's block over p of the row
+    sdk::Vector lower_, upper_;  // of the rows of intervals; empty if there are none
     double reference_ = 1.0;
-    mutable sdk::Vector work_, padded_;     // local columns, and local rows of E; both with the padding of BlockRows
+    mutable sdk::Vector work_, padded_;  // local columns, and local rows of E; both with the padding of BlockRows
 };
 
 }  // namespace delassus::petsc

@@ -10,27 +10,14 @@ namespace delassus::petsc {
 namespace {
 
 constexpr double largest_regularization = 1e-4;
-// Bodies' velocities up to which a factor by MUMPS is the default: in three dimensions its fill grows with the power 4/3
-// of their number and its work with the square.
-constexpr std::int64_t most_factored = 400000;
-
 }  // namespace
 
 void CondensedSystem::analyze(const PartSystem& system, const sdk::LocalProblemView& problem) {
     system_ = &system;
-    groups_.clear();
-    for (std::int64_t c = 0; c < problem.raw->cone_count; ++c) {
-        const delassus_cone& cone = problem.cone(c);
-        if (cone.kind == DELASSUS_CONE_FRICTION) {
-            groups_.push_back(cone.rows);
-        } else {
-            groups_.insert(groups_.end(), static_cast<std::size_t>(cone.rows), 1);
-        }
-    }
+    groups_ = coupled_rows(problem);
     kind_ = wanted_ == "hypre"     ? LinearSolver::Hypre
             : wanted_ == "bjacobi" ? LinearSolver::BlockJacobi
-            : wanted_ == "mumps" || problem.raw->n_all <= most_factored ? LinearSolver::Mumps
-                                                                         : LinearSolver::BlockJacobi;
+                                   : LinearSolver::Mumps;
     krylov_.reset();
     matrix_.reset();
     ++analyses_;
@@ -66,13 +53,15 @@ void CondensedSystem::find_T(const Complementarity& cones, const sdk::Vector& th
                 E(i, j) = scale_[first + i] * system_->E().coeff(first + i, first + j) * scale_[first + j];
         if (E.isZero(0.0)) {
             for (int i = 0; i < rows; ++i)
-                t_[3 * g + static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] = 1.0 / (theta[first + i] + delta_);
+                t_[3 * g + static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] =
+                    1.0 / (theta[first + i] + delta_);
             continue;
         }
         if (const ipm::Basis* basis = cones.row_basis(g)) {
             Eigen::Matrix3d U;
             for (int k = 0; k < 3; ++k)
-                for (int i = 0; i < 3; ++i) U(i, k) = (*basis)[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)];
+                for (int i = 0; i < 3; ++i)
+                    U(i, k) = (*basis)[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)];
             E = U.transpose() * E * U;
         }
         for (int i = 0; i < rows; ++i) E(i, i) += theta[first + i] + delta_;

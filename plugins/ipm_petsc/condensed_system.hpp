@@ -35,8 +35,8 @@ public:
     void load(const PartSystem& system, const sdk::LocalProblemView& problem, const sdk::Vector& scale);
     /// theta: m, in the bases. Raises δ until the matrix can be factored. Throws sdk::NumericalFailure.
     void factorize(const sdk::LocalProblemView& problem, const Complementarity& cones, const sdk::Vector& theta);
-    /// From f (own n) and g (own m, in the bases) δx and δz (in the bases), to a relative residual of `enough` if it can
-    /// be had; the residual that was.
+    /// From f (own n) and g (own m, in the bases) δx and δz (in the bases), to a relative residual of `enough` if it
+    /// can be had; the residual that was.
     double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
                  sdk::Vector& dx, sdk::Vector& dz);
 

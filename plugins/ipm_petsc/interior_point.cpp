@@ -31,13 +31,7 @@ PartitionedInteriorPoint::~PartitionedInteriorPoint() {
 }
 
 std::string PartitionedInteriorPoint::refusal(const sdk::ProblemView& problem) {
-    for (const delassus_cone& cone : problem.cones)
-        for (std::int32_t i = cone.first_row; i < cone.first_row + cone.rows; ++i)
-            for (sdk::SparseRowsView::InnerIterator e(problem.E, i); e; ++e)
-                if (e.col() != i && (cone.kind != DELASSUS_CONE_FRICTION || e.col() < cone.first_row ||
-                                     e.col() >= cone.first_row + cone.rows))
-                    return "E couples rows other than those of one contact; ipm takes any E";
-    return {};
+    return refusal_of_compliance(problem);
 }
 
 void PartitionedInteriorPoint::analyze(const sdk::LocalProblemView& problem) {
@@ -148,7 +142,8 @@ void PartitionedInteriorPoint::start_cold(const sdk::LocalProblemView& problem) 
     kkt_.solve(cones_, a_, right_, 1e-3, x_, dz_);
     cones_.reactions_from_basis(dz_);
     const double square = system_.dot(dz_, dz_);
-    const double size = std::max(std::sqrt(square / std::max<double>(1.0, static_cast<double>(problem.raw->m_all))), 1e-2);
+    const double size =
+        std::max(std::sqrt(square / std::max<double>(1.0, static_cast<double>(problem.raw->m_all))), 1e-2);
     cones_.start(dz_, -theta * dz_, size, 10.0 * theta * size);
 }
 
@@ -179,8 +174,7 @@ bool PartitionedInteriorPoint::step(const sdk::LocalProblemView& problem) {
     constexpr double predictor_residual = 1e-2, loosest = 1e-3, tightest = 1e-10;
     cones_.scale(theta_);
     kkt_.factorize(problem, cones_, theta_);
-    const double equations = std::sqrt(
-        processes().sum(f_.cwiseProduct(kkt_.R()).squaredNorm() + g_.squaredNorm()));
+    const double equations = std::sqrt(processes().sum(f_.cwiseProduct(kkt_.R()).squaredNorm() + g_.squaredNorm()));
     cones_.rows_to_basis(g_);
     cones_.target_zero(target_);
     const double tau = mean_product(0.0);
@@ -190,7 +184,8 @@ bool PartitionedInteriorPoint::step(const sdk::LocalProblemView& problem) {
         const double ratio = std::clamp(mean_product(predicted) / tau, 0.0, 1.0);
         cones_.target(ratio * ratio * ratio * tau, true, target_);
         const double size = std::sqrt(degree_) * std::sqrt(tau);
-        const double forcing = 0.1 * std::min(std::sqrt(degree_) * tau, std::sqrt(tau) * std::max(equations, std::sqrt(degree_) * tau));
+        const double forcing =
+            0.1 * std::min(std::sqrt(degree_) * tau, std::sqrt(tau) * std::max(equations, std::sqrt(degree_) * tau));
         find_direction(std::clamp(forcing / std::max(size, equations), tightest, loosest));
     }
     const double length = std::min(1.0, step_fraction_ * longest_step());
@@ -235,8 +230,7 @@ void PartitionedInteriorPoint::iterate(const sdk::LocalProblemView& problem, sdk
 
 // Progress is a smaller natural error, or smaller residuals and products: the natural error follows those later.
 bool PartitionedInteriorPoint::is_stuck(double error) {
-    const double equations =
-        std::sqrt(processes().sum(f_.cwiseProduct(kkt_.R()).squaredNorm() + g_.squaredNorm()));
+    const double equations = std::sqrt(processes().sum(f_.cwiseProduct(kkt_.R()).squaredNorm() + g_.squaredNorm()));
     const double rest = std::max(mean_product(0.0), equations);
     ++idle_iterations_;
     if (error < 0.99 * least_error_ || rest < 0.9 * least_rest_) idle_iterations_ = 0;

@@ -12,7 +12,7 @@ constexpr const char* preconditioners[] = {"auto", "mumps", "bjacobi", "hypre"};
 constexpr delassus_option options[] = {
     choice_option("preconditioner", "auto", preconditioners,
                   "of H + D'TD: Cholesky factors by MUMPS, or conjugate gradients with incomplete Cholesky on each "
-                  "process or with hypre's BoomerAMG; auto: mumps up to 400000 velocities, then bjacobi"),
+                  "process or with hypre's BoomerAMG; auto: mumps"),
     integer_option("inner_iterations", "2000", 1, 1e9, "iterations", "of conjugate gradients in one linear solve"),
     real_option("step_fraction", "0.99", 0.5, 0.9999, "", "part of the way to the boundary that a step may take"),
     real_option("regularization", "1e-13", 1e-15, 1e-4, "",

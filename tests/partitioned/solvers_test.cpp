@@ -17,8 +17,8 @@ namespace {
 
 struct Case {
     const char* plugin;
-    double tolerance;            // of the natural error, small enough for velocities to 1e-9
-    std::int64_t most;           // iterations; what takes more is compared after few
+    double tolerance;   // of the natural error, small enough for velocities to 1e-9
+    std::int64_t most;  // iterations; what takes more is compared after few
     std::int64_t few;
     std::vector<Law> laws;
 };
@@ -33,12 +33,13 @@ struct Answer {
 };
 
 /// ‖x − y‖, ‖y‖ in the norm of diag H and the velocity without reactions, about H⁻¹a, squared; own rows.
-void add_squares(const PartitionedProblem& part, std::int64_t first, const double* x, const double* y, std::vector<double>& sums) {
+void add_squares(const PartitionedProblem& part, std::int64_t first, const double* x, const double* y,
+                 std::vector<double>& sums) {
     for (std::int64_t i = 0; i < part.n(); ++i) {
         const auto k = static_cast<std::size_t>(i);
         double h = 1.0;
-        for (auto e = static_cast<std::size_t>(part.H.row_start[k]); e < static_cast<std::size_t>(part.H.row_start[k + 1]);
-             ++e)
+        for (auto e = static_cast<std::size_t>(part.H.row_start[k]);
+             e < static_cast<std::size_t>(part.H.row_start[k + 1]); ++e)
             if (part.H.column[e] == first + i) h = std::abs(part.H.value[e]);
         sums[0] += h * (x[i] - y[i]) * (x[i] - y[i]);
         sums[1] += h * y[i] * y[i];
@@ -167,7 +168,9 @@ TEST_P(PartitionedPlugins, TakeOneBodyThatTouchesAll) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, PartitionedPlugins,
-                         testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}}),
+                         testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}},
+                                         Case{"ipm_petsc", 1e-12, 100, 3, {Law::Associated}},
+                                         Case{"admm_petsc", 1e-11, 3000, 10, {Law::Associated, Law::Coulomb}}),
                          [](const auto& each) { return std::string(each.param.plugin); });
 
 }  // namespace

@@ -131,9 +131,8 @@ void Bodies::factorize(const sdk::LocalProblemView& problem) {
         start.push_back(static_cast<std::int32_t>(column.size()));
     }
     const auto n = static_cast<std::int32_t>(columns_.size());
-    const auto whole =
-        problem_of(problem, n, {n, n, start.back(), start.data(), column.data(), value.data()}, block_start_,
-                   block_index_);
+    const auto whole = problem_of(problem, n, {n, n, start.back(), start.data(), column.data(), value.data()},
+                                  block_start_, block_index_);
     processes_.together([&] { inverse_.factorize(sdk::ProblemView(whole)); });
 }
 
@@ -156,8 +155,7 @@ sdk::SparseRowsView LocalRows::view(const sdk::LocalMatrixView& matrix, const Ex
     for (Eigen::Index i = first; i <= last; ++i)
         start_[at(i - first)] = static_cast<std::int32_t>(matrix.row_start[at(i)] - begin);
     for (auto e = begin; e < end; ++e) column_[at(e - begin)] = columns.local(matrix.column[at(e)]);
-    return {last - first,    columns.size(), end - begin, start_.data(), column_.data(),
-            matrix.value.data() + begin};
+    return {last - first, columns.size(), end - begin, start_.data(), column_.data(), matrix.value.data() + begin};
 }
 
 }  // namespace delassus::petsc

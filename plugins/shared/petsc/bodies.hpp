@@ -45,7 +45,7 @@ private:
     Exchange columns_;
     sdk::HInverse inverse_;
     bool has_blocks_ = false, diagonal_ = false;
-    int width_ = 1;  // of the largest block of all
+    int width_ = 1;                                        // of the largest block of all
     std::vector<std::int32_t> block_start_, block_index_;  // local columns, ascending in a block
 };
 

@@ -44,7 +44,8 @@ Exchange::Exchange(const Processes& processes, std::span<const std::int64_t> sta
     below_ = static_cast<std::int32_t>(std::lower_bound(foreign_.begin(), foreign_.end(), first_) - foreign_.begin());
     processes.together([&] {
         if (own_ + static_cast<std::int64_t>(foreign_.size()) >= std::numeric_limits<PetscInt>::max())
-            throw std::runtime_error("one process has more unknowns than this PETSc can count (2^31): use more processes");
+            throw std::runtime_error(
+                "one process has more unknowns than this PETSc can count (2^31): use more processes");
     });
     foreign_of_all_ = processes.sum(static_cast<std::int64_t>(foreign_.size()));
     if (foreign_of_all_ == 0) return;
@@ -53,7 +54,7 @@ Exchange::Exchange(const Processes& processes, std::span<const std::int64_t> sta
     for (std::size_t k = 0; k < foreign_.size(); ++k) {
         const auto owner = std::upper_bound(start.begin(), start.end(), foreign_[k]) - start.begin() - 1;
         leaves[k] = static_cast<PetscInt>(static_cast<std::int64_t>(k) < below_ ? static_cast<std::int64_t>(k)
-                                                                                 : static_cast<std::int64_t>(k) + own_);
+                                                                                : static_cast<std::int64_t>(k) + own_);
         roots[k].rank = static_cast<PetscInt>(owner);
         roots[k].index = static_cast<PetscInt>(foreign_[k] - start[static_cast<std::size_t>(owner)]);
     }
@@ -71,7 +72,8 @@ std::int32_t Exchange::local_of_foreign(std::int64_t number) const {
 void Exchange::bring(void* values, MPI_Datatype type, int width, std::size_t bytes) const {
     if (foreign_of_all_ == 0) return;
     const Unit unit(type, width);
-    const void* own = static_cast<const char*>(values) + static_cast<std::size_t>(below_) * bytes * static_cast<std::size_t>(width);
+    const void* own =
+        static_cast<const char*>(values) + static_cast<std::size_t>(below_) * bytes * static_cast<std::size_t>(width);
     check(PetscSFBcastBegin(forest_.get(), unit.get(), own, values, MPI_REPLACE));
     check(PetscSFBcastEnd(forest_.get(), unit.get(), own, values, MPI_REPLACE));
 }

@@ -14,9 +14,9 @@ namespace delassus::petsc {
 
 using StarForestHandle = Handle<PetscSF, &PetscSFDestroy>;
 
-/// A process's own numbers first … end − 1 of all, and the foreign ones that it uses. In its local numbering all of them
-/// stand in the order of their numbers: the foreign ones below, its own, the foreign ones above. Rows of a matrix with
-/// ascending columns therefore keep their order. A local vector has size() entries.
+/// A process's own numbers first … end − 1 of all, and the foreign ones that it uses. In its local numbering all of
+/// them stand in the order of their numbers: the foreign ones below, its own, the foreign ones above. Rows of a matrix
+/// with ascending columns therefore keep their order. A local vector has size() entries.
 class Exchange {
 public:
     Exchange() = default;

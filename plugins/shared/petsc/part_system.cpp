@@ -28,8 +28,7 @@ void PartSystem::analyze(const Processes& processes, const sdk::LocalProblemView
     coupled_ = !problem.needs_any(DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS);
     inverse_.reset();
     number_.resize(place(columns().size()));
-    for (Eigen::Index i = 0; i < columns().size(); ++i)
-        number_[place(i)] = static_cast<PetscInt>(columns().number(i));
+    for (Eigen::Index i = 0; i < columns().size(); ++i) number_[place(i)] = static_cast<PetscInt>(columns().number(i));
     std::vector<std::int32_t> cone_of(place(problem.m));
     for (std::int64_t c = 0; c < problem.raw->cone_count; ++c)
         for (std::int32_t i = 0; i < problem.cone(c).rows; ++i)
@@ -38,9 +37,12 @@ void PartSystem::analyze(const Processes& processes, const sdk::LocalProblemView
     for (Eigen::Index i = 0; i < problem.m; ++i)
         for (auto e = place(problem.E.row_start[place(i)]); e < place(problem.E.row_start[place(i) + 1]); ++e) {
             const auto j = problem.E.column[e] - problem.first_row();
-            couples = couples || j < 0 || j >= problem.m || cone_of[place(j)] != cone_of[place(i)];
+            if (j == i) continue;
+            couples = couples || j < 0 || j >= problem.m || cone_of[place(j)] != cone_of[place(i)] ||
+                      problem.cone(cone_of[place(i)]).kind != DELASSUS_CONE_FRICTION;
         }
-    if (processes.any(couples)) throw std::runtime_error("E couples rows of different cones, which this solver cannot take");
+    if (processes.any(couples))
+        throw std::runtime_error("E couples rows other than those of one contact, which this solver cannot take");
     // H itself, for products, and for its factor where it couples bodies.
     check(MatCreate(processes.get(), H_.make()));
     check(MatSetType(H_.get(), MATAIJ));
@@ -96,10 +98,9 @@ void PartSystem::factorize(const sdk::LocalProblemView& problem) {
         find_coupled_diagonal();
     } else if (columns().size() > 0) {
         sdk::CompressedRows W;
-        bodies_.inverse().half_solve_rows(
-            sdk::SparseRowsView(D_.rows(), D_.cols(), D_.nonZeros(), D_.outerIndexPtr(), D_.innerIndexPtr(),
-                                D_.valuePtr()),
-            W);
+        bodies_.inverse().half_solve_rows(sdk::SparseRowsView(D_.rows(), D_.cols(), D_.nonZeros(), D_.outerIndexPtr(),
+                                                              D_.innerIndexPtr(), D_.valuePtr()),
+                                          W);
         for (Eigen::Index i = 0; i < problem.m; ++i)
             for (auto e = place(W.start[place(i)]); e < place(W.start[place(i) + 1]); ++e)
                 diagonal_[i] += W.value[e] * W.value[e];
@@ -239,6 +240,29 @@ sdk::Vector PartSystem::apply_D(const sdk::Vector& v) const {
     return D_ * all;
 }
 
+std::string refusal_of_compliance(const sdk::ProblemView& problem) {
+    for (const delassus_cone& cone : problem.cones)
+        for (std::int32_t i = cone.first_row; i < cone.first_row + cone.rows; ++i)
+            for (sdk::SparseRowsView::InnerIterator e(problem.E, i); e; ++e)
+                if (e.col() != i && (cone.kind != DELASSUS_CONE_FRICTION || e.col() < cone.first_row ||
+                                     e.col() >= cone.first_row + cone.rows))
+                    return "E couples rows other than those of one contact";
+    return {};
+}
+
+std::vector<std::int32_t> coupled_rows(const sdk::LocalProblemView& problem) {
+    std::vector<std::int32_t> groups;
+    for (std::int64_t c = 0; c < problem.raw->cone_count; ++c) {
+        const delassus_cone& cone = problem.cone(c);
+        if (cone.kind == DELASSUS_CONE_FRICTION) {
+            groups.push_back(cone.rows);
+        } else {
+            groups.insert(groups.end(), place(cone.rows), 1);
+        }
+    }
+    return groups;
+}
+
 sdk::Vector PartSystem::apply_transpose(const sdk::Vector& lambda) const {
     sdk::Vector all = D_.transpose() * lambda;
     columns().collect(all.data());
@@ -267,7 +291,8 @@ double PartSystem::natural(const sdk::Vector& lambda, const sdk::Vector& u) cons
         for (std::int32_t i = 0; i < cone.rows; ++i) trial[place(i)] = l[i] - square * v[i];
         if (coulomb_) trial[0] -= square * sdk::de_saxce(cone, v);
         sdk::project(cone, trial.data());
-        for (std::int32_t i = 0; i < cone.rows; ++i) sum += (l[i] - trial[place(i)]) * (l[i] - trial[place(i)]) / square;
+        for (std::int32_t i = 0; i < cone.rows; ++i)
+            sum += (l[i] - trial[place(i)]) * (l[i] - trial[place(i)]) / square;
     }
     return std::sqrt(processes().sum(sum)) / reference_;
 }

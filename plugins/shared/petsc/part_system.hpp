@@ -12,10 +12,10 @@
 
 namespace delassus::petsc {
 
-/// Own rows of the problem, with E coupling rows of one cone only. All operations but the getters are collective.
+/// Own rows of the problem, with E coupling rows of one contact only. All operations but the getters are collective.
 class PartSystem {
 public:
-    /// Throws std::runtime_error, on all processes, where E couples cones or PETSc's numbers are too small.
+    /// Throws std::runtime_error, on all processes, where E couples others, or PETSc's numbers are too small.
     void analyze(const Processes& processes, const sdk::LocalProblemView& problem);
     /// Factors H and finds the diagonal of N. Throws sdk::NumericalFailure. Where H couples bodies the diagonal costs a
     /// solve with H for each row of D, sixteen at a time.
@@ -25,11 +25,11 @@ public:
 
     [[nodiscard]] const Processes& processes() const { return bodies_.processes(); }
     [[nodiscard]] const Exchange& columns() const { return bodies_.columns(); }
-    [[nodiscard]] const sdk::Vector& diagonal() const { return diagonal_; }      ///< of N; blocks of zeros filled
-    [[nodiscard]] const sdk::Vector& free_velocity() const { return r_; }        ///< r = D H⁻¹ a + b
-    [[nodiscard]] const sdk::SparseRows& D() const { return D_; }                ///< m × local columns
-    [[nodiscard]] const sdk::SparseRows& E() const { return E_; }                ///< m × m, own rows
-    [[nodiscard]] double reference() const { return reference_; }                ///< ‖S r‖
+    [[nodiscard]] const sdk::Vector& diagonal() const { return diagonal_; }  ///< of N; blocks of zeros filled
+    [[nodiscard]] const sdk::Vector& free_velocity() const { return r_; }    ///< r = D H⁻¹ a + b
+    [[nodiscard]] const sdk::SparseRows& D() const { return D_; }            ///< m × local columns
+    [[nodiscard]] const sdk::SparseRows& E() const { return E_; }            ///< m × m, own rows
+    [[nodiscard]] double reference() const { return reference_; }            ///< ‖S r‖
     /// Own rows as a problem with n = 0: the cones and the law. Valid as long as the problem that was loaded.
     [[nodiscard]] const sdk::ProblemView& rows() const { return *rows_; }
 
@@ -52,8 +52,8 @@ public:
     [[nodiscard]] double norm(const sdk::Vector& v) const { return std::sqrt(dot(v, v)); }
     [[nodiscard]] bool finite(const sdk::Vector& v) const { return !processes().any(!v.allFinite()); }
 
-    /// An empty n_all × n_all matrix with the pattern of H and of all products of columns in one group of own rows, which
-    /// follow one another and cover them (group_rows: their numbers).
+    /// An empty n_all × n_all matrix with the pattern of H and of all products of columns in one group of own rows,
+    /// which follow one another and cover them (group_rows: their numbers).
     void make_matrix(const sdk::LocalProblemView& problem, const std::vector<std::int32_t>& group_rows,
                      MatrixHandle& matrix) const;
     /// matrix += H; before assemble().
@@ -89,11 +89,16 @@ private:
     bool coulomb_ = false;
 };
 
+/// Why a whole problem's E cannot be taken; empty if it can.
+[[nodiscard]] std::string refusal_of_compliance(const sdk::ProblemView& problem);
+/// Numbers of own rows that belong together, in their order: a contact's, else single rows.
+[[nodiscard]] std::vector<std::int32_t> coupled_rows(const sdk::LocalProblemView& problem);
+
 /// How linear systems with an n_all × n_all definite matrix are solved.
 enum class LinearSolver { Mumps, Hypre, BlockJacobi };
 
-/// Sets up krylov for matrix: a factorisation by MUMPS, or conjugate gradients with hypre's BoomerAMG or with incomplete
-/// Cholesky on each process. Collective.
+/// Sets up krylov for matrix: a factorisation by MUMPS, or conjugate gradients with hypre's BoomerAMG or with
+/// incomplete Cholesky on each process. Collective.
 void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kind, KrylovHandle& krylov);
 /// Factors or sets up the preconditioner for the matrix's new values. False if the factorisation failed. Collective.
 [[nodiscard]] bool set_up(KSP krylov);

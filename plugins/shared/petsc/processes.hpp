@@ -43,8 +43,8 @@ public:
     [[nodiscard]] std::int64_t max(std::int64_t value) const { return reduced(value, MPI_MAX); }
     [[nodiscard]] bool any(bool value) const { return max(std::int64_t{value ? 1 : 0}) != 0; }
 
-    /// Runs body, which must not be collective. If it throws on any process, all throw the sentence of the first one, as
-    /// sdk::NumericalFailure if it was one, else as std::runtime_error.
+    /// Runs body, which must not be collective. If it throws on any process, all throw the sentence of the first one,
+    /// as sdk::NumericalFailure if it was one, else as std::runtime_error.
     void together(const std::function<void()>& body) const;
 
 private:
