@@ -11,6 +11,7 @@ using Part = ScaledPart::Part;
 
 constexpr double longest_step = 1e10;           // N̂ has unit diagonal on the average
 constexpr std::int64_t refresh_interval = 200;  // iterations between products that renew û
+constexpr double rounding = 1e-10;              // of sums over all rows, generously
 
 }  // namespace
 
@@ -126,8 +127,9 @@ void PartitionedGradient::iterate(Run& run) {
 
 // next = Π(y − t û(y)) with the largest t that backtracking allows: t dᵀN̂d ≤ ‖d‖², which is the test of the quadratic
 // model without a difference of values of f (plugins/apgd/apgd.cpp has the derivation). All four sums of a step go
-// through one reduction. On entry next and its û are the iterate before λ̂, from which the first pass extrapolates to y.
-// True: stop.
+// through one reduction. A step that backtracking has set to ‖d‖²/dᵀN̂d meets the test as an equation, and rounding,
+// which differs between numbers of processes, must not decide it. On entry next and its û are the iterate before λ̂,
+// from which the first pass extrapolates to y. True: stop.
 bool PartitionedGradient::gradient_step(Run& run, double momentum) {
     for (bool first = true;; first = false) {
         const auto step_and_project = [&](const Part& part) {
@@ -153,7 +155,7 @@ bool PartitionedGradient::gradient_step(Run& run, double momentum) {
             scaled_.sums_about_product<1, 3>(change_, step_and_project, judge);
         natural_ = scaled_.natural_from(natural);
         uphill_ = uphill;
-        if (!(step_ * curvature > square)) return false;
+        if (!(step_ * curvature > (1.0 + rounding) * square)) return false;
         run.unscaled = lambda_.cwiseProduct(scaled_.scaling());
         if (run.count()) return true;
         step_ = std::min(shrinkage_ * step_, square / curvature);
