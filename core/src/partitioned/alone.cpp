@@ -32,6 +32,11 @@ AloneAlarm::~AloneAlarm() {
     thread_.join();
 }
 
+void meet_in_failure(const Communicator& last_words, const std::string& sentence) {
+    const AloneAlarm alarm(last_words, sentence);
+    static_cast<void>(last_words.all(0));
+}
+
 void fail_alone(const Communicator& communicator, const std::string& sentence) {
     fmt::print(stderr, "delassus: process {} of {} failed, so the others end too: {}\n", communicator.rank(),
                communicator.size(), sentence);
