@@ -18,8 +18,10 @@ namespace delassus {
 namespace {
 
 volatile pid_t watched_child = 0;
+volatile std::sig_atomic_t asked_to_end = 0;
 
 void pass_on(int signal_number) {
+    asked_to_end = 1;
     if (watched_child > 0) kill(watched_child, signal_number);
 }
 
@@ -43,6 +45,7 @@ void continue_in_watched_child(const std::string& who, int exit_code) {
         if (errno != EINTR) _exit(exit_code);
     if (WIFEXITED(status)) _exit(WEXITSTATUS(status));
     const int killer = WTERMSIG(status);
+    if (asked_to_end) _exit(exit_code);  // the launcher's own doing, or the user's
     std::fprintf(stderr, "delassus: %s was ended by %s%s; so the others end too\n", who.c_str(),
                  signal_name(killer).c_str(), killer == SIGKILL ? ", as when its node is out of memory" : "");
     std::fflush(stderr);

@@ -3,6 +3,8 @@
 // whole x. It also fails as it is told, on one process.
 #include <mpi.h>
 
+#include <Eigen/LU>
+
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
