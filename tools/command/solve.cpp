@@ -7,13 +7,17 @@
 #include <optional>
 
 #include "command.hpp"
+#include "delassus/communicator.hpp"
 #include "delassus/config.hpp"
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
+#include "on_all_processes.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
+#include "process/watched_process.hpp"
+#include "solve_in_parts.hpp"
 
 namespace delassus::command {
 
@@ -54,20 +58,15 @@ Config configuration(const SolveArguments& arguments) {
     return config;
 }
 
-void print_report(const SolveReport& report) {
-    fmt::print("{} with {} {}: {}", report.problem, report.solver, report.version, name_of(report.status));
-    fmt::print(" after {} iterations, {:.3g} s setup + {:.3g} s solve\n", report.iterations, report.seconds_setup,
-               report.seconds_solve);
-    if (!report.message.empty()) fmt::print("  {}\n", report.message);
-    fmt::print("  error");
-    for (const ErrorMeasure& measure : error_measures)
-        if (measure.is_error) fmt::print("  {} {:.2e}", measure.name, report.error.*measure.value);
-    fmt::print("\n");
+/// Several processes, and a solver that can share the problem among them.
+bool is_partitioned_run(const Registry& registry, const SolverConfig& solver) {
+    if (process_count() == 1) return false;
+    const std::uint64_t capabilities = is_library_path(solver.name) ? registry.load(solver.name)->info().capabilities
+                                                                    : solver_info(registry, solver.name).capabilities;
+    return (capabilities & DELASSUS_CAN_PARTITIONED) != 0;
 }
 
-int solve(const SolveArguments& arguments) {
-    const Config config = configuration(arguments);
-    const Registry registry(config.plugin_path);
+int solve_whole(const SolveArguments& arguments, const Registry& registry, const Config& config) {
     SolveSettings settings = config.solver.settings();
     settings.record_curve = arguments.curve;
 
@@ -121,7 +120,35 @@ int solve(const SolveArguments& arguments) {
     return report.status == Status::Solved ? exit_solved : exit_not_converged;
 }
 
+int solve(const SolveArguments& arguments) {
+    const bool several = process_count() > 1;
+    if (several)
+        continue_in_watched_child(fmt::format("process {} of {}", process_rank(), process_count()), exit_not_converged);
+    const auto body = [&](const std::shared_ptr<const Communicator>& run) {
+        const Config config = configuration(arguments);
+        const Registry registry(config.plugin_path);
+        if (is_partitioned_run(registry, config.solver))
+            if (const auto code = solve_in_parts(
+                    run, {arguments.problem, arguments.warm_start, arguments.solution, arguments.json, arguments.curve},
+                    registry, config))
+                return *code;
+        return solve_whole(arguments, registry, config);
+    };
+    return several ? on_all_processes(body) : body(single_process());
+}
+
 }  // namespace
+
+void print_report(const SolveReport& report) {
+    fmt::print("{} with {} {}: {}", report.problem, report.solver, report.version, name_of(report.status));
+    fmt::print(" after {} iterations, {:.3g} s setup + {:.3g} s solve\n", report.iterations, report.seconds_setup,
+               report.seconds_solve);
+    if (!report.message.empty()) fmt::print("  {}\n", report.message);
+    fmt::print("  error");
+    for (const ErrorMeasure& measure : error_measures)
+        if (measure.is_error) fmt::print("  {} {:.2e}", measure.name, report.error.*measure.value);
+    fmt::print("\n");
+}
 
 void add_solve(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<SolveArguments>();

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solve_in_parts.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "command.hpp"
+#include "delassus/error.hpp"
+#include "delassus/partitioned_solver.hpp"
+#include "delassus/problem_files.hpp"
+#include "process/stdout_guard.hpp"
+#include "process/supervision.hpp"
+
+namespace delassus::command {
+
+namespace {
+
+/// The ranges of a vector that every process has, or the whole of one of which every process has a range.
+std::vector<double> own_range(const std::vector<double>& all, const std::vector<std::int64_t>& start, int rank) {
+    const auto r = static_cast<std::size_t>(rank);
+    return {all.begin() + start[r], all.begin() + start[r + 1]};
+}
+
+std::vector<double> whole_of(const Communicator& run, const std::vector<double>& own) {
+    std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(run.size()));
+    const auto* bytes = reinterpret_cast<const std::byte*>(own.data());
+    to[0].assign(bytes, bytes + own.size() * sizeof(double));
+    std::vector<double> whole;
+    for (const auto& from : run.exchange(to)) {
+        const auto* values = reinterpret_cast<const double*>(from.data());
+        whole.insert(whole.end(), values, values + from.size() / sizeof(double));
+    }
+    return whole;
+}
+
+void print_processes(const std::vector<ProcessReport>& processes) {
+    constexpr double MiB = 1048576.0;
+    for (std::size_t p = 0; p < processes.size(); ++p)
+        fmt::print("  process {}: {} columns, {} rows, {} ghosts; {:.1f} MiB at most, {:.1f} MiB sent by the core\n", p,
+                   processes[p].n, processes[p].m, processes[p].ghosts,
+                   static_cast<double>(processes[p].peak_memory) / MiB,
+                   static_cast<double>(processes[p].bytes_sent) / MiB);
+}
+
+}  // namespace
+
+std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run, const PartsArguments& arguments,
+                                  const Registry& registry, const Config& config) {
+    SolveSettings settings = config.solver.settings();
+    settings.record_curve = arguments.curve;
+    Problem data;
+    together(*run, [&] {
+        data = read_problem(arguments.problem);
+        if (config.solver.law) data.law = *config.solver.law;
+    });
+    const PreparedPart problem(run, part_of(*run, std::move(data)));
+    Solution own;
+    if (!arguments.warm_start.empty()) {
+        together(*run, [&] {
+            const Solution start =
+                read_solution(arguments.warm_start, static_cast<std::int32_t>(problem.problem().n_all()),
+                              static_cast<std::int32_t>(problem.problem().m_all()));
+            own = {own_range(start.x, problem.problem().column_start, run->rank()),
+                   own_range(start.lambda, problem.problem().row_start, run->rank())};
+        });
+        settings.warm_start = true;
+    }
+
+    const std::string& name = config.solver.name;
+    const bool terminal = isatty(STDERR_FILENO) != 0 && run->rank() == 0;
+    settings.cancelled = interrupted;
+    if (terminal)
+        settings.on_progress = [](const CurveSample& sample) {
+            fmt::print(stderr, "\r  iteration {}  {:.1f} s ", sample.iteration, sample.seconds);
+        };
+    install_interrupt_handler();
+    install_crash_handler(fmt::format("process {} of {}, with the solver {},", run->rank(), run->size(), name),
+                          exit_not_converged);
+
+    StdoutGuard guard;
+    SolveReport report;
+    {
+        const Watchdog watchdog(
+            settings.time_limit + std::max(2.0, settings.time_limit),
+            fmt::format("the solver {} did not answer long after its time limit of {} s", name, settings.time_limit),
+            exit_not_converged);
+        PartitionedSolver solver(registry, config.solver, run);
+        const std::string refusal = solver.refusal(problem, settings);
+        if (!refusal.empty() && name == "auto") return std::nullopt;
+        report = solver.solve(problem, own, settings);
+    }
+    if (const auto bytes = guard.release(); bytes > 0 && run->rank() == 0)
+        fmt::print(stderr, "delassus: the solver {} wrote {} bytes to standard output; they were dropped\n", name,
+                   bytes);
+    if (terminal) fmt::print(stderr, "\r{:60}\r", "");
+    const auto processes = process_reports(problem);
+    const std::string json = to_json(report, processes);
+    if (!arguments.solution.empty()) {
+        const Solution whole = {whole_of(*run, own.x), whole_of(*run, own.lambda)};
+        together(*run, [&] {
+            if (run->rank() == 0) write_solution(whole, json, arguments.solution);
+        });
+    }
+    if (run->rank() == 0) {
+        if (arguments.json) {
+            fmt::print("{}", json);
+        } else {
+            print_report(report);
+            print_processes(processes);
+        }
+    }
+    return report.status == Status::Solved ? exit_solved : exit_not_converged;
+}
+
+}  // namespace delassus::command
