@@ -11,6 +11,7 @@
 #include "delassus/config.hpp"
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
+#include "delassus/partitioned_files.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
 #include "on_all_processes.hpp"
@@ -58,9 +59,10 @@ Config configuration(const SolveArguments& arguments) {
     return config;
 }
 
-/// Several processes, and a solver that can share the problem among them.
-bool is_partitioned_run(const Registry& registry, const SolverConfig& solver) {
-    if (process_count() == 1) return false;
+/// A solver that can share the problem, and several processes; or one, where the problem is in a file that is made to
+/// be shared and the solver was named.
+bool is_partitioned_run(const Registry& registry, const SolverConfig& solver, const std::filesystem::path& problem) {
+    if (process_count() == 1 && (solver.name == "auto" || !is_partitioned_file(problem))) return false;
     const std::uint64_t capabilities = is_library_path(solver.name) ? registry.load(solver.name)->info().capabilities
                                                                     : solver_info(registry, solver.name).capabilities;
     return (capabilities & DELASSUS_CAN_PARTITIONED) != 0;
@@ -127,7 +129,7 @@ int solve(const SolveArguments& arguments) {
     const auto body = [&](const std::shared_ptr<const Communicator>& run) {
         const Config config = configuration(arguments);
         const Registry registry(config.plugin_path);
-        if (is_partitioned_run(registry, config.solver))
+        if (is_partitioned_run(registry, config.solver, arguments.problem))
             if (const auto code = solve_in_parts(
                     run, {arguments.problem, arguments.warm_start, arguments.solution, arguments.json, arguments.curve},
                     registry, config))
@@ -153,7 +155,9 @@ void print_report(const SolveReport& report) {
 void add_solve(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<SolveArguments>();
     auto* command = program.add_subcommand("solve", "Solve a problem with one solver");
-    command->add_option("problem", arguments->problem, "Problem folder, or FCLib file (.hdf5)")
+    command
+        ->add_option("problem", arguments->problem,
+                     "Problem folder, or FCLib file (.hdf5), or HDF5 file of a problem (.h5)")
         ->required()
         ->type_name("PROBLEM");
     command->add_option("--solver", arguments->solver, "Name of a plugin, or path of a shared library [auto]")
@@ -169,7 +173,10 @@ void add_solve(CLI::App& program, Action& action) {
     command->add_option("--time-limit", arguments->time_limit, "Limit of the solver's own time [none]")
         ->type_name("SECONDS");
     command->add_option("--warm-start", arguments->warm_start, "Solution folder to start from")->type_name("DIR");
-    command->add_option("--solution", arguments->solution, "Folder to write the solution to")->type_name("DIR");
+    command
+        ->add_option("--solution", arguments->solution,
+                     "Folder to write the solution to; in parts and of an HDF5 problem, a file")
+        ->type_name("DIR");
     command->add_option("--config", arguments->config, "YAML file with the same settings; flags override it")
         ->type_name("FILE");
     add_plugin_path(*command, arguments->plugin_path);

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "command.hpp"
 #include "delassus/error.hpp"
+#include "delassus/partitioned_files.hpp"
 #include "delassus/partitioned_solver.hpp"
 #include "delassus/problem_files.hpp"
 #include "process/stdout_guard.hpp"
@@ -18,12 +20,32 @@ namespace delassus::command {
 
 namespace {
 
-/// The ranges of a vector that every process has, or the whole of one of which every process has a range.
-std::vector<double> own_range(const std::vector<double>& all, const std::vector<std::int64_t>& start, int rank) {
+/// Own entries of a vector that every process has in the order that the problem had before it was moved.
+std::vector<double> own_of(const std::vector<double>& all, const std::vector<std::int64_t>& start, int rank,
+                           const std::vector<std::int64_t>& origin) {
     const auto r = static_cast<std::size_t>(rank);
-    return {all.begin() + start[r], all.begin() + start[r + 1]};
+    if (origin.empty()) return {all.begin() + start[r], all.begin() + start[r + 1]};
+    std::vector<double> own;
+    for (const auto number : origin) own.push_back(all[static_cast<std::size_t>(number)]);
+    return own;
 }
 
+/// A solution folder that every process reads, or a file of which each reads its slice.
+Solution read_start(const Communicator& run, const std::filesystem::path& path, const PartitionedProblem& part) {
+    if (std::filesystem::is_regular_file(path)) return read_partitioned_solution(run, path, part);
+    Solution own;
+    together(run, [&] {
+        if (std::max(part.n_all(), part.m_all()) > std::numeric_limits<std::int32_t>::max())
+            throw InputError(fmt::format("{}: a folder holds no solution of this size; give a file", path.string()));
+        const Solution start =
+            read_solution(path, static_cast<std::int32_t>(part.n_all()), static_cast<std::int32_t>(part.m_all()));
+        own = {own_of(start.x, part.column_start, run.rank(), part.column_origin),
+               own_of(start.lambda, part.row_start, run.rank(), part.row_origin)};
+    });
+    return own;
+}
+
+/// On process 0 the vector of which every process has a range.
 std::vector<double> whole_of(const Communicator& run, const std::vector<double>& own) {
     std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(run.size()));
     const auto* bytes = reinterpret_cast<const std::byte*>(own.data());
@@ -51,21 +73,25 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
                                   const Registry& registry, const Config& config) {
     SolveSettings settings = config.solver.settings();
     settings.record_curve = arguments.curve;
-    Problem data;
-    together(*run, [&] {
-        data = read_problem(arguments.problem);
-        if (config.solver.law) data.law = *config.solver.law;
-    });
-    const PreparedPart problem(run, part_of(*run, std::move(data)));
+    bool file = false;
+    together(*run, [&] { file = is_partitioned_file(arguments.problem); });
+    const auto read = [&] {
+        if (file) {
+            PartitionedProblem part = read_partitioned(*run, arguments.problem);
+            if (config.solver.law) part.law = *config.solver.law;
+            return part;
+        }
+        Problem data;
+        together(*run, [&] {
+            data = read_problem(arguments.problem);
+            if (config.solver.law) data.law = *config.solver.law;
+        });
+        return part_of(*run, std::move(data));
+    };
+    const PreparedPart problem(run, read());
     Solution own;
     if (!arguments.warm_start.empty()) {
-        together(*run, [&] {
-            const Solution start =
-                read_solution(arguments.warm_start, static_cast<std::int32_t>(problem.problem().n_all()),
-                              static_cast<std::int32_t>(problem.problem().m_all()));
-            own = {own_range(start.x, problem.problem().column_start, run->rank()),
-                   own_range(start.lambda, problem.problem().row_start, run->rank())};
-        });
+        own = read_start(*run, arguments.warm_start, problem.problem());
         settings.warm_start = true;
     }
 
@@ -99,10 +125,14 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
     const auto processes = process_reports(problem);
     const std::string json = to_json(report, processes);
     if (!arguments.solution.empty()) {
-        const Solution whole = {whole_of(*run, own.x), whole_of(*run, own.lambda)};
-        together(*run, [&] {
-            if (run->rank() == 0) write_solution(whole, json, arguments.solution);
-        });
+        if (file) {
+            write_partitioned_solution(*run, arguments.solution, problem.problem(), own.x, own.lambda, json);
+        } else {
+            const Solution whole = {whole_of(*run, own.x), whole_of(*run, own.lambda)};
+            together(*run, [&] {
+                if (run->rank() == 0) write_solution(whole, json, arguments.solution);
+            });
+        }
     }
     if (run->rank() == 0) {
         if (arguments.json) {
