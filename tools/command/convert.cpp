@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "command.hpp"
+#include "delassus/distributed.hpp"
+#include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
 
 namespace delassus::command {
@@ -15,6 +17,7 @@ struct ConvertArguments {
 };
 
 int convert(const ConvertArguments& arguments) {
+    if (process_count() > 1) throw InputError("convert works in one process; start it without mpirun");
     Problem problem = read_problem(arguments.input);
     if (!arguments.law.empty()) problem.law = law_of(arguments.law);
     write_problem(problem, arguments.output);

@@ -2,6 +2,7 @@
 // A small solver of partitioned problems for tests: accelerated projected gradients, of which every process keeps the
 // whole x. It also fails as it is told, on one process.
 #include <mpi.h>
+#include <Eigen/LU>
 
 #include <Eigen/LU>
 
