@@ -11,6 +11,7 @@
 #include "delassus/config.hpp"
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
+#include "delassus/generate_partitioned.hpp"
 #include "delassus/partitioned_files.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
@@ -28,7 +29,7 @@ struct SolveArguments {
     std::filesystem::path problem;
     std::string solver;
     std::vector<std::string> settings;
-    std::string law;
+    std::string law, partition = "auto";
     std::optional<double> tolerance, time_limit;
     std::optional<std::int64_t> max_iterations;
     std::filesystem::path warm_start, solution, config;
@@ -62,7 +63,8 @@ Config configuration(const SolveArguments& arguments) {
 /// A solver that can share the problem, and several processes; or one, where the problem is in a file that is made to
 /// be shared and the solver was named.
 bool is_partitioned_run(const Registry& registry, const SolverConfig& solver, const std::filesystem::path& problem) {
-    if (process_count() == 1 && (solver.name == "auto" || !is_partitioned_file(problem))) return false;
+    const bool made_to_be_shared = is_partitioned_file(problem) || is_generated_problem(problem.string());
+    if (process_count() == 1 && (solver.name == "auto" || !made_to_be_shared)) return false;
     const std::uint64_t capabilities = is_library_path(solver.name) ? registry.load(solver.name)->info().capabilities
                                                                     : solver_info(registry, solver.name).capabilities;
     return (capabilities & DELASSUS_CAN_PARTITIONED) != 0;
@@ -130,9 +132,11 @@ int solve(const SolveArguments& arguments) {
         const Config config = configuration(arguments);
         const Registry registry(config.plugin_path);
         if (is_partitioned_run(registry, config.solver, arguments.problem))
-            if (const auto code = solve_in_parts(
-                    run, {arguments.problem, arguments.warm_start, arguments.solution, arguments.json, arguments.curve},
-                    registry, config))
+            if (const auto code =
+                    solve_in_parts(run,
+                                   {arguments.problem, arguments.warm_start, arguments.solution, arguments.json,
+                                    arguments.curve, partitioning_of(arguments.partition)},
+                                   registry, config))
                 return *code;
         return solve_whole(arguments, registry, config);
     };
@@ -177,6 +181,10 @@ void add_solve(CLI::App& program, Action& action) {
         ->add_option("--solution", arguments->solution,
                      "Folder to write the solution to; in parts and of an HDF5 problem, a file")
         ->type_name("DIR");
+    command
+        ->add_option("--partition", arguments->partition,
+                     "Under mpirun, who gets which bodies: auto | file (by the order of the file) | scotch [auto]")
+        ->type_name("HOW");
     command->add_option("--config", arguments->config, "YAML file with the same settings; flags override it")
         ->type_name("FILE");
     add_plugin_path(*command, arguments->plugin_path);

@@ -7,12 +7,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "command.hpp"
 #include "delassus/error.hpp"
+#include "delassus/generate_partitioned.hpp"
 #include "delassus/partitioned_files.hpp"
 #include "delassus/partitioned_solver.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/repartition.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 
@@ -45,15 +48,26 @@ Solution read_start(const Communicator& run, const std::filesystem::path& path, 
     return own;
 }
 
-/// On process 0 the vector of which every process has a range.
-std::vector<double> whole_of(const Communicator& run, const std::vector<double>& own) {
+/// On process 0 the vector of which every process has a part, in the order that it had before it was moved.
+std::vector<double> whole_of(const Communicator& run, const std::vector<double>& own,
+                             const std::vector<std::int64_t>& start, const std::vector<std::int64_t>& origin) {
+    struct Entry {
+        std::int64_t place;
+        double value;
+    };
+    std::vector<Entry> entries;
+    for (std::size_t k = 0; k < own.size(); ++k)
+        entries.push_back(
+            {origin.empty() ? start[static_cast<std::size_t>(run.rank())] + static_cast<std::int64_t>(k) : origin[k],
+             own[k]});
     std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(run.size()));
-    const auto* bytes = reinterpret_cast<const std::byte*>(own.data());
-    to[0].assign(bytes, bytes + own.size() * sizeof(double));
-    std::vector<double> whole;
+    const auto* bytes = reinterpret_cast<const std::byte*>(entries.data());
+    to[0].assign(bytes, bytes + entries.size() * sizeof(Entry));
+    std::vector<double> whole(run.rank() == 0 ? static_cast<std::size_t>(start.back()) : 0);
     for (const auto& from : run.exchange(to)) {
-        const auto* values = reinterpret_cast<const double*>(from.data());
-        whole.insert(whole.end(), values, values + from.size() / sizeof(double));
+        const auto* first = reinterpret_cast<const Entry*>(from.data());
+        for (const Entry& entry : std::span(first, from.size() / sizeof(Entry)))
+            whole[static_cast<std::size_t>(entry.place)] = entry.value;
     }
     return whole;
 }
@@ -76,19 +90,19 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
     bool file = false;
     together(*run, [&] { file = is_partitioned_file(arguments.problem); });
     const auto read = [&] {
-        if (file) {
-            PartitionedProblem part = read_partitioned(*run, arguments.problem);
-            if (config.solver.law) part.law = *config.solver.law;
-            return part;
-        }
+        if (is_generated_problem(arguments.problem.string()))
+            return generate_partitioned(*run, pile_parameters(arguments.problem.string()));
+        if (file) return read_partitioned(*run, arguments.problem);
         Problem data;
-        together(*run, [&] {
-            data = read_problem(arguments.problem);
-            if (config.solver.law) data.law = *config.solver.law;
-        });
+        together(*run, [&] { data = read_problem(arguments.problem); });
         return part_of(*run, std::move(data));
     };
-    const PreparedPart problem(run, read());
+    const auto placed = [&] {
+        PartitionedProblem part = repartition(*run, read(), arguments.partition);
+        if (config.solver.law) part.law = *config.solver.law;
+        return part;
+    };
+    const PreparedPart problem(run, placed());
     Solution own;
     if (!arguments.warm_start.empty()) {
         own = read_start(*run, arguments.warm_start, problem.problem());
@@ -125,10 +139,12 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
     const auto processes = process_reports(problem);
     const std::string json = to_json(report, processes);
     if (!arguments.solution.empty()) {
-        if (file) {
+        if (file || is_generated_problem(arguments.problem.string())) {
             write_partitioned_solution(*run, arguments.solution, problem.problem(), own.x, own.lambda, json);
         } else {
-            const Solution whole = {whole_of(*run, own.x), whole_of(*run, own.lambda)};
+            const PartitionedProblem& part = problem.problem();
+            const Solution whole = {whole_of(*run, own.x, part.column_start, part.column_origin),
+                                    whole_of(*run, own.lambda, part.row_start, part.row_origin)};
             together(*run, [&] {
                 if (run->rank() == 0) write_solution(whole, json, arguments.solution);
             });

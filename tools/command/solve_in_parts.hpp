@@ -8,6 +8,7 @@
 
 #include "delassus/communicator.hpp"
 #include "delassus/config.hpp"
+#include "delassus/repartition.hpp"
 #include "delassus/solver.hpp"
 
 namespace delassus::command {
@@ -15,6 +16,7 @@ namespace delassus::command {
 struct PartsArguments {
     std::filesystem::path problem, warm_start, solution;
     bool json = false, curve = false;
+    Partitioning partition = Partitioning::Automatic;
 };
 
 /// Solves on all processes together and reports on process 0; the exit code. Nothing if the solver is auto and no
