@@ -103,6 +103,10 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
         return part;
     };
     const PreparedPart problem(run, placed());
+    // The linear solvers that get the whole problem factor it once; what a file holds may be too large for that.
+    const bool made_to_be_shared = file || is_generated_problem(arguments.problem.string());
+    const bool linear = (problem.needs() & UINT64_C(0xffff) & ~DELASSUS_CAN_FREE) == 0;
+    if (config.solver.name == "auto" && linear && !made_to_be_shared) return std::nullopt;
     Solution own;
     if (!arguments.warm_start.empty()) {
         own = read_start(*run, arguments.warm_start, problem.problem());
@@ -139,7 +143,7 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
     const auto processes = process_reports(problem);
     const std::string json = to_json(report, processes);
     if (!arguments.solution.empty()) {
-        if (file || is_generated_problem(arguments.problem.string())) {
+        if (made_to_be_shared) {
             write_partitioned_solution(*run, arguments.solution, problem.problem(), own.x, own.lambda, json);
         } else {
             const PartitionedProblem& part = problem.problem();
