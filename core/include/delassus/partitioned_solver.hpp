@@ -96,4 +96,18 @@ private:
     std::unique_ptr<Implementation> implementation_;
 };
 
+/// What one process had of a partitioned problem, and what it cost it.
+struct ProcessReport {
+    std::int64_t n = 0, m = 0;     ///< own columns and rows
+    std::int64_t ghosts = 0;       ///< columns of others that its rows have to do with
+    std::int64_t bytes_sent = 0;   ///< by the core since the start; a solver's own library counts for itself
+    std::int64_t peak_memory = 0;  ///< bytes resident at most so far
+};
+
+/// Of all processes, by rank. Collective.
+[[nodiscard]] DELASSUS_API std::vector<ProcessReport> process_reports(const PreparedPart& problem);
+
+/// The report as JSON text with the processes beside it (docs/report.md).
+[[nodiscard]] DELASSUS_API std::string to_json(const SolveReport& report, const std::vector<ProcessReport>& processes);
+
 }  // namespace delassus

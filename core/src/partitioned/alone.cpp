@@ -17,7 +17,7 @@ AloneAlarm::AloneAlarm(const Communicator& communicator, std::string sentence) {
     if (communicator.size() == 1) return;
     thread_ = std::thread([this, &communicator, sentence = std::move(sentence)] {
         std::unique_lock lock(mutex_);
-        if (!condition_.wait_for(lock, std::chrono::seconds(3), [this] { return done_; }))
+        if (!condition_.wait_for(lock, std::chrono::seconds(2), [this] { return done_; }))
             fail_alone(communicator, sentence);
     });
 }
@@ -30,6 +30,11 @@ AloneAlarm::~AloneAlarm() {
     }
     condition_.notify_one();
     thread_.join();
+}
+
+void meet_in_failure(const Communicator& last_words, const std::string& sentence) {
+    const AloneAlarm alarm(last_words, sentence);
+    static_cast<void>(last_words.all(0));
 }
 
 void fail_alone(const Communicator& communicator, const std::string& sentence) {

@@ -11,7 +11,7 @@
 
 namespace delassus {
 
-/// Ends the run of all processes with a sentence and exit code 3 unless destroyed within three seconds. A process that
+/// Ends the run of all processes with a sentence and exit code 3 unless destroyed within two seconds. A process that
 /// has failed holds one while it waits for the others: they come if they have failed as well, and never if they wait
 /// for it somewhere else.
 class AloneAlarm {

@@ -8,14 +8,18 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <limits>
+#include <map>
 
 #include "delassus/error.hpp"
 #include "partitioned/alone.hpp"
 #include "partitioned/part_meter.hpp"
 #include "partitioned/prepared_part.hpp"
+#include "solver/auto_solver.hpp"
 #include "solver/finished_solver.hpp"
 #include "solver/judgement.hpp"
 #include "solver/plugin_instance.hpp"
+#include "solver/ranking.hpp"
 #include "solver/solver_implementation.hpp"
 #include "support/finite.hpp"
 
@@ -113,7 +117,10 @@ struct PartitionedSolver::Implementation {
     const Registry& registry;
     SolverConfig config;
     std::shared_ptr<const Communicator> communicator;
-    std::unique_ptr<PluginInstance> instance;
+    std::unique_ptr<PluginInstance> instance;  // or, for auto:
+    std::unique_ptr<Ranking> ranking;
+    PluginInfo info_of_auto;
+    std::map<std::pair<std::string, OptionTexts>, PartitionedSolver> solvers;
     bool analyzed = false;
     std::uint64_t pattern_id = 0, values_id = 0;
 
@@ -168,16 +175,28 @@ struct PartitionedSolver::Implementation {
 
     void solve_with_plugin(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
                            SolveReport& report);
+    /// The stages of the ranking, and after them every other solver that can, each from the best so far.
+    void solve_in_stages(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
+                         SolveReport& report);
+    [[nodiscard]] const RankingRule& rule_of(const PreparedPart& problem, double tolerance) const {
+        const auto rows = std::min<std::int64_t>(problem.raw().m_all, std::numeric_limits<std::int32_t>::max());
+        return ranking->rule({problem.needs(), tolerance, false}, static_cast<std::int32_t>(rows));
+    }
 };
 
 PartitionedSolver::PartitionedSolver(const Registry& registry, SolverConfig config,
                                      std::shared_ptr<const Communicator> communicator)
-    : implementation_(new Implementation{registry, std::move(config), std::move(communicator), nullptr}) {
+    : implementation_(new Implementation{registry, std::move(config), std::move(communicator), {}, {}, {}, {}}) {
     auto& self = *implementation_;
     together(*self.communicator, [&] {
         OptionTexts options = self.config.options;
         if (!take_finish(options).solver.empty())
             throw InputError("a partitioned problem is solved by one solver; leave out the option \"finish\"");
+        if (self.config.name == auto_name) {
+            self.ranking = std::make_unique<Ranking>(ranking_of(registry, options));
+            self.info_of_auto = auto_info(registry);
+            return;
+        }
         self.instance = std::make_unique<PluginInstance>(registry.load(self.config.name), options);
     });
 }
@@ -187,11 +206,18 @@ PartitionedSolver::PartitionedSolver(PartitionedSolver&&) noexcept = default;
 PartitionedSolver& PartitionedSolver::operator=(PartitionedSolver&&) noexcept = default;
 
 const PluginInfo& PartitionedSolver::info() const {
-    return implementation_->instance->info();
+    return implementation_->instance ? implementation_->instance->info() : implementation_->info_of_auto;
 }
 
 std::string PartitionedSolver::refusal(const PreparedPart& problem, const SolveSettings& settings) const {
     std::uint64_t needs = problem.needs();
+    if (const auto& self = *implementation_; self.ranking) {
+        if (!unnamed(self.registry, needs).empty()) return {};
+        for (const auto& ranked : self.rule_of(problem, settings.tolerance).stages)
+            if (can(self.registry, ranked.solver, needs)) return {};
+        return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
+                           problem.describe(needs));
+    }
     if (settings.warm_start) needs |= DELASSUS_CAN_WARM_START;
     const auto missing = info().missing(needs);
     if (missing == 0) return {};
@@ -252,6 +278,63 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
         report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
 }
 
+void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& problem, Solution& own,
+                                                        const SolveSettings& settings, SolveReport& report) {
+    const RankingRule& rule = rule_of(problem, settings.tolerance);
+    std::vector<RankedStage> stages = rule.stages;
+    for (const auto& name : unnamed(registry, problem.needs()))
+        if (std::none_of(stages.begin(), stages.end(), [&](const RankedStage& one) { return one.solver == name; }))
+            stages.push_back({name, {}, {.reason = "the solvers before it did not reach the tolerance"}});
+    double best = std::numeric_limits<double>::infinity(), spent = 0.0;
+    bool started = settings.warm_start;
+    for (const auto& ranked : stages) {
+        const bool own_law = !ranked.stage.law || *ranked.stage.law == problem.problem().law;
+        if (!own_law || !can(registry, ranked.solver, problem.needs())) continue;
+        auto place = solvers.find({ranked.solver, ranked.options});
+        if (place == solvers.end()) {
+            SolverConfig one;
+            one.name = ranked.solver;
+            one.options = ranked.options;
+            place = solvers
+                        .emplace(std::pair(ranked.solver, ranked.options),
+                                 PartitionedSolver(registry, std::move(one), communicator))
+                        .first;
+        }
+        SolveSettings stage = settings;
+        stage.tolerance = std::max(settings.tolerance, ranked.stage.tolerance);
+        stage.max_iterations = std::min(settings.max_iterations - report.iterations, ranked.stage.max_iterations);
+        stage.time_limit = settings.time_limit - spent;
+        stage.warm_start = started && (place->second.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
+        if (stage.max_iterations <= 0 || !(stage.time_limit > 0.0)) break;
+        Solution next = own;
+        const SolveReport done = place->second.solve(problem, next, stage);
+        spent += done.seconds_setup + done.seconds_solve;
+        report.iterations += done.iterations;
+        report.seconds_setup += done.seconds_setup;
+        report.seconds_solve += done.seconds_solve;
+        report.curve.insert(report.curve.end(), done.curve.begin(), done.curve.end());
+        report.stages.push_back({done.solver, done.options, done.law, ranked.stage.reason, stage.tolerance, done.status,
+                                 done.message, done.iterations, done.seconds_setup + done.seconds_solve,
+                                 done.error.natural});
+        const bool good = std::isfinite(done.error.natural) && done.error.natural < best;
+        if (good || !started || done.status == Status::Solved) {
+            own = std::move(next);
+            best = done.error.natural;
+            started = true;
+            report.claimed_residual = done.claimed_residual;
+        }
+        report.status = done.status;
+        const bool to_the_end = stage.tolerance <= settings.tolerance;
+        if ((done.status == Status::Solved && to_the_end) || done.status == Status::Cancelled ||
+            done.status == Status::TimeLimit || (ranked.last && done.status != Status::Solved))
+            break;
+        if (done.status == Status::Solved) report.status = Status::Stalled;
+    }
+    std::vector<std::string> names;
+    for (const auto& stage : report.stages) names.push_back(stage.solver);
+    report.message = fmt::format("{}: {}", rule.name, fmt::join(names, ", then "));
+}
+
 SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own, const SolveSettings& settings) {
     auto& self = *implementation_;
     const Communicator& run = *self.communicator;
@@ -277,7 +360,8 @@ SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own,
     report.options = self.config.options;
     report.law = problem.problem().law;
     report.tolerance = settings.tolerance;
-    self.solve_with_plugin(problem, own, settings, report);
+    self.ranking ? self.solve_in_stages(problem, own, settings, report)
+                 : self.solve_with_plugin(problem, own, settings, report);
 
     std::int64_t not_finite = all_finite(own.x) && all_finite(own.lambda) ? 0 : 1;
     run.max(std::span(&not_finite, 1));

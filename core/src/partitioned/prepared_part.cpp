@@ -11,6 +11,7 @@
 #include "partitioned/part_meter.hpp"
 #include "problem/cone_kinds.hpp"
 #include "problem/need_of.hpp"
+#include "problem/parallel_rows.hpp"
 #include "problem/symmetry.hpp"
 #include "support/finite.hpp"
 #include "support/module.hpp"
@@ -408,12 +409,33 @@ void PreparedPart::Implementation::derive_needs() {
         if (counts[static_cast<std::size_t>(kind.kind)] > 0) raw.needs |= kind.capability();
     set_law_needs();
     if (raw.n_all > 0 && compliant) raw.needs |= DELASSUS_CAN_COMPLIANCE;
-    // The cheap certificates of a whole problem that need no more than counts.
-    std::int64_t empty = 0;
-    for (std::int64_t row = 0; row < raw.m && !compliant; ++row)
-        empty = std::max<std::int64_t>(empty, raw.D.row_start[row] == raw.D.row_start[row + 1] ? 1 : 0);
-    if (raw.n_all > 0 && (largest(empty) > 0 || (!compliant && raw.m_all > raw.n_all)))
-        raw.needs |= DELASSUS_CAN_REDUNDANT;
+    if (raw.n_all > 0 && raw.m_all > 0 && certain_redundancy()) raw.needs |= DELASSUS_CAN_REDUNDANT;
+}
+
+// The certificates of RedundancyCheck. Parallel rows are looked for within each process: those of two bodies belong to
+// one, as a rule.
+bool PreparedPart::Implementation::certain_redundancy() const {
+    if (!compliant && raw.m_all > raw.n_all) return true;
+    const auto is_rigid = [&](std::int64_t row) { return raw.E.row_start[row] == raw.E.row_start[row + 1]; };
+    std::vector<double> touched(columns.size(), 0.0);
+    std::array<std::int64_t, 3> sums = {0, 0, 0};  // rigid rows, empty ones, columns that they touch
+    for (std::int64_t row = 0; row < raw.m; ++row) {
+        if (!is_rigid(row)) continue;
+        ++sums[0];
+        if (raw.D.row_start[row] == raw.D.row_start[row + 1]) ++sums[1];
+        for (auto k = raw.D.row_start[row]; k < raw.D.row_start[row + 1]; ++k)
+            touched[columns.place(raw.D.column[k])] = 1.0;
+    }
+    columns.add(*communicator, touched);
+    sums[2] = std::count_if(touched.begin(), touched.begin() + raw.n, [](double times) { return times > 0.0; });
+    communicator->sum(sums);
+    if (sums[1] > 0 || sums[0] > sums[2]) return true;
+    std::int64_t parallel = 0;
+    together(*communicator, [&] {
+        std::vector<RowDirection> directions;
+        parallel = has_parallel_rows(problem.D, is_rigid, directions) ? 1 : 0;
+    });
+    return largest(parallel) > 0;
 }
 
 void PreparedPart::Implementation::set_law_needs() {

@@ -52,6 +52,7 @@ struct PreparedPart::Implementation {
     void lay_out();
     void count_cones();
     void derive_needs();
+    [[nodiscard]] bool certain_redundancy() const;
     void set_law_needs();
     void identify();
     [[nodiscard]] PartMeter& measuring() const;

@@ -90,7 +90,11 @@ std::uint64_t needs_of(const PreparedProblem& problem, const SolveSettings& sett
 }
 
 std::string who_can(const Registry& registry, std::uint64_t needs) {
-    const auto capable = registry.capable(needs);
+    auto capable = registry.capable(needs);
+    if ((needs & DELASSUS_CAN_DISTRIBUTED) != 0)  // a problem that is given whole to all may be shared among them
+        for (auto& name : registry.capable((needs & ~static_cast<std::uint64_t>(DELASSUS_CAN_DISTRIBUTED)) |
+                                           DELASSUS_CAN_PARTITIONED))
+            if (std::find(capable.begin(), capable.end(), name) == capable.end()) capable.push_back(std::move(name));
     return capable.empty() ? ". No installed solver can" : fmt::format(". Can: {}", fmt::join(capable, ", "));
 }
 
