@@ -21,6 +21,7 @@ install(FILES "${DELASSUS_PLUGIN_DIRECTORY}/not-built.list" DESTINATION ${CMAKE_
 install(TARGETS delassus_sdk EXPORT delassusSdkTargets)
 install(DIRECTORY core/include/delassus DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
 install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" tools/generate/include/delassus/generate.hpp
+  tools/generate/include/delassus/generate_partitioned.hpp
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus COMPONENT development)
 install(DIRECTORY examples/plugin examples/embed examples/system examples/engines DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         COMPONENT development)

@@ -35,12 +35,19 @@ public:
     /// Takes an iterate (m each, scaled), the best natural error so far and the penalty in use; the penalty to use.
     [[nodiscard]] double next(const sdk::Vector& lambda, const sdk::Vector& z, double best, std::int64_t iteration,
                               double penalty) {
+        return next(lambda, z, best, iteration, penalty, [](const sdk::Vector& v) { return v.norm(); });
+    }
+
+    /// As above for the own rows of a problem in parts: norm(v) is that of all processes' rows.
+    template <class Norm>
+    [[nodiscard]] double next(const sdk::Vector& lambda, const sdk::Vector& z, double best, std::int64_t iteration,
+                              double penalty, const Norm& norm) {
         if (best < 0.5 * milestone_) {
             milestone_ = best;
             milestone_iteration_ = iteration;
         }
         if (has_previous_) {
-            const double reactions = (lambda - lambda_).norm(), velocities = (z - z_).norm();
+            const double reactions = norm(lambda - lambda_), velocities = norm(z - z_);
             if (reactions > 0.0 || velocities > 0.0) {
                 // One of them may rest, where all contacts stick or all are open.
                 const double ratio = reactions / (penalty * velocities);

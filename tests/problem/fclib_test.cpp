@@ -159,8 +159,8 @@ TEST(FclibFile, RoundTrip) {
         Problem problem = read(fixture);
         problem.source = "by hand";
         problem.notes = "Υ";
-        write_problem(problem, scratch / "copy.h5");
-        expect_same(problem, read_problem(scratch / "copy.h5"));
+        write_problem(problem, scratch / "copy.hdf5");
+        expect_same(problem, read_problem(scratch / "copy.hdf5"));
     }
     EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), fs::directory_iterator()), 1);
 }

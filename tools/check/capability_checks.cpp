@@ -24,7 +24,8 @@ std::string solve_one(const Subject& subject, const KnownProblem& known) {
 
 /// A plugin that refuses problems by its own predicate must still take at least one that needs each thing it declares.
 std::string check_shown(const Subject& subject) {
-    std::uint64_t shown = DELASSUS_CAN_WARM_START | DELASSUS_CAN_DISTRIBUTED;  // checks of their own
+    std::uint64_t shown =
+        DELASSUS_CAN_WARM_START | DELASSUS_CAN_DISTRIBUTED | DELASSUS_CAN_PARTITIONED;  // checks of their own
     const auto problems = subject.problems();
     for (const auto& known : problems) shown |= PreparedProblem(known.problem).needs();
     const auto hidden = subject.info().capabilities & ~shown;

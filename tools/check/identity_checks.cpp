@@ -26,8 +26,8 @@ std::string check_capability_bits(const Subject& subject) {
     constexpr std::uint64_t structures = DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS | DELASSUS_CAN_H_DEFINITE |
                                          DELASSUS_CAN_H_SEMIDEFINITE | DELASSUS_CAN_H_INDEFINITE |
                                          DELASSUS_CAN_H_UNSYMMETRIC | DELASSUS_CAN_REDUCED;
-    constexpr std::uint64_t others =
-        DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START | DELASSUS_CAN_DISTRIBUTED;
+    constexpr std::uint64_t others = DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START |
+                                     DELASSUS_CAN_DISTRIBUTED | DELASSUS_CAN_PARTITIONED;
     const auto bits = subject.info().capabilities;
     expect((bits & ~(sdk::all_cones | laws | structures | others)) == 0,
            "it sets capability bits that have no meaning");

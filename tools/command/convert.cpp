@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// delassus convert: between problem folders and FCLib files.
+// delassus convert: between problem folders, problems in one file and FCLib files.
 #include <fmt/format.h>
 
 #include "command.hpp"
+#include "delassus/distributed.hpp"
+#include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
 
 namespace delassus::command {
@@ -15,6 +17,7 @@ struct ConvertArguments {
 };
 
 int convert(const ConvertArguments& arguments) {
+    if (process_count() > 1) throw InputError("convert works in one process; start it without mpirun");
     Problem problem = read_problem(arguments.input);
     if (!arguments.law.empty()) problem.law = law_of(arguments.law);
     write_problem(problem, arguments.output);
@@ -27,9 +30,14 @@ int convert(const ConvertArguments& arguments) {
 void add_convert(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<ConvertArguments>();
     auto* command = program.add_subcommand(
-        "convert", "Convert a problem; the name decides the form: .hdf5 is FCLib, anything else a folder");
-    command->add_option("input", arguments->input, "Problem folder or FCLib file")->required()->type_name("IN");
-    command->add_option("output", arguments->output, "Problem folder or FCLib file")->required()->type_name("OUT");
+        "convert",
+        "Convert a problem; the name decides the form: .h5 is one HDF5 file, .hdf5 FCLib, anything else a folder");
+    command->add_option("input", arguments->input, "Problem folder, or HDF5 file (.h5, .hdf5)")
+        ->required()
+        ->type_name("IN");
+    command->add_option("output", arguments->output, "Problem folder, or HDF5 file (.h5, .hdf5)")
+        ->required()
+        ->type_name("OUT");
     command
         ->add_option("--law", arguments->law,
                      "Friction law of the result: associated | coulomb (FCLib files mean coulomb)")

@@ -8,9 +8,12 @@
 
 #include "command.hpp"
 #include "delassus/needs.hpp"
+#include "delassus/partitioned_files.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/qualification.hpp"
 #include "delassus/rank.hpp"
+#include "on_all_processes.hpp"
+#include "partition_report.hpp"
 #include "support/json.hpp"
 
 namespace delassus::command {
@@ -23,8 +26,7 @@ struct InspectArguments {
     std::filesystem::path problem;
     std::string law;
     std::vector<std::filesystem::path> plugin_path;
-    bool qualification = false;
-    bool json = false;
+    bool qualification = false, whole = false, json = false;
 };
 
 struct ConeCount {
@@ -97,7 +99,62 @@ void print(const Problem& problem, const Qualification& found) {
     }
 }
 
+/// A problem in one file: what it holds without what takes the whole of it (rank, needs, solvers). Under mpirun also
+/// how it would be shared.
+int inspect_file(const InspectArguments& arguments) {
+    return on_all_processes([&](const std::shared_ptr<const Communicator>& run) {
+        PartitionedFileSummary found = inspect_partitioned(*run, arguments.problem);
+        if (!arguments.law.empty()) found.law = law_of(arguments.law);
+        std::optional<PartitionQuality> quality;
+        if (run->size() > 1) quality = measure_partition(*run, read_partitioned(*run, arguments.problem));
+        if (run->rank() != 0) return static_cast<int>(exit_solved);
+        const bool blocks = found.structure == Structure::Diagonal || found.structure == Structure::Blocks;
+        const std::string structure = found.structure == Structure::Definite
+                                          ? "sparse, symmetric, with a positive diagonal"
+                                          : std::string(name_of(found.structure));
+        if (arguments.json) {
+            Json json = {{"problem", found.name},
+                         {"n", found.n},
+                         {"m", found.m},
+                         {"law", name_of(found.law)},
+                         {"structure", structure},
+                         {"h_largest_block", blocks ? Json(found.largest_block) : Json(nullptr)},
+                         {"bodies", found.body_count > 0 ? Json(found.body_count) : Json(nullptr)},
+                         {"entries", {{"H", found.H_entries}, {"D", found.D_entries}, {"E", found.E_entries}}},
+                         {"cones", Json::object()},
+                         {"bytes", found.file_bytes},
+                         {"source", found.source},
+                         {"notes", found.notes}};
+            for (const auto& [kind, count] : found.cones)
+                json["cones"][kind] = {{"blocks", count.blocks}, {"rows", count.rows}};
+            if (quality)
+                json["partition"] = {{"processes", run->size()},
+                                     {"cut_cones", quality->cut_cones},
+                                     {"ghosts", quality->ghosts},
+                                     {"most_ghosts", quality->most_ghosts},
+                                     {"imbalance", quality->imbalance}};
+            fmt::print("{}\n", json_text(json, 2));
+            return static_cast<int>(exit_solved);
+        }
+        fmt::print("{}\n  n = {} velocities, m = {} constraint rows, law {}\n", found.name, found.n, found.m,
+                   name_of(found.law));
+        fmt::print("  H is {}, {} entries", structure, found.H_entries);
+        if (blocks) fmt::print(", blocks of at most {}", found.largest_block);
+        fmt::print("\n  D has {} entries, E {}\n", found.D_entries, found.E_entries);
+        if (found.body_count > 0) fmt::print("  {} bodies\n", found.body_count);
+        for (const auto& [kind, count] : found.cones)
+            fmt::print("  {} {} blocks, {} rows\n", count.blocks, kind, count.rows);
+        if (quality) print_quality(*quality, run->size());
+        if (!found.source.empty()) fmt::print("  source  {}\n", found.source);
+        if (!found.notes.empty()) fmt::print("  notes   {}\n", found.notes);
+        fmt::print("  rank, needs and solvers take the whole problem: --whole, or a problem folder\n");
+        return static_cast<int>(exit_solved);
+    });
+}
+
 int inspect(const InspectArguments& arguments) {
+    if (!arguments.whole && !arguments.qualification && is_partitioned_file(arguments.problem))
+        return inspect_file(arguments);
     Problem data = read_problem(arguments.problem);
     if (!arguments.law.empty()) data.law = law_of(arguments.law);
     const PreparedProblem prepared(std::move(data));
@@ -161,7 +218,7 @@ void add_inspect(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<InspectArguments>();
     auto* command = program.add_subcommand(
         "inspect", "Show a problem's sizes, structure, cones, rank, needs, and which solvers can take it");
-    command->add_option("problem", arguments->problem, "Problem folder, or FCLib file (.hdf5)")
+    command->add_option("problem", arguments->problem, "Problem folder, or HDF5 file (.h5, .hdf5)")
         ->required()
         ->type_name("PROBLEM");
     command->add_option("--law", arguments->law, "Friction law in place of the problem's own: associated | coulomb")
@@ -169,6 +226,8 @@ void add_inspect(CLI::App& program, Action& action) {
     add_plugin_path(*command, arguments->plugin_path);
     command->add_flag("--qualification", arguments->qualification,
                       "Check LICQ and the pointed friction cone: are reactions unique, are they bounded?");
+    command->add_flag("--whole", arguments->whole,
+                      "Read all of a problem in one file (.h5), for its rank, its needs and the solvers");
     command->add_flag("--json", arguments->json, "Print JSON");
     command->callback([arguments, &action] { action.run = [arguments] { return inspect(*arguments); }; });
 }

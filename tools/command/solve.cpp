@@ -7,13 +7,19 @@
 #include <optional>
 
 #include "command.hpp"
+#include "delassus/communicator.hpp"
 #include "delassus/config.hpp"
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
+#include "delassus/generate_partitioned.hpp"
+#include "delassus/partitioned_files.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
+#include "on_all_processes.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
+#include "process/watched_process.hpp"
+#include "solve_in_parts.hpp"
 
 namespace delassus::command {
 
@@ -23,7 +29,7 @@ struct SolveArguments {
     std::filesystem::path problem;
     std::string solver;
     std::vector<std::string> settings;
-    std::string law;
+    std::string law, partition = "auto";
     std::optional<double> tolerance, time_limit;
     std::optional<std::int64_t> max_iterations;
     std::filesystem::path warm_start, solution, config;
@@ -54,20 +60,17 @@ Config configuration(const SolveArguments& arguments) {
     return config;
 }
 
-void print_report(const SolveReport& report) {
-    fmt::print("{} with {} {}: {}", report.problem, report.solver, report.version, name_of(report.status));
-    fmt::print(" after {} iterations, {:.3g} s setup + {:.3g} s solve\n", report.iterations, report.seconds_setup,
-               report.seconds_solve);
-    if (!report.message.empty()) fmt::print("  {}\n", report.message);
-    fmt::print("  error");
-    for (const ErrorMeasure& measure : error_measures)
-        if (measure.is_error) fmt::print("  {} {:.2e}", measure.name, report.error.*measure.value);
-    fmt::print("\n");
+/// A solver that can share the problem, and several processes; or one, where the problem is in a file that is made to
+/// be shared and the solver was named.
+bool is_partitioned_run(const Registry& registry, const SolverConfig& solver, const std::filesystem::path& problem) {
+    const bool made_to_be_shared = is_partitioned_file(problem) || is_generated_problem(problem.string());
+    if (process_count() == 1 && (solver.name == "auto" || !made_to_be_shared)) return false;
+    const std::uint64_t capabilities = is_library_path(solver.name) ? registry.load(solver.name)->info().capabilities
+                                                                    : solver_info(registry, solver.name).capabilities;
+    return (capabilities & DELASSUS_CAN_PARTITIONED) != 0;
 }
 
-int solve(const SolveArguments& arguments) {
-    const Config config = configuration(arguments);
-    const Registry registry(config.plugin_path);
+int solve_whole(const SolveArguments& arguments, const Registry& registry, const Config& config) {
     SolveSettings settings = config.solver.settings();
     settings.record_curve = arguments.curve;
 
@@ -121,12 +124,44 @@ int solve(const SolveArguments& arguments) {
     return report.status == Status::Solved ? exit_solved : exit_not_converged;
 }
 
+int solve(const SolveArguments& arguments) {
+    const bool several = process_count() > 1;
+    if (several)
+        continue_in_watched_child(fmt::format("process {} of {}", process_rank(), process_count()), exit_not_converged);
+    const auto body = [&](const std::shared_ptr<const Communicator>& run) {
+        const Config config = configuration(arguments);
+        const Registry registry(config.plugin_path);
+        if (is_partitioned_run(registry, config.solver, arguments.problem))
+            if (const auto code =
+                    solve_in_parts(run,
+                                   {arguments.problem, arguments.warm_start, arguments.solution, arguments.json,
+                                    arguments.curve, partitioning_of(arguments.partition)},
+                                   registry, config))
+                return *code;
+        return solve_whole(arguments, registry, config);
+    };
+    return several ? on_all_processes(body) : body(single_process());
+}
+
 }  // namespace
+
+void print_report(const SolveReport& report) {
+    fmt::print("{} with {} {}: {}", report.problem, report.solver, report.version, name_of(report.status));
+    fmt::print(" after {} iterations, {:.3g} s setup + {:.3g} s solve\n", report.iterations, report.seconds_setup,
+               report.seconds_solve);
+    if (!report.message.empty()) fmt::print("  {}\n", report.message);
+    fmt::print("  error");
+    for (const ErrorMeasure& measure : error_measures)
+        if (measure.is_error) fmt::print("  {} {:.2e}", measure.name, report.error.*measure.value);
+    fmt::print("\n");
+}
 
 void add_solve(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<SolveArguments>();
     auto* command = program.add_subcommand("solve", "Solve a problem with one solver");
-    command->add_option("problem", arguments->problem, "Problem folder, or FCLib file (.hdf5)")
+    command
+        ->add_option("problem", arguments->problem,
+                     "Problem folder, or FCLib file (.hdf5), or HDF5 file of a problem (.h5)")
         ->required()
         ->type_name("PROBLEM");
     command->add_option("--solver", arguments->solver, "Name of a plugin, or path of a shared library [auto]")
@@ -142,7 +177,14 @@ void add_solve(CLI::App& program, Action& action) {
     command->add_option("--time-limit", arguments->time_limit, "Limit of the solver's own time [none]")
         ->type_name("SECONDS");
     command->add_option("--warm-start", arguments->warm_start, "Solution folder to start from")->type_name("DIR");
-    command->add_option("--solution", arguments->solution, "Folder to write the solution to")->type_name("DIR");
+    command
+        ->add_option("--solution", arguments->solution,
+                     "Folder to write the solution to; in parts and of an HDF5 problem, a file")
+        ->type_name("DIR");
+    command
+        ->add_option("--partition", arguments->partition,
+                     "Under mpirun, who gets which bodies: auto | file (by the order of the file) | scotch [auto]")
+        ->type_name("HOW");
     command->add_option("--config", arguments->config, "YAML file with the same settings; flags override it")
         ->type_name("FILE");
     add_plugin_path(*command, arguments->plugin_path);

@@ -107,6 +107,7 @@ inline void check_count(std::string_view family, std::string_view things, double
 Family chain_family();
 Family net_family();
 Family sphere_pile_family();
+Family pile_family();
 Family box_stack_family();
 Family brick_wall_family();
 Family elastic_block_family();

@@ -14,7 +14,7 @@ using generating::Family;
 const std::vector<Family>& families() {
     using namespace generating;
     static const std::vector<Family> table = {
-        chain_family(),      net_family(),           sphere_pile_family(), box_stack_family(),
+        chain_family(),      net_family(),           sphere_pile_family(), pile_family(),   box_stack_family(),
         brick_wall_family(), elastic_block_family(), gyroscopic_family(),  motors_family(),
     };
     return table;

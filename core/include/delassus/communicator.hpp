@@ -57,4 +57,9 @@ public:
 /// with the sentence of the first process, in the order of ranks, on which it did. Collective.
 DELASSUS_API void together(const Communicator& communicator, const std::function<void()>& body);
 
+/// For a process that has failed and cannot tell whether the others have too: waits for all of them to call this. Those
+/// that do not come within two seconds wait for this one somewhere else: the run of all then ends with this sentence
+/// and exit code 3. Nothing else may be called on this communicator.
+DELASSUS_API void meet_in_failure(const Communicator& last_words, const std::string& sentence);
+
 }  // namespace delassus

@@ -29,7 +29,8 @@ struct LocalMatrix {
 struct PartitionedProblem {
     std::string name;
     Law law = Law::Associated;
-    std::string source;
+    std::string source;  ///< where it came from
+    std::string notes;   ///< anything odd
 
     /// Process p owns the numbers start[p] … start[p + 1] − 1; processes + 1 entries, the same on all.
     std::vector<std::int64_t> column_start = {0, 0}, row_start = {0, 0}, cone_start = {0, 0};
@@ -40,6 +41,9 @@ struct PartitionedProblem {
     std::vector<double> a;    ///< n
     std::vector<double> b;    ///< m
     std::vector<Cone> cones;  ///< in the order of the own rows; together m rows
+
+    /// The first column of each own body, ascending, among the numbers of all processes; empty where nobody said it.
+    std::vector<std::int64_t> body_start;
 
     /// The numbers that the own entries of x, and of λ, had before a partition moved them: in the file, or in the
     /// generator. Empty where they are the numbers of today.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Problems and solutions on disk (docs/files.md): problem folders (problem.json and Matrix Market files), FCLib
-// HDF5 files (local and global), solution folders.
+// Problems and solutions on disk (docs/files.md): problem folders (problem.json and Matrix Market files), problems in
+// one HDF5 file, FCLib HDF5 files (local and global), solution folders.
 //
 // Readers check everything and throw InputError with one sentence that names the file. Writers write beside the target
 // and rename, so that nothing half-written is ever seen.
@@ -14,10 +14,12 @@
 
 namespace delassus {
 
-/// Reads a problem folder, or an FCLib file if the path is a file that ends in .hdf5 or .h5. The result is validated.
+/// Reads a problem folder, or, if the path is a file that ends in .h5 or .hdf5, a problem in one HDF5 file or an FCLib
+/// file, whichever its content says. The result is validated.
 DELASSUS_API Problem read_problem(const std::filesystem::path& path);
 
-/// Writes a problem folder, or an FCLib file if the path ends in .hdf5 or .h5. FCLib holds friction cones of one
+/// Writes a problem in one HDF5 file if the path ends in .h5, an FCLib file if it ends in .hdf5, else a problem folder.
+/// FCLib holds friction cones of one
 /// dimension and, globally, free rows; other problems are refused with InputError.
 DELASSUS_API void write_problem(const Problem& problem, const std::filesystem::path& path);
 

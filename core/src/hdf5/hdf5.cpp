@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <type_traits>
 
@@ -198,6 +199,38 @@ std::vector<std::string> Group::texts(const char* name) const {
     return texts;
 }
 
+Array Group::array(const char* name, bool real) const {
+    Dataset dataset = open(name);
+    if (real ? !is_plain_number(dataset.type.get()) : !is_plain_integer(dataset.type.get()))
+        refuse(fmt::format("/{} must hold {}", name, real ? "floating-point numbers" : "integers"));
+    if (shape(name).size() != 1) refuse(fmt::format("/{} must have one dimension", name));
+    Array array;
+    array.element_bytes_ = static_cast<std::int64_t>(H5Tget_size(dataset.type.get()));
+    array.count_ = dataset.count;
+    array.place_ = fmt::format("{}: {}/{}", file_, place_, name);
+    array.id_ = std::move(dataset.id);
+    return array;
+}
+
+void Array::read(std::int64_t first, std::span<std::int64_t> values) const {
+    read(first, values.size(), H5T_NATIVE_INT64, values.data());
+}
+
+void Array::read(std::int64_t first, std::span<double> values) const {
+    read(first, values.size(), H5T_NATIVE_DOUBLE, values.data());
+}
+
+void Array::read(std::int64_t first, std::size_t count, hid_t type, void* values) const {
+    if (count == 0) return;
+    const hsize_t start = static_cast<hsize_t>(first), block = count;
+    const Handle space(H5Dget_space(id_.get())), memory(H5Screate_simple(1, &block, nullptr));
+    if (first < 0 || static_cast<std::uint64_t>(first) + count > static_cast<std::uint64_t>(count_) ||
+        H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, &start, nullptr, &block, nullptr) < 0 ||
+        H5Dread(id_.get(), type, memory.get(), space.get(), H5P_DEFAULT, values) < 0)
+        throw InputError(fmt::format("{} cannot be read from {} to {} ({}).", place_, first,
+                                     first + static_cast<std::int64_t>(count) - 1, last_complaint()));
+}
+
 std::vector<std::int64_t> Group::shape(const char* name) const {
     const Dataset dataset = open(name);
     const Handle space(H5Dget_space(dataset.id.get()));
@@ -252,13 +285,28 @@ std::string Group::attribute_text(const char* name) const {
     if (!attribute.valid()) return {};
     const Handle type(H5Aget_type(attribute.get())), space(H5Aget_space(attribute.get()));
     const std::size_t size = H5Tget_size(type.get());
-    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) != 0 || size > longest_text ||
-        H5Sget_simple_extent_npoints(space.get()) != 1)
+    if (H5Tget_class(type.get()) != H5T_STRING || size > longest_text || H5Sget_simple_extent_npoints(space.get()) != 1)
         return {};
+    if (H5Tis_variable_str(type.get()) != 0) {
+        char* text = nullptr;
+        if (H5Aread(attribute.get(), type.get(), &text) < 0 || text == nullptr) return {};
+        std::string value(text, strnlen(text, longest_text));
+        H5free_memory(text);
+        return value;
+    }
     std::string value(size, '\0');
     if (H5Aread(attribute.get(), type.get(), value.data()) < 0) return {};
     value.resize(std::min(value.find('\0'), value.size()));
     return value;
+}
+
+std::int64_t Group::attribute_integer(const char* name, std::int64_t missing) const {
+    const Handle attribute(H5Aopen(id_.get(), name, H5P_DEFAULT));
+    if (!attribute.valid()) return missing;
+    const Handle type(H5Aget_type(attribute.get())), space(H5Aget_space(attribute.get()));
+    std::int64_t value = missing;
+    if (!is_plain_integer(type.get()) || H5Sget_simple_extent_npoints(space.get()) != 1) return missing;
+    return H5Aread(attribute.get(), H5T_NATIVE_INT64, &value) < 0 ? missing : value;
 }
 
 double Group::attribute_number(const char* name) const {

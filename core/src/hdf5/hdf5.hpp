@@ -6,6 +6,7 @@
 #include <hdf5.h>
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,6 +51,25 @@ void require_memory(std::uint64_t bytes = 0);
 /// What HDF5 last complained about, in its words; empty if nothing.
 std::string last_complaint();
 
+/// An open dataset of numbers of one dimension, of which ranges are read.
+class Array {
+public:
+    [[nodiscard]] std::int64_t count() const { return count_; }
+    /// Bytes that one element takes in the file.
+    [[nodiscard]] std::int64_t element_bytes() const { return element_bytes_; }
+    /// Elements first … first + values.size() − 1, which must exist. Integers of any width are read as 64-bit ones.
+    void read(std::int64_t first, std::span<std::int64_t> values) const;
+    void read(std::int64_t first, std::span<double> values) const;
+
+private:
+    friend class Group;
+    void read(std::int64_t first, std::size_t count, hid_t type, void* values) const;
+
+    Handle id_;
+    std::string place_;  ///< file and dataset, for messages
+    std::int64_t count_ = 0, element_bytes_ = 0;
+};
+
 /// A group of an open file that knows its place for messages.
 class Group {
 public:
@@ -76,6 +96,10 @@ public:
     /// Texts of one fixed length, padded with zeros: a row each.
     [[nodiscard]] std::vector<std::string> texts(const char* name) const;
 
+    /// Datasets of one dimension, open for reading ranges.
+    [[nodiscard]] Array integer_array(const char* name) const { return array(name, false); }
+    [[nodiscard]] Array number_array(const char* name) const { return array(name, true); }
+
     /// The extents of the dataset.
     [[nodiscard]] std::vector<std::int64_t> shape(const char* name) const;
     /// The chosen rows, ascending, of a dataset whose rows have `width` numbers.
@@ -84,8 +108,10 @@ public:
 
     /// The names of the groups and datasets in it, by name.
     [[nodiscard]] std::vector<std::string> members() const;
-    /// A short text that hangs on the group; empty if there is none.
+    /// A short text of fixed or of variable length that hangs on the group; empty if there is none.
     [[nodiscard]] std::string attribute_text(const char* name) const;
+    /// An integer that hangs on the group; `missing` if there is none.
+    [[nodiscard]] std::int64_t attribute_integer(const char* name, std::int64_t missing) const;
     /// A number that hangs on the group; not a number if there is none.
     [[nodiscard]] double attribute_number(const char* name) const;
 
@@ -96,6 +122,7 @@ private:
         std::int64_t count = 0;
     };
     [[nodiscard]] Dataset open(const char* name) const;
+    [[nodiscard]] Array array(const char* name, bool real) const;
     template <class Number>
     [[nodiscard]] std::vector<Number> read(const char* name, std::int64_t count, bool exactly) const;
 

@@ -91,7 +91,9 @@ PartitionedProblem part_of(const Communicator& communicator, Problem problem) {
         part.name = problem.name;
         part.law = problem.law;
         part.source = problem.source;
-        part.column_start = even_starts(n, processes, places_to_cut(problem));
+        part.notes = problem.notes;
+        const std::vector<char> may_begin = places_to_cut(problem);
+        part.column_start = even_starts(n, processes, may_begin);
         std::vector<char> may(static_cast<std::size_t>(m) + 1, 0);
         std::vector<std::int64_t> first_row = {0};
         for (const Cone& cone : problem.cones) {
@@ -106,6 +108,8 @@ PartitionedProblem part_of(const Communicator& communicator, Problem problem) {
         const auto own = static_cast<std::size_t>(communicator.rank());
         const auto column = part.column_start[own], column_end = part.column_start[own + 1];
         const auto row = part.row_start[own], row_end = part.row_start[own + 1];
+        for (auto place = column; place < column_end; ++place)
+            if (may_begin[static_cast<std::size_t>(place)]) part.body_start.push_back(place);
         part.H = rows_of(problem.H, n, column, column_end);
         part.D = rows_of(problem.D, n, row, row_end);
         if (problem.E.entries() > 0) part.E = rows_of(problem.E, m, row, row_end);
@@ -163,6 +167,7 @@ Problem gathered(const Communicator& communicator, const PartitionedProblem& par
         whole.name = part.name;
         whole.law = part.law;
         whole.source = part.source;
+        whole.notes = part.notes;
         for (const Bytes& bytes : parts) {
             ByteReader reader(bytes);
             for (SparseMatrix* matrix : {&whole.H, &whole.D, &whole.E}) append_rows(reader, *matrix);
@@ -231,6 +236,18 @@ void validate(const Communicator& communicator, const PartitionedProblem& proble
         check("H", problem.H, problem.n(), problem.n_all(), false);
         check("D", problem.D, problem.m(), problem.n_all(), false);
         check("E", problem.E, problem.m(), problem.m_all(), true);
+        for (std::size_t k = 0; k < problem.body_start.size(); ++k)
+            if (problem.body_start[k] < problem.column_start[own] ||
+                problem.body_start[k] >= problem.column_start[own + 1] ||
+                problem.body_start[k] <= (k == 0 ? problem.column_start[own] - 1 : problem.body_start[k - 1]))
+                refuse(fmt::format("its body {} begins at the column {}, out of its range or of order", k,
+                                   problem.body_start[k]));
+        if (!problem.body_start.empty() && problem.body_start[0] != problem.column_start[own])
+            refuse("its first body does not begin where its columns do");
+        for (const auto& [origin, size] :
+             {std::pair(&problem.column_origin, problem.n()), std::pair(&problem.row_origin, problem.m())})
+            if (!origin->empty() && static_cast<std::int64_t>(origin->size()) != size)
+                refuse(fmt::format("it knows the origin of {} of {} entries", origin->size(), size));
         const auto finite = [](const std::vector<double>& values) {
             return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
         };
@@ -240,6 +257,10 @@ void validate(const Communicator& communicator, const PartitionedProblem& proble
         for (std::size_t k = 0; k < problem.cones.size(); ++k) {
             const Cone& cone = problem.cones[k];
             rows += cone.rows;
+            if (k > 0 && cone.kind == problem.cones[k - 1].kind && cone.rows == problem.cones[k - 1].rows &&
+                cone.parameters == problem.cones[k - 1].parameters && cone.lo.empty() && cone.hi.empty() &&
+                problem.cones[k - 1].lo.empty() && problem.cones[k - 1].hi.empty())
+                continue;  // as good as the one before
             // The checks of one cone are those of a small problem of its own.
             Problem alone;
             alone.H = SparseMatrix::from_triplets(1, 1, {{0, 0, 1.0}});

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -16,6 +15,7 @@
 #include "delassus/sdk/residual.hpp"
 #include "delassus/sdk/saddle_point.hpp"
 #include "delassus/sdk/sparse_lu.hpp"
+#include "problem/cone_sums.hpp"
 #include "problem/dense_rows.hpp"
 #include "problem/prepared_problem.hpp"
 
@@ -62,39 +62,6 @@ Reference of_unsymmetric(const sdk::ProblemView& problem) {
 /// A reference below this share of the velocities without reactions counts as rest.
 constexpr double vanishing_velocity = 1e-8;
 
-double ratio(double numerator, double denominator) {
-    return denominator > 0.0 ? numerator / denominator : numerator;
-}
-
-/// Projections through the table of cones, and those that fill most problems without it.
-struct AnyCone {
-    const sdk::ConeOperations& operations;
-    [[nodiscard]] static std::int32_t rows(const delassus_cone& cone) { return cone.rows; }
-    [[nodiscard]] bool is_linear() const { return operations.is_linear; }
-    void project(const delassus_cone& cone, double* lambda) const { operations.project(cone, lambda); }
-    void project_dual(const delassus_cone& cone, double* u) const { operations.project_dual(cone, u); }
-    [[nodiscard]] double gap(const delassus_cone& cone, const double* lambda, const double* u) const {
-        return operations.gap(cone, lambda, u);
-    }
-};
-/// Friction with three rows, without branches.
-struct SpatialFriction : sdk::FrictionCone {
-    explicit SpatialFriction(const delassus_cone& cone) : mu(sdk::friction_coefficient(cone)) {}
-    const double mu;  // a copy, since the compiler must assume that projections overwrite the cone
-
-    [[nodiscard]] static constexpr std::int32_t rows(const delassus_cone&) { return 3; }
-    [[nodiscard]] static constexpr bool is_linear() { return false; }
-
-    void project(const delassus_cone&, double* lambda) const { project_spatial(mu, lambda); }
-    void project_dual(const delassus_cone&, double* u) const {
-        if (mu > 0.0) {
-            project_spatial(1.0 / mu, u);
-        } else {
-            u[0] = std::max(0.0, u[0]);
-        }
-    }
-};
-
 }  // namespace
 
 struct ErrorMeter::Implementation {
@@ -124,23 +91,6 @@ struct ErrorMeter::Implementation {
         if (view.E.nonZeros() > 0) plain_u.noalias() += view.E * lambda;
         return plain_u;
     }
-
-    /// The measures of Errors as sums over the cones: of squares, except for the gap.
-    struct Sums {
-        double natural = 0.0, cone = 0.0, dual = 0.0, gap = 0.0, siconos = 0.0;
-        double velocity = 0.0;  ///< ‖u‖²
-        double rounding = 0.0;
-
-        void operator+=(const Sums& other) {
-            natural += other.natural;
-            cone += other.cone;
-            dual += other.dual;
-            gap += other.gap;
-            siconos += other.siconos;
-            velocity += other.velocity;
-            rounding += other.rounding;
-        }
-    };
 
     /// What a pass over rows computes.
     enum class Pass { Both, Velocities, Impulse };
@@ -198,45 +148,11 @@ struct ErrorMeter::Implementation {
         }
     }
 
-    /// λ, u: of the cone's rows, u with the De Saxcé term where the law asks for it. trial: memory for as many.
-    template <class Projections>
-    void add_cone(const Projections& on, std::size_t c, const double* lambda, const double* u, double* trial,
-                  Sums& sums) const {
-        const auto& cone = prepared.cones[c];
-        const std::int32_t rows = on.rows(cone);
-        const double square = residual.scaling()[c] * residual.scaling()[c];
-        const auto squared_distance = [&](const double* from) {
-            double sum = 0.0;
-            for (std::int32_t i = 0; i < rows; ++i) sum += (from[i] - trial[i]) * (from[i] - trial[i]);
-            return sum;
-        };
-        double squared_velocity = 0.0;
-        for (std::int32_t i = 0; i < rows; ++i) squared_velocity += u[i] * u[i];
-        sums.velocity += squared_velocity;
-        if (on.is_linear()) {  // λ cancels; leaving it out avoids its rounding
-            sums.natural += square * squared_velocity;
-        } else {
-            for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - square * u[i];
-            on.project(cone, trial);
-            sums.natural += squared_distance(lambda) / square;
-        }
-        for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i];
-        on.project(cone, trial);
-        sums.cone += squared_distance(lambda) / square;
-        for (std::int32_t i = 0; i < rows; ++i) trial[i] = lambda[i] - u[i];
-        on.project(cone, trial);
-        sums.siconos += squared_distance(lambda);
-        for (std::int32_t i = 0; i < rows; ++i) trial[i] = u[i];
-        on.project_dual(cone, trial);
-        sums.dual += squared_distance(u) * square;
-        sums.gap += on.gap(cone, lambda, u);
-    }
-
     /// One pass over D and E, cone by cone, which leaves the impulse Dᵀ λ as well. On the rounding: a product of k
     /// terms is off by at most k ε times the product of the absolute values (Higham, Accuracy and Stability of
     /// Numerical Algorithms, eq. 3.5); the errors of single terms add up as √k, and ε counts for one.
     /// The sums are those of parts of the cones, added up in their order: the same bits for any number of threads.
-    [[nodiscard]] Sums sums_over_cones(const double* x, const double* lambda) const {
+    [[nodiscard]] ConeSums sums_over_cones(const double* x, const double* lambda) const {
         constexpr std::size_t part = 512;
         const std::size_t cones = prepared.cones.size(), parts = (cones + part - 1) / part;
         const sdk::Team team = prepared.useful_team();
@@ -262,34 +178,23 @@ struct ErrorMeter::Implementation {
                 }
             });
         }
-        Sums sums;
-        for (const Sums& one : part_sums) sums += one;
+        ConeSums sums;
+        for (const ConeSums& one : part_sums) sums += one;
         return sums;
     }
 
     /// Adds the parts of the cones from first to second − 1. memory: three times the rows of the largest cone.
     template <Pass pass>
     void add_cones(std::pair<std::size_t, std::size_t> range, const double* x, const double* lambda, double* memory,
-                   Sums& total) const {
-        Sums sums;  // in registers
+                   ConeSums& total) const {
+        ConeSums sums;  // in registers
         for (std::size_t c = range.first; c < range.second; ++c) {
             const auto& cone = prepared.cones[c];
             const double* lambda_c = lambda + cone.first_row;
             double *u = memory, *magnitude = u + cone.rows, *trial = magnitude + cone.rows;
             prefetch_after(view.raw->D, cone.first_row);
             pass_over_rows<pass>(c, x, lambda, u, magnitude);
-            const double s = residual.scaling()[c];
-            for (std::int32_t i = 0; i < cone.rows; ++i) {
-                const double scaled = s * magnitude[i] + std::abs(lambda_c[i]) / s;
-                sums.rounding += scaled * scaled;
-            }
-            if (view.coulomb) u[0] += sdk::de_saxce(cone, u);
-            if (cone.kind == DELASSUS_CONE_FRICTION && cone.rows == 3) {
-                std::array<double, 3> of_three;
-                add_cone(SpatialFriction(cone), c, lambda_c, u, of_three.data(), sums);
-            } else {
-                add_cone(AnyCone{sdk::operations_of(cone)}, c, lambda_c, u, trial, sums);
-            }
+            add_block(cone, residual.scaling()[c], view.coulomb, lambda_c, u, magnitude, trial, sums);
         }
         total = sums;
     }
@@ -309,7 +214,7 @@ struct ErrorMeter::Implementation {
     // Kept so that measuring again allocates nothing.
     mutable Vector plain_u, momentum, impulse;
     mutable std::vector<double> work;
-    mutable std::vector<Sums> part_sums;
+    mutable std::vector<ConeSums> part_sums;
 };
 
 ErrorMeter::ErrorMeter(const PreparedProblem& problem)
@@ -332,22 +237,15 @@ Errors ErrorMeter::measure(std::span<const double> x_values, std::span<const dou
     const VectorView x(x_values.data(), problem.n);
     const VectorView lambda(lambda_values.data(), problem.m);
     ++self.measurements;
-    Errors errors;
-    const auto sums = self.sums_over_cones(x.data(), lambda.data());
-    const double reference = self.residual.reference();
-    errors.rounding = 0.5 * std::numeric_limits<double>::epsilon() * std::sqrt(sums.rounding) / reference;
+    const ConeSums sums = self.sums_over_cones(x.data(), lambda.data());
+    double balance = 0.0;
     if (problem.n > 0) {
         Vector& momentum = self.momentum;
         momentum.noalias() = problem.H * x;
-        errors.balance = ratio((momentum - self.impulse - problem.a).norm(),
-                               std::max({momentum.norm(), self.impulse.norm(), problem.a.norm()}));
+        balance = ratio((momentum - self.impulse - problem.a).norm(),
+                        std::max({momentum.norm(), self.impulse.norm(), problem.a.norm()}));
     }
-    errors.natural = std::sqrt(sums.natural) / reference;
-    errors.cone = std::sqrt(sums.cone) / reference;
-    errors.dual = std::sqrt(sums.dual) / reference;
-    errors.gap = std::abs(sums.gap) / (reference * reference);
-    errors.siconos = ratio(std::sqrt(sums.siconos), std::max({self.r_norm, lambda.norm(), std::sqrt(sums.velocity)}));
-    return errors;
+    return errors_of(sums, self.residual.reference(), self.r_norm, lambda.norm(), balance);
 }
 
 double ErrorMeter::reference() const {

@@ -14,13 +14,12 @@ void* symbol(const char* name) {
                          "; use problem folders");
 }
 
-/// HDF5's serial library is not safe for several threads.
+}  // namespace
+
 std::mutex& hdf5_mutex() {
     static std::mutex mutex;
     return mutex;
 }
-
-}  // namespace
 
 Problem read_fclib(const std::filesystem::path& file) {
     const auto read = reinterpret_cast<DelassusFclibRead>(symbol("delassus_fclib_read"));

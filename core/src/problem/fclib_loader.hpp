@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <mutex>
 #include <string>
 
 #include "delassus/problem.hpp"
@@ -13,6 +14,9 @@ namespace delassus {
 /// Throws InputError if this build has no HDF5.
 Problem read_fclib(const std::filesystem::path& file);
 void write_fclib(const Problem& problem, const std::filesystem::path& file);
+
+/// Held while HDF5 works: its serial library is not safe for several threads.
+std::mutex& hdf5_mutex();
 
 }  // namespace delassus
 

@@ -9,6 +9,7 @@
 
 #include "delassus/error.hpp"
 #include "problem/cone_kinds.hpp"
+#include "problem/need_of.hpp"
 
 namespace delassus {
 
@@ -88,20 +89,29 @@ std::uint64_t capabilities_of(const std::vector<std::string>& names) {
     return bits;
 }
 
-std::string PreparedProblem::describe(std::uint64_t missing) const {
+std::string describe_needs(std::uint64_t missing, std::span<const std::int64_t> counts) {
     std::vector<std::string> phrases;
     for (const auto& capability : capability_table) {
         if (!(missing & capability.bit)) continue;
         std::int64_t count = 0;
-        for (const Cone& cone : problem().cones) {
-            const sdk::ConeOperations& kind = operations_of(cone);
-            if (kind.capability() == capability.bit) count += kind.is_separable() ? cone.rows : 1;
-        }
+        for (const auto& kind : sdk::cone_table)
+            if (kind.capability() == capability.bit) count = counts[static_cast<std::size_t>(kind.kind)];
         std::string phrase(capability.phrase);
         if (count == 1) phrase.pop_back();  // "1 friction cone"
         phrases.push_back(count > 0 ? fmt::format("{} {}", count, phrase) : phrase);
     }
     return fmt::format("{}", fmt::join(phrases, ", "));
+}
+
+std::vector<std::int64_t> counts_of(const std::vector<Cone>& cones) {
+    std::vector<std::int64_t> counts(sdk::cone_table.size(), 0);
+    for (const Cone& cone : cones)
+        counts[static_cast<std::size_t>(cone.kind)] += operations_of(cone).is_separable() ? cone.rows : 1;
+    return counts;
+}
+
+std::string PreparedProblem::describe(std::uint64_t missing) const {
+    return describe_needs(missing, counts_of(problem().cones));
 }
 
 }  // namespace delassus

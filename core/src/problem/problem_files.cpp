@@ -9,12 +9,13 @@
 #include "delassus/error.hpp"
 #include "problem/fclib_loader.hpp"
 #include "problem/problem_folder.hpp"
+#include "problem/problem_hdf5_loader.hpp"
 
 namespace delassus {
 namespace fs = std::filesystem;
 namespace {
 
-bool names_fclib_file(const fs::path& path) {
+bool names_hdf5_file(const fs::path& path) {
     return path.extension() == ".hdf5" || path.extension() == ".h5";
 }
 
@@ -24,8 +25,8 @@ Problem read_problem(const fs::path& path) {
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(fmt::format("{}: there is no such file or folder.", path.string()));
     try {
-        if (!names_fclib_file(path) || fs::is_directory(path, error)) return read_problem_folder(path);
-        return read_fclib(path);
+        if (!names_hdf5_file(path) || fs::is_directory(path, error)) return read_problem_folder(path);
+        return is_problem_hdf5(path) ? read_problem_hdf5(path) : read_fclib(path);
     } catch (const std::bad_alloc&) {
         throw InputError(fmt::format("{} does not fit into memory.", path.string()));
     }
@@ -33,8 +34,10 @@ Problem read_problem(const fs::path& path) {
 
 void write_problem(const Problem& problem, const fs::path& path) {
     validate(problem);
-    if (names_fclib_file(path)) {
+    if (path.extension() == ".hdf5") {
         write_fclib(problem, path);
+    } else if (path.extension() == ".h5") {
+        write_problem_hdf5(problem, path);
     } else {
         write_problem_folder(problem, path);
     }

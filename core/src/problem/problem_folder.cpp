@@ -69,7 +69,7 @@ std::string problem_name(const fs::path& path, bool strip_extension) {
 }
 
 Problem read_problem_folder(const fs::path& folder) {
-    require_folder(folder, "a problem folder (or an FCLib file that ends in .hdf5 or .h5)");
+    require_folder(folder, "a problem folder (or an HDF5 file that ends in .h5 or .hdf5)");
     const fs::path json_file = folder / "problem.json";
     if (!present(json_file)) {
         throw InputError(fmt::format("{} holds no problem.json, so it is not a problem folder.", folder.string()));

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "delassus/sdk/problem_view.hpp"
+#include "problem/parallel_rows.hpp"
 #include "problem/symmetry.hpp"
 
 namespace delassus {
@@ -122,40 +123,8 @@ bool RedundancyCheck::by_places(const SparseMatrix& D, const SparseMatrix& E) {
 }
 
 bool RedundancyCheck::by_values(const SparseMatrix& D, const SparseMatrix& E) {
-    directions_.clear();
-    for (std::int32_t row = 0; row < D.rows; ++row) {
-        const auto begin = D.row_start[row];
-        const auto end = D.row_start[row + 1];
-        if (!is_rigid(E, row) || D.value[begin] == 0.0) continue;
-        Hash hash;
-        hash.add(D.column.data() + begin, static_cast<std::size_t>(end - begin) * sizeof(std::int32_t));
-        // The ratio to the row's first entry, rounded so that parallel rows usually fall into one bucket.
-        for (auto k = begin; k < end; ++k) {
-            const auto ratio = static_cast<float>(D.value[k] / D.value[begin]);
-            hash.add(&ratio, sizeof ratio);
-        }
-        directions_.push_back({hash.value(), row});
-    }
-
-    const auto parallel = [&](std::int32_t p, std::int32_t q) {
-        const auto p_begin = D.row_start[p], q_begin = D.row_start[q];
-        const auto length = D.row_start[p + 1] - p_begin;
-        if (length != D.row_start[q + 1] - q_begin) return false;
-        for (std::int32_t k = 0; k < length; ++k) {
-            if (D.column[p_begin + k] != D.column[q_begin + k]) return false;
-            const double left = D.value[p_begin + k] * D.value[q_begin];
-            const double right = D.value[q_begin + k] * D.value[p_begin];
-            if (std::abs(left - right) > 1e-14 * (std::abs(left) + std::abs(right))) return false;
-        }
-        return true;
-    };
-    std::sort(directions_.begin(), directions_.end(), [](const Direction& first, const Direction& second) {
-        return first.hash != second.hash ? first.hash < second.hash : first.row < second.row;
-    });
-    for (std::size_t i = 0; i < directions_.size(); ++i)
-        for (std::size_t j = i + 1; j < directions_.size() && directions_[j].hash == directions_[i].hash; ++j)
-            if (parallel(directions_[i].row, directions_[j].row)) return true;
-    return false;
+    return has_parallel_rows(
+        D, [&](std::int32_t row) { return is_rigid(E, row); }, directions_);
 }
 
 void Hash::add(const void* data, std::size_t bytes) {

@@ -31,6 +31,12 @@ struct BlockPartition {
 /// Semidefinite or Indefinite, for a symmetric matrix that is not definite: whether H + 1e-10 diag(|H|) is.
 [[nodiscard]] Structure structure_of_singular(const SparseMatrix& H, const BlockPartition& blocks);
 
+/// A row, and a hash that parallel rows share as a rule.
+struct RowDirection {
+    std::uint64_t hash;
+    std::int32_t row;
+};
+
 /// Whether rows of D without compliance are certain to depend on one another: more of them than columns that they
 /// touch, one of them empty, or two of them parallel. A cheap certificate, not a rank: false means "not known". Keeps
 /// its scratch arrays from call to call.
@@ -44,13 +50,9 @@ private:
     [[nodiscard]] bool by_places(const SparseMatrix& D, const SparseMatrix& E);
     [[nodiscard]] bool by_values(const SparseMatrix& D, const SparseMatrix& E);
 
-    struct Direction {
-        std::uint64_t hash;  ///< equal for parallel rows, as a rule
-        std::int32_t row;
-    };
     bool certain_by_places_ = false;
     std::vector<char> touched_;
-    std::vector<Direction> directions_;
+    std::vector<RowDirection> directions_;
 };
 
 /// Hash of numbers, for the identities of patterns and values, and of content.

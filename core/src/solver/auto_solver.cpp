@@ -41,24 +41,6 @@ AutoOptions read_options(const Registry& registry, const OptionTexts& options) {
             values[1].integer != 0};
 }
 
-/// Whether this plugin is installed and has all these capabilities.
-bool can(const Registry& registry, const std::string& name, std::uint64_t needs) {
-    const auto& plugins = registry.plugins();
-    return std::any_of(plugins.begin(), plugins.end(),
-                       [&](const PluginInfo& plugin) { return plugin.name == name && plugin.missing(needs) == 0; });
-}
-
-/// The plugins, by ascending name, that can take problems with these needs and work without being named by the user.
-std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) {
-    std::vector<std::string> names = registry.capable(needs);
-    std::erase_if(names, [&](const std::string& name) {
-        return std::any_of(registry.plugins().begin(), registry.plugins().end(), [&](const PluginInfo& plugin) {
-            return plugin.name == name && (plugin.flags & DELASSUS_FLAG_PEER) != 0;
-        });
-    });
-    return names;
-}
-
 class AutoSolver : public Solver::Implementation {
 public:
     AutoSolver(const Registry& registry, OptionTexts options)
@@ -133,6 +115,26 @@ private:
 };
 
 }  // namespace
+
+bool can(const Registry& registry, const std::string& name, std::uint64_t needs) {
+    const auto& plugins = registry.plugins();
+    return std::any_of(plugins.begin(), plugins.end(),
+                       [&](const PluginInfo& plugin) { return plugin.name == name && plugin.missing(needs) == 0; });
+}
+
+std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) {
+    std::vector<std::string> names = registry.capable(needs);
+    std::erase_if(names, [&](const std::string& name) {
+        return std::any_of(registry.plugins().begin(), registry.plugins().end(), [&](const PluginInfo& plugin) {
+            return plugin.name == name && (plugin.flags & DELASSUS_FLAG_PEER) != 0;
+        });
+    });
+    return names;
+}
+
+Ranking ranking_of(const Registry& registry, const OptionTexts& options) {
+    return read_options(registry, options).ranking;
+}
 
 PluginInfo auto_info(const Registry& registry) {
     PluginInfo info;

@@ -30,4 +30,12 @@ struct AutoChoice {
 [[nodiscard]] DELASSUS_API AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs,
                                                   double tolerance);
 
+/// What `auto` of partitioned problems needs of the above.
+class Ranking;
+[[nodiscard]] Ranking ranking_of(const Registry& registry, const OptionTexts& options);
+/// Whether this plugin is installed and has all these capabilities.
+[[nodiscard]] bool can(const Registry& registry, const std::string& name, std::uint64_t needs);
+/// The plugins, by ascending name, that can take problems with these needs and work without being named by the user.
+[[nodiscard]] std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs);
+
 }  // namespace delassus

@@ -9,35 +9,14 @@
 
 #include "delassus/error.hpp"
 #include "problem/infeasibility.hpp"
+#include "solver/plugin_instance.hpp"
 #include "solver/solver_implementation.hpp"
 
 namespace delassus {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-/// Curve samples are spaced by this factor in time.
-constexpr double sample_spacing = 1.02;
-
-/// A stopwatch that can be stopped while the host does work of its own.
-class Stopwatch {
-public:
-    void start() {
-        begin_ = Clock::now();
-        running_ = true;
-    }
-    void stop() {
-        if (running_) seconds_ += std::chrono::duration<double>(Clock::now() - begin_).count();
-        running_ = false;
-    }
-    [[nodiscard]] double seconds() const { return seconds_; }
-
-private:
-    Clock::time_point begin_;
-    double seconds_ = 0.0;
-    bool running_ = false;
-};
+using Clock = Stopwatch::Clock;
 
 /// The context of the progress callback during one solve.
 struct Listener {
@@ -91,27 +70,6 @@ struct Listener {
     }
 };
 
-Status status_of(std::int32_t raw) {
-    switch (raw) {
-        case DELASSUS_SOLVED:
-            return Status::Solved;
-        case DELASSUS_ITERATION_LIMIT:
-            return Status::IterationLimit;
-        case DELASSUS_TIME_LIMIT:
-            return Status::TimeLimit;
-        case DELASSUS_STALLED:
-            return Status::Stalled;
-        case DELASSUS_INFEASIBLE:
-            return Status::Infeasible;
-        case DELASSUS_NUMERICAL_FAILURE:
-            return Status::NumericalFailure;
-        case DELASSUS_CANCELLED:
-            return Status::Cancelled;
-        default:
-            return Status::Error;
-    }
-}
-
 /// Checks the claim that there is no solution, as any other claim is checked.
 void check_proof(const PreparedProblem& problem, const Solution& answer, SolveReport& report) {
     const double size = proven_size(problem, answer.x, answer.lambda);
@@ -126,25 +84,9 @@ void check_proof(const PreparedProblem& problem, const Solution& answer, SolveRe
 class PluginSolver : public Solver::Implementation {
 public:
     PluginSolver(std::shared_ptr<const Plugin> loaded, OptionTexts texts, const Registry* known)
-        : plugin(std::move(loaded)), chosen(std::move(texts)), registry(known) {
-        const auto resolved = resolve_options(plugin->info().name, plugin->info().options, chosen);
-        std::vector<delassus_option_value> values;
-        for (const auto& value : resolved) {
-            const bool textual = value.type == DELASSUS_OPTION_CHOICE || value.type == DELASSUS_OPTION_TEXT;
-            values.push_back(
-                {value.key.c_str(), value.type, 0, value.integer, value.real, textual ? value.text.c_str() : nullptr});
-        }
-        const auto status =
-            guarded([&] { return border().create(values.data(), static_cast<std::int32_t>(values.size()), &solver); });
-        if (status != DELASSUS_SOLVED || !solver)
-            throw InputError(fmt::format("{} cannot be set up: {}", plugin->info().name, last_error(nullptr)));
-    }
+        : instance(std::move(loaded), texts), chosen(std::move(texts)), registry(known) {}
 
-    ~PluginSolver() override {
-        if (solver) guarded([&] { return border().destroy(solver), DELASSUS_SOLVED; });
-    }
-
-    [[nodiscard]] const PluginInfo& info() const override { return plugin->info(); }
+    [[nodiscard]] const PluginInfo& info() const override { return instance.info(); }
     [[nodiscard]] const OptionTexts& options() const override { return chosen; }
 
     [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) override {
@@ -154,40 +96,24 @@ public:
                                problem.describe(missing), registry ? who_can(*registry, needs) : std::string());
         if (!border().accepts) return {};
         char reason[512] = "";
-        const auto answer = guarded([&] { return border().accepts(solver, &problem.raw(), reason, sizeof reason); });
-        if (answer == 1 && thrown.empty()) return {};
+        const auto answer =
+            guarded([&] { return border().accepts(instance.get(), &problem.raw(), reason, sizeof reason); });
+        if (answer == 1 && instance.thrown().empty()) return {};
         reason[sizeof reason - 1] = '\0';
         return fmt::format("{} cannot solve {}: {}.", info().name, quoted_name(problem),
-                           !thrown.empty() ? thrown
-                           : *reason       ? reason
-                                           : "it gave no reason");
+                           !instance.thrown().empty() ? instance.thrown()
+                           : *reason                  ? reason
+                                                      : "it gave no reason");
     }
 
     std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override;
 
 private:
-    [[nodiscard]] const delassus_plugin_descriptor& border() const { return plugin->descriptor(); }
-
-    /// Runs an operation of the plugin. Exceptions are not allowed through the border, but a plugin that throws all the
-    /// same must not take the host down.
+    [[nodiscard]] const delassus_plugin_descriptor& border() const { return instance.border(); }
     template <class Operation>
     std::int32_t guarded(Operation&& operation) {
-        thrown.clear();
-        try {
-            return operation();
-        } catch (const std::exception& error) {
-            thrown = fmt::format("it threw an exception through the plugin border: {}", error.what());
-        } catch (...) {
-            thrown = "it threw an exception through the plugin border";
-        }
-        return DELASSUS_ERROR;
-    }
-
-    [[nodiscard]] std::string last_error(void* instance) {
-        if (!thrown.empty()) return thrown;
-        const char* text = border().last_error(instance);
-        return text && *text ? text : "it gave no reason";
+        return instance.guarded(operation);
     }
 
     /// Renews the analysis and the factorisation as far as the problem's identity asks.
@@ -196,31 +122,30 @@ private:
         if (analyzed && pattern_id == raw.pattern_id && values_id == raw.values_id) return DELASSUS_SOLVED;
         if (!analyzed || pattern_id != raw.pattern_id) {
             analyzed = false;
-            if (const auto status = guarded([&] { return border().analyze(solver, &raw); }); status != DELASSUS_SOLVED)
+            if (const auto status = guarded([&] { return border().analyze(instance.get(), &raw); });
+                status != DELASSUS_SOLVED)
                 return status;
         }
         analyzed = false;
-        const auto status = guarded([&] { return border().factorize(solver, &raw); });
+        const auto status = guarded([&] { return border().factorize(instance.get(), &raw); });
         analyzed = status == DELASSUS_SOLVED;
         pattern_id = raw.pattern_id;
         values_id = raw.values_id;
         return status;
     }
 
-    std::shared_ptr<const Plugin> plugin;
+    PluginInstance instance;
     OptionTexts chosen;
     const Registry* registry;
-    void* solver = nullptr;
     bool analyzed = false;
     std::uint64_t pattern_id = 0, values_id = 0;
-    std::string thrown;
 };
 
 std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution& solution,
                                         const SolveSettings& settings, SolveReport& report) {
     if (border().use_team) {
         const sdk::Team team = settings.team ? settings.team->team() : sdk::Team();
-        guarded([&] { return border().use_team(solver, team.raw()), DELASSUS_SOLVED; });
+        guarded([&] { return border().use_team(instance.get(), team.raw()), DELASSUS_SOLVED; });
     }
     Stopwatch setup, watch;
     setup.start();
@@ -240,12 +165,12 @@ std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution
             settings.time_limit, &Listener::callback,         &listener};
         watch.start();
         raw_status = guarded([&] {
-            return border().solve(solver, &problem.raw(), &request, solution.x.data(), solution.lambda.data(),
+            return border().solve(instance.get(), &problem.raw(), &request, solution.x.data(), solution.lambda.data(),
                                   &outcome);
         });
         watch.stop();
         if (listener.failure) std::rethrow_exception(listener.failure);
-        if (thrown.empty()) report.iterations = outcome.iterations;
+        if (instance.thrown().empty()) report.iterations = outcome.iterations;
         given_up = listener.given_up;
     }
     report.seconds_solve = watch.seconds();
@@ -257,7 +182,7 @@ std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution
     if (outcome.message) report.message = outcome.message;
     if (report.status == Status::Infeasible) check_proof(problem, solution, report);
     if (report.status == Status::Error || report.status == Status::NumericalFailure)
-        report.message = fmt::format("{}: {}", info().name, last_error(solver));
+        report.message = fmt::format("{}: {}", info().name, instance.last_error());
     if (settings.record_curve)
         report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
     return std::nullopt;

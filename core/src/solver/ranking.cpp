@@ -64,10 +64,11 @@ RankingRule read_rule(const nlohmann::json& json) {
     RankingRule rule;
     rule.name = json.at("name").get<std::string>();
     const nlohmann::json& when = json.at("when");
-    check_keys(when, {"linear", "simulation", "law", "structure", "m", "tolerance"},
+    check_keys(when, {"linear", "simulation", "partitioned", "law", "structure", "m", "tolerance"},
                fmt::format("\"when\" of \"{}\"", rule.name));
     if (when.contains("linear")) rule.linear = when.at("linear").get<bool>();
     if (when.contains("simulation")) rule.simulation = when.at("simulation").get<bool>();
+    if (when.contains("partitioned")) rule.partitioned = when.at("partitioned").get<bool>();
     if (when.contains("law")) rule.law = law_of(when.at("law").get<std::string>());
     if (when.contains("structure"))
         for (const auto& name : when.at("structure")) rule.structures.push_back(structure_of(name));
@@ -85,6 +86,7 @@ RankingRule read_rule(const nlohmann::json& json) {
 bool RankingRule::matches(const RankedNeeds& asked) const {
     if (linear && *linear != ((asked.needs & sdk::cones_not_linear) == 0)) return false;
     if (simulation && *simulation != asked.simulation) return false;
+    if (partitioned && *partitioned != ((asked.needs & DELASSUS_CAN_PARTITIONED) != 0)) return false;
     if (law && (asked.needs & need_of(*law)) == 0) return false;
     if (!structures.empty() && std::none_of(structures.begin(), structures.end(), [&](Structure structure) {
             return (asked.needs & need_of(structure)) != 0;

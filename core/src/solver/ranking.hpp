@@ -42,6 +42,7 @@ struct RankingRule {
     std::string name;
     std::optional<bool> linear;         ///< free rows only, or others too
     std::optional<bool> simulation;     ///< a step of a simulation, or a problem by itself
+    std::optional<bool> partitioned;    ///< a problem in parts, or one that every process has as a whole
     std::optional<Law> law;             ///< of problems with friction
     std::vector<Structure> structures;  ///< none: any
     RowRange m;

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "delassus/solver.hpp"
+#include "solver/report_json.hpp"
+
 #include "problem/errors_json.hpp"
-#include "support/json.hpp"
 
 namespace delassus {
 
-namespace {
-
 using Json = nlohmann::ordered_json;
 
-}  // namespace
-
-std::string to_json(const SolveReport& report) {
+Json report_json(const SolveReport& report) {
     Json json = {{"problem", report.problem},
                  {"solver", report.solver},
                  {"version", report.version},
@@ -46,7 +42,11 @@ std::string to_json(const SolveReport& report) {
         for (const auto& sample : report.curve) curve.push_back({sample.iteration, sample.seconds, sample.natural});
         json["curve"] = {{"columns", {"iteration", "seconds", "natural"}}, {"samples", std::move(curve)}};
     }
-    return json_text(json, 2) + "\n";
+    return json;
+}
+
+std::string to_json(const SolveReport& report) {
+    return json_text(report_json(report), 2) + "\n";
 }
 
 }  // namespace delassus

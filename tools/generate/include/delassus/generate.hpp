@@ -119,6 +119,24 @@ struct SpherePileParameters {
 };
 [[nodiscard]] DELASSUS_API Problem generate_sphere_pile(const SpherePileParameters& parameters);
 
+/// Spheres in the closest packing in a box with square layers, for runs of several processes: every number comes from
+/// the seed and the sphere's place in the lattice (delassus/generate_partitioned.hpp makes it in parts).
+struct PileParameters {
+    std::uint64_t contacts = 1000;  ///< wanted; counted without jitter
+    std::int32_t layers = 10;       ///< of spheres; every other one is one sphere narrower
+    bool walls = true;              ///< four fixed walls that touch the wider layers
+    double radius = 0.05;
+    double density = 2500.0;
+    double jitter = 0.0;    ///< radii are smaller by a random share up to this, so that gaps open
+    double envelope = 0.1;  ///< neighbours with a gap up to envelope · radius are contacts
+    double mu = 0.5;        ///< 0: one nonnegative row a contact instead of three
+    double speed = 0.1;     ///< m/s, amplitude of random velocities (over the radius for angular ones)
+    double gravity = 9.81;
+    double step = 0.01;
+    std::uint64_t seed = 1;
+};
+[[nodiscard]] DELASSUS_API Problem generate_pile(const PileParameters& parameters);
+
 /// Towers of boxes, four contact points on each face: every face has redundant rows (12 with friction, rank 6).
 struct BoxStackParameters {
     std::int32_t towers = 1;  ///< independent, turned about the vertical, each by another angle

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "partitioned/alone.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+
+namespace delassus {
+
+namespace {
+constexpr int exit_of_a_failed_run = 3;
+}
+
+AloneAlarm::AloneAlarm(const Communicator& communicator, std::string sentence) {
+    if (communicator.size() == 1) return;
+    thread_ = std::thread([this, &communicator, sentence = std::move(sentence)] {
+        std::unique_lock lock(mutex_);
+        if (!condition_.wait_for(lock, std::chrono::seconds(2), [this] { return done_; }))
+            fail_alone(communicator, sentence);
+    });
+}
+
+AloneAlarm::~AloneAlarm() {
+    if (!thread_.joinable()) return;
+    {
+        const std::lock_guard lock(mutex_);
+        done_ = true;
+    }
+    condition_.notify_one();
+    thread_.join();
+}
+
+void meet_in_failure(const Communicator& last_words, const std::string& sentence) {
+    const AloneAlarm alarm(last_words, sentence);
+    static_cast<void>(last_words.all(0));
+}
+
+void fail_alone(const Communicator& communicator, const std::string& sentence) {
+    fmt::print(stderr, "delassus: process {} of {} failed, so the others end too: {}\n", communicator.rank(),
+               communicator.size(), sentence);
+    std::fflush(stderr);
+    communicator.abort(exit_of_a_failed_run);
+    std::_Exit(exit_of_a_failed_run);  // not reached
+}
+
+}  // namespace delassus

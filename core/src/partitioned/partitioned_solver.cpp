@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Solving with a plugin that takes partitioned problems, on all processes together.
+#include "delassus/partitioned_solver.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <map>
+
+#include "delassus/error.hpp"
+#include "partitioned/alone.hpp"
+#include "partitioned/part_meter.hpp"
+#include "partitioned/prepared_part.hpp"
+#include "solver/auto_solver.hpp"
+#include "solver/finished_solver.hpp"
+#include "solver/judgement.hpp"
+#include "solver/plugin_instance.hpp"
+#include "solver/ranking.hpp"
+#include "solver/solver_implementation.hpp"
+#include "support/finite.hpp"
+
+namespace delassus {
+
+namespace {
+
+using Clock = Stopwatch::Clock;
+
+/// Processes agree about so often on the time and on cancelling, in seconds; every time costs a reduction.
+constexpr double seconds_between_agreements = 0.02;
+
+/// The context of the progress callback on one process. All processes call it for the same iterations.
+class PartListener {
+public:
+    PartListener(const PreparedPart& problem, const SolveSettings& settings, SolveReport& report, Stopwatch& watch)
+        : problem_(problem), settings_(settings), report_(report), watch_(watch) {}
+
+    // The border: nothing is thrown through the plugin. A process that cannot go on ends the run of all, since the
+    // others wait for it.
+    static std::int32_t callback(void* context, std::int64_t iteration, const double* x,
+                                 const double* lambda) noexcept {
+        auto& self = *static_cast<PartListener*>(context);
+        if (iteration < self.next_ && !self.settings_.give_up) {
+            self.report_.iterations = iteration;
+            return DELASSUS_CONTINUE;
+        }
+        try {
+            const bool give_up = self.settings_.give_up && self.settings_.give_up(iteration, x, lambda);
+            self.watch_.stop();
+            const auto answer = self.hear(iteration, x, lambda, give_up);
+            self.watch_.start();
+            return answer;
+        } catch (const std::exception& error) {
+            fail_alone(self.problem_.communicator(), error.what());
+        }
+    }
+
+    [[nodiscard]] bool given_up() const { return given_up_; }
+
+private:
+    std::int32_t hear(std::int64_t iteration, const double* x, const double* lambda, bool give_up) {
+        report_.iterations = iteration;
+        std::array<double, 3> agreed = {report_.seconds_setup + watch_.seconds(), give_up ? 1.0 : 0.0,
+                                        settings_.cancelled && settings_.cancelled() ? 1.0 : 0.0};
+        problem_.communicator().max(agreed);
+        const double seconds = agreed[0];
+        given_up_ = given_up_ || agreed[1] > 0.0;
+        if (settings_.record_curve && seconds >= next_sample_) {
+            const CurveSample sample{iteration, seconds, problem_.natural(x, lambda)};
+            next_sample_ = seconds * sample_spacing;
+            if (std::isfinite(sample.natural)) {
+                report_.curve.push_back(sample);
+                if (settings_.on_sample) settings_.on_sample(sample);
+            }
+        }
+        if (settings_.on_progress && Clock::now() >= next_display_) {
+            settings_.on_progress(report_.curve.empty() ? CurveSample{iteration, seconds, NAN} : report_.curve.back());
+            next_display_ = Clock::now() + std::chrono::milliseconds(100);
+        }
+        plan_next(iteration, seconds);
+        if (agreed[2] > 0.0 || given_up_) return DELASSUS_STOP_CANCEL;
+        return seconds >= settings_.time_limit ? DELASSUS_STOP_TIME : DELASSUS_CONTINUE;
+    }
+
+    /// From agreed numbers alone, so that all processes plan the same.
+    void plan_next(std::int64_t iteration, double seconds) {
+        const std::int64_t done = iteration - last_;
+        const double each = done > 0 ? (seconds - last_seconds_) / static_cast<double>(done) : 1.0;
+        const double wanted = seconds_between_agreements / std::max(each, 1e-9);
+        stride_ = std::clamp<std::int64_t>(static_cast<std::int64_t>(wanted), 1, 2 * stride_);
+        last_ = iteration;
+        last_seconds_ = seconds;
+        next_ = iteration + stride_;
+    }
+
+    const PreparedPart& problem_;
+    const SolveSettings& settings_;
+    SolveReport& report_;
+    Stopwatch& watch_;
+    double next_sample_ = 0.0, last_seconds_ = 0.0;
+    std::int64_t next_ = 0, last_ = 0, stride_ = 1;
+    Clock::time_point next_display_ = Clock::now();
+    bool given_up_ = false;
+};
+
+std::string quoted_name(const PreparedPart& problem) {
+    const std::string& name = problem.problem().name;
+    return name.empty() ? "the problem" : fmt::format("\"{}\"", name);
+}
+
+}  // namespace
+
+struct PartitionedSolver::Implementation {
+    const Registry& registry;
+    SolverConfig config;
+    std::shared_ptr<const Communicator> communicator;
+    std::unique_ptr<PluginInstance> instance;  // or, for auto:
+    std::unique_ptr<Ranking> ranking;
+    PluginInfo info_of_auto;
+    std::map<std::pair<std::string, OptionTexts>, PartitionedSolver> solvers;
+    bool analyzed = false;
+    std::uint64_t pattern_id = 0, values_id = 0;
+
+    /// Runs a collective operation of the plugin and agrees on how it ended; a sentence of the first process on which
+    /// it failed, if it did.
+    struct Ending {
+        std::int32_t status = DELASSUS_SOLVED;
+        std::string sentence;
+    };
+    template <class Operation>
+    Ending run(Operation&& operation) {
+        const std::int32_t own = instance->guarded(operation);
+        const bool failed = own == DELASSUS_ERROR || own == DELASSUS_NUMERICAL_FAILURE;
+        const std::string sentence =
+            failed ? fmt::format("{}: {}", instance->info().name, instance->last_error()) : std::string();
+        std::vector<std::int64_t> statuses;
+        if (failed) {
+            const AloneAlarm alarm(*communicator, sentence);
+            statuses = communicator->all(own);
+        } else {
+            statuses = communicator->all(own);
+        }
+        for (int rank = 0; rank < communicator->size(); ++rank) {
+            const auto status = static_cast<std::int32_t>(statuses[static_cast<std::size_t>(rank)]);
+            if (status == DELASSUS_ERROR || status == DELASSUS_NUMERICAL_FAILURE)
+                return {status, communicator->broadcast(sentence, rank)};
+        }
+        for (const auto status : statuses)
+            if (status != statuses.front())
+                return {DELASSUS_ERROR,
+                        fmt::format("{} ended as {} on one process and as {} on another", instance->info().name,
+                                    name_of(status_of(static_cast<std::int32_t>(statuses.front()))),
+                                    name_of(status_of(static_cast<std::int32_t>(status))))};
+        return {own, {}};
+    }
+
+    /// Renews the analysis and the factorisation as far as the problem's identity asks.
+    Ending set_up(const delassus_local_problem& raw) {
+        if (analyzed && pattern_id == raw.pattern_id && values_id == raw.values_id) return {};
+        if (!analyzed || pattern_id != raw.pattern_id) {
+            analyzed = false;
+            auto ending = run([&] { return instance->border().analyze_partitioned(instance->get(), &raw); });
+            if (ending.status != DELASSUS_SOLVED) return ending;
+        }
+        analyzed = false;
+        auto ending = run([&] { return instance->border().factorize_partitioned(instance->get(), &raw); });
+        analyzed = ending.status == DELASSUS_SOLVED;
+        pattern_id = raw.pattern_id;
+        values_id = raw.values_id;
+        return ending;
+    }
+
+    void solve_with_plugin(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
+                           SolveReport& report);
+    /// The stages of the ranking, and after them every other solver that can, each from the best so far.
+    void solve_in_stages(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
+                         SolveReport& report);
+    [[nodiscard]] const RankingRule& rule_of(const PreparedPart& problem, double tolerance) const {
+        const auto rows = std::min<std::int64_t>(problem.raw().m_all, std::numeric_limits<std::int32_t>::max());
+        return ranking->rule({problem.needs(), tolerance, false}, static_cast<std::int32_t>(rows));
+    }
+};
+
+PartitionedSolver::PartitionedSolver(const Registry& registry, SolverConfig config,
+                                     std::shared_ptr<const Communicator> communicator)
+    : implementation_(new Implementation{registry, std::move(config), std::move(communicator), {}, {}, {}, {}}) {
+    auto& self = *implementation_;
+    together(*self.communicator, [&] {
+        OptionTexts options = self.config.options;
+        if (!take_finish(options).solver.empty())
+            throw InputError("a partitioned problem is solved by one solver; leave out the option \"finish\"");
+        if (self.config.name == auto_name) {
+            self.ranking = std::make_unique<Ranking>(ranking_of(registry, options));
+            self.info_of_auto = auto_info(registry);
+            return;
+        }
+        self.instance = std::make_unique<PluginInstance>(registry.load(self.config.name), options);
+    });
+}
+
+PartitionedSolver::~PartitionedSolver() = default;
+PartitionedSolver::PartitionedSolver(PartitionedSolver&&) noexcept = default;
+PartitionedSolver& PartitionedSolver::operator=(PartitionedSolver&&) noexcept = default;
+
+const PluginInfo& PartitionedSolver::info() const {
+    return implementation_->instance ? implementation_->instance->info() : implementation_->info_of_auto;
+}
+
+std::string PartitionedSolver::refusal(const PreparedPart& problem, const SolveSettings& settings) const {
+    std::uint64_t needs = problem.needs();
+    if (const auto& self = *implementation_; self.ranking) {
+        if (!unnamed(self.registry, needs).empty()) return {};
+        for (const auto& ranked : self.rule_of(problem, settings.tolerance).stages)
+            if (can(self.registry, ranked.solver, needs)) return {};
+        return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
+                           problem.describe(needs));
+    }
+    if (settings.warm_start) needs |= DELASSUS_CAN_WARM_START;
+    const auto missing = info().missing(needs);
+    if (missing == 0) return {};
+    return fmt::format("{} cannot solve {}: {}{}.", info().name, quoted_name(problem), problem.describe(missing),
+                       who_can(implementation_->registry, needs));
+}
+
+void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& problem, Solution& own,
+                                                          const SolveSettings& settings, SolveReport& report) {
+    const auto& raw = problem.raw();
+    const auto& border = instance->border();
+    if (border.use_team) {
+        const sdk::Team team = settings.team ? settings.team->team() : sdk::Team();
+        instance->guarded([&] { return border.use_team(instance->get(), team.raw()), DELASSUS_SOLVED; });
+    }
+    Stopwatch setup, watch;
+    setup.start();
+    Ending ending = set_up(raw);
+    setup.stop();
+    std::array<double, 2> seconds = {setup.seconds(), 0.0};
+    communicator->max(seconds);
+    report.seconds_setup = seconds[0];
+
+    delassus_outcome outcome{};
+    outcome.struct_size = sizeof outcome;
+    outcome.residual = NAN;
+    bool given_up = false;
+    if (ending.status == DELASSUS_SOLVED) {
+        PartListener listener(problem, settings, report, watch);
+        const delassus_request request{
+            sizeof request,      settings.warm_start ? 1 : 0, settings.tolerance, settings.max_iterations,
+            settings.time_limit, &PartListener::callback,     &listener};
+        watch.start();
+        ending = run([&] {
+            return border.solve_partitioned(instance->get(), &raw, &request, own.x.data(), own.lambda.data(), &outcome);
+        });
+        watch.stop();
+        if (ending.status != DELASSUS_ERROR) report.iterations = outcome.iterations;
+        given_up = listener.given_up();
+    }
+    seconds[1] = watch.seconds();
+    communicator->max(seconds);
+    report.seconds_solve = seconds[1];
+    report.analyses = outcome.analyses;
+    report.factorizations = outcome.factorizations;
+    report.claimed_residual = outcome.residual;
+    report.status = status_of(ending.status);
+    if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
+    report.message = communicator->broadcast(outcome.message ? outcome.message : "");
+    if (report.status == Status::Infeasible) {
+        report.status = Status::FalseClaim;
+        report.message =
+            fmt::format("{} claimed that there is no solution; of a partitioned problem such a claim cannot be checked",
+                        report.solver);
+    }
+    if (!ending.sentence.empty()) report.message = ending.sentence;
+    if (settings.record_curve)
+        report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
+}
+
+void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& problem, Solution& own,
+                                                        const SolveSettings& settings, SolveReport& report) {
+    const RankingRule& rule = rule_of(problem, settings.tolerance);
+    std::vector<RankedStage> stages = rule.stages;
+    for (const auto& name : unnamed(registry, problem.needs()))
+        if (std::none_of(stages.begin(), stages.end(), [&](const RankedStage& one) { return one.solver == name; }))
+            stages.push_back({name, {}, {.reason = "the solvers before it did not reach the tolerance"}});
+    double best = std::numeric_limits<double>::infinity(), spent = 0.0;
+    bool started = settings.warm_start;
+    for (const auto& ranked : stages) {
+        const bool own_law = !ranked.stage.law || *ranked.stage.law == problem.problem().law;
+        if (!own_law || !can(registry, ranked.solver, problem.needs())) continue;
+        auto place = solvers.find({ranked.solver, ranked.options});
+        if (place == solvers.end()) {
+            SolverConfig one;
+            one.name = ranked.solver;
+            one.options = ranked.options;
+            place = solvers
+                        .emplace(std::pair(ranked.solver, ranked.options),
+                                 PartitionedSolver(registry, std::move(one), communicator))
+                        .first;
+        }
+        SolveSettings stage = settings;
+        stage.tolerance = std::max(settings.tolerance, ranked.stage.tolerance);
+        stage.max_iterations = std::min(settings.max_iterations - report.iterations, ranked.stage.max_iterations);
+        stage.time_limit = settings.time_limit - spent;
+        stage.warm_start = started && (place->second.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
+        if (stage.max_iterations <= 0 || !(stage.time_limit > 0.0)) break;
+        Solution next = own;
+        const SolveReport done = place->second.solve(problem, next, stage);
+        spent += done.seconds_setup + done.seconds_solve;
+        report.iterations += done.iterations;
+        report.seconds_setup += done.seconds_setup;
+        report.seconds_solve += done.seconds_solve;
+        report.curve.insert(report.curve.end(), done.curve.begin(), done.curve.end());
+        report.stages.push_back({done.solver, done.options, done.law, ranked.stage.reason, stage.tolerance, done.status,
+                                 done.message, done.iterations, done.seconds_setup + done.seconds_solve,
+                                 done.error.natural});
+        const bool good = std::isfinite(done.error.natural) && done.error.natural < best;
+        if (good || !started || done.status == Status::Solved) {
+            own = std::move(next);
+            best = done.error.natural;
+            started = true;
+            report.claimed_residual = done.claimed_residual;
+        }
+        report.status = done.status;
+        const bool to_the_end = stage.tolerance <= settings.tolerance;
+        if ((done.status == Status::Solved && to_the_end) || done.status == Status::Cancelled ||
+            done.status == Status::TimeLimit || (ranked.last && done.status != Status::Solved))
+            break;
+        if (done.status == Status::Solved) report.status = Status::Stalled;
+    }
+    std::vector<std::string> names;
+    for (const auto& stage : report.stages) names.push_back(stage.solver);
+    report.message = fmt::format("{}: {}", rule.name, fmt::join(names, ", then "));
+}
+
+SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own, const SolveSettings& settings) {
+    auto& self = *implementation_;
+    const Communicator& run = *self.communicator;
+    check_settings(settings);
+    if (const std::string sentence = refusal(problem, settings); !sentence.empty()) throw Unsupported(sentence);
+    const auto n = static_cast<std::size_t>(problem.raw().n), m = static_cast<std::size_t>(problem.raw().m);
+    together(run, [&] {
+        if (!settings.warm_start) {
+            own.x.assign(n, 0.0);
+            own.lambda.assign(m, 0.0);
+        } else if (own.x.size() != n || own.lambda.size() != m) {
+            throw InputError(fmt::format("the warm start has {} and {} entries; the part has n = {} and m = {}",
+                                         own.x.size(), own.lambda.size(), n, m));
+        } else if (!all_finite(own.x) || !all_finite(own.lambda)) {
+            throw InputError("the warm start holds a value that is not finite");
+        }
+    });
+
+    SolveReport report;
+    report.problem = problem.problem().name;
+    report.solver = info().name;
+    report.version = info().version;
+    report.options = self.config.options;
+    report.law = problem.problem().law;
+    report.tolerance = settings.tolerance;
+    self.ranking ? self.solve_in_stages(problem, own, settings, report)
+                 : self.solve_with_plugin(problem, own, settings, report);
+
+    std::int64_t not_finite = all_finite(own.x) && all_finite(own.lambda) ? 0 : 1;
+    run.max(std::span(&not_finite, 1));
+    if (not_finite != 0) {
+        report.status = Status::NumericalFailure;
+        report.message =
+            fmt::format("{} returned values that are not finite; they were replaced by zeros", info().name);
+        own.x.assign(n, 0.0);
+        own.lambda.assign(m, 0.0);
+    }
+    report.error = problem.measure(own.x, own.lambda);
+    auto& part = *problem.implementation_;
+    judge(report, part.only_cones(), [&] {
+        return part.structure == Structure::Reduced
+                   ? RoundingOfBalance()
+                   : part.measuring().rounding_of_balance(own.x.data(), own.lambda.data());
+    });
+    if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
+    return report;
+}
+
+}  // namespace delassus

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every claim of a solver is held against, whether one process has the problem or each a part of it.
+#pragma once
+
+#include <functional>
+
+#include "delassus/solver.hpp"
+
+namespace delassus {
+
+/// What rounding alone may contribute to Errors::balance at this (x, λ): ε ‖|H||x| + |D|ᵀ|λ| + |a|‖ over the divisor of
+/// the balance, with the unit roundoff ε. With a stiff H, ‖|H||x|‖ is far above ‖Hx‖, and x rounded to double cannot
+/// balance better. `reactions` is the part of |D|ᵀ|λ|: what reactions that cancel one another leave.
+struct RoundingOfBalance {
+    double all = 0.0, reactions = 0.0;
+};
+
+/// Throws InputError on a setting outside its domain.
+void check_settings(const SolveSettings& settings);
+
+/// Compares the claim report.status with report.error and corrects status and message (docs/errors.md, "When a claim
+/// stands"). only_cones: every set is a cone. rounding_of_balance: called where only the balance is missed; in the
+/// same cases on all processes that have the same report.
+void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfBalance()>& rounding_of_balance);
+
+}  // namespace delassus
