@@ -29,7 +29,9 @@ protected:
     [[nodiscard]] std::string problem() const { return (folder / "stack").string(); }
     [[nodiscard]] static CommandResult mpirun(int processes, const std::string& arguments,
                                               const std::string& environment = "") {
-        return run_shell(environment + " OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n " +
+        // Without what a solver with MPI in this process has left in the environment: mpirun would not start under it.
+        return run_shell("env -i PATH=\"$PATH\" HOME=\"$HOME\" " + environment +
+                         " OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n " +
                          std::to_string(processes) + " --oversubscribe " + DELASSUS_COMMAND + " " + arguments +
                          " --plugin-path " DELASSUS_TEST_PLUGINS);
     }
