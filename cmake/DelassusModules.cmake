@@ -68,14 +68,18 @@ function(delassus_library module)
   delassus_install_library(delassus_${module})
 endfunction()
 
-# delassus_loaded_module(<name> SOURCES file… LIBRARIES target…): a part with a heavy dependency, which its loader opens at need.
+# delassus_loaded_module(<name> SOURCES file… LIBRARIES target… [COMPONENT component]): a part with a heavy dependency, which its
+# loader opens at need. COMPONENT: what it is installed with, `library` unless said; `plugins` for what solvers need as well.
 function(delassus_loaded_module name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "COMPONENT" "SOURCES;LIBRARIES")
+  if(NOT arg_COMPONENT)
+    set(arg_COMPONENT library)
+  endif()
   add_library(${name} MODULE ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} delassus_settings fmt::fmt)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY "${DELASSUS_MODULE_DIRECTORY}"
     INSTALL_RPATH "$ORIGIN/..")
-  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus COMPONENT library)
+  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus COMPONENT ${arg_COMPONENT})
   set_property(GLOBAL APPEND PROPERTY DELASSUS_LOADED_MODULES ${name})
 endfunction()
 

@@ -125,13 +125,13 @@ class Problem(_delassus.Problem):
 
     @classmethod
     def read(cls, path: Path) -> "Problem":
-        """Read a problem folder, or an FCLib file if the path ends in .hdf5 or .h5 (docs/files.md)."""
+        """Read a problem folder, or a problem or an FCLib file in HDF5 if the path ends in .h5 or .hdf5 (docs/files.md)."""
         problem = cls.__new__(cls)
         _delassus.Problem.__init__(problem, os.fspath(path))
         return problem
 
     def write(self, path: Path) -> None:
-        """Write a problem folder, or an FCLib file if the path ends in .hdf5 or .h5."""
+        """Write a problem folder, or one HDF5 file if the path ends in .h5, or an FCLib file if it ends in .hdf5."""
         self._write(os.fspath(path))
 
     @property
@@ -304,7 +304,7 @@ def register(solver: type) -> type:
 
 
 def read(path: Path) -> Problem:
-    """Read a problem folder, or an FCLib file if the path ends in .hdf5 or .h5 (docs/files.md)."""
+    """Read a problem folder, or a problem or an FCLib file in HDF5 if the path ends in .h5 or .hdf5 (docs/files.md)."""
     return Problem.read(path)
 
 

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "command.hpp"
+#include "delassus/distributed.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/partitioned_files.hpp"
 #include "delassus/problem_files.hpp"
@@ -153,7 +154,8 @@ int inspect_file(const InspectArguments& arguments) {
 }
 
 int inspect(const InspectArguments& arguments) {
-    if (!arguments.whole && !arguments.qualification && is_partitioned_file(arguments.problem))
+    const bool parts = process_count() > 1 && arguments.problem.extension() == ".h5";
+    if (!arguments.whole && !arguments.qualification && (parts || is_partitioned_file(arguments.problem)))
         return inspect_file(arguments);
     Problem data = read_problem(arguments.problem);
     if (!arguments.law.empty()) data.law = law_of(arguments.law);

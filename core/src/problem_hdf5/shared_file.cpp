@@ -69,13 +69,17 @@ void Writing::integer(const char* name, std::int64_t value) {
 void Writing::long_text(const char* name, const std::string& value) {
     if (value.empty()) return;
     const Handle type = text_type(value), space(H5Screate(H5S_SCALAR));
-    const Handle set(H5Dcreate2(file_, name, type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
+    H5Pset_obj_track_times(creation.get(), false);
+    const Handle set(H5Dcreate2(file_, name, type.get(), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
     check(set.valid() && H5Dwrite(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, value.data()) >= 0);
     bytes_ += static_cast<std::int64_t>(value.size());
 }
 
 void Writing::group(const char* name) {
-    const Handle made(H5Gcreate2(file_, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    const Handle creation(H5Pcreate(H5P_GROUP_CREATE));
+    H5Pset_obj_track_times(creation.get(), false);
+    const Handle made(H5Gcreate2(file_, name, H5P_DEFAULT, creation.get(), H5P_DEFAULT));
     check(made.valid());
 }
 
@@ -83,6 +87,7 @@ void Writing::create(const char* name, hid_t type, std::int64_t count) {
     const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
     H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
     H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
+    H5Pset_obj_track_times(creation.get(), false);  // equal content, equal bytes
     const auto size = static_cast<hsize_t>(count);
     const Handle space(H5Screate_simple(1, &size, nullptr));
     const Handle set(H5Dcreate2(file_, name, type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
