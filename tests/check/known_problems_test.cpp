@@ -51,7 +51,7 @@ TEST(KnownProblems, HaveNamesOfTheirOwn) {
 TEST(KnownProblems, NeedEveryCapability) {
     std::uint64_t needs = 0;
     for (const auto& known : known_problems()) needs |= PreparedProblem(known.problem).needs();
-    needs |= DELASSUS_CAN_WARM_START | DELASSUS_CAN_DISTRIBUTED;
+    needs |= DELASSUS_CAN_WARM_START | DELASSUS_CAN_DISTRIBUTED | DELASSUS_CAN_PARTITIONED;
     EXPECT_EQ(capability_names(needs), capability_names(~std::uint64_t{0}));
 }
 

@@ -34,7 +34,7 @@ TEST(Documents, BashOffersCommandsOptionsNamesAndFiles) {
     EXPECT_EQ(offered(scratch, "delassus plugins che", 2), "check ");
     EXPECT_EQ(offered(scratch, "delassus run --integ", 2), "--integrator ");
     EXPECT_EQ(offered(scratch, "delassus run --integrator moreau", 3), "moreau_jean ");
-    EXPECT_EQ(offered(scratch, "delassus solve --solver apg", 3), "apgd ");
+    EXPECT_EQ(offered(scratch, "delassus solve --solver minr", 3), "minres ");
     EXPECT_EQ(offered(scratch, "delassus run --law cou", 3), "coulomb ");
     EXPECT_EQ(offered(scratch, "delassus run sce", 2), "scene.yaml ");
     EXPECT_EQ(offered(scratch, "delassus work", 1).find("worker"), std::string::npos) << "hidden";

@@ -50,7 +50,8 @@ void print_capability_table(const Registry& registry) {
         {"compliance E", DELASSUS_CAN_COMPLIANCE},
         {"redundant rows", DELASSUS_CAN_REDUNDANT},
         {"warm start", DELASSUS_CAN_WARM_START},
-        {"MPI", DELASSUS_CAN_DISTRIBUTED},
+        {"MPI, whole problems", DELASSUS_CAN_DISTRIBUTED},
+        {"MPI, in parts", DELASSUS_CAN_PARTITIONED},
     };
     columns.insert(columns.end(), std::begin(others), std::end(others));
     fmt::print("| solver |");

@@ -72,7 +72,8 @@ public:
     /// Loads a plugin by name, or by path if the text has a slash or ends in .so. Throws InputError or PluginError.
     [[nodiscard]] DELASSUS_API std::shared_ptr<const Plugin> load(const std::string& name_or_path) const;
 
-    /// The names of the plugins that meet the needs.
+    /// The names of the plugins that meet the needs. Those that are made for problems in parts are among them only if
+    /// that is one of the needs: elsewhere they start MPI for nothing, and work where they are named.
     [[nodiscard]] DELASSUS_API std::vector<std::string> capable(std::uint64_t needs) const;
 
 private:

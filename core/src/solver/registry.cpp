@@ -132,8 +132,11 @@ std::shared_ptr<const Plugin> Registry::load(const std::string& name_or_path) co
 
 std::vector<std::string> Registry::capable(std::uint64_t needs) const {
     std::vector<std::string> names;
-    for (const auto& plugin : plugins_)
-        if (plugin.missing(needs) == 0) names.push_back(plugin.name);
+    const bool in_parts = (needs & DELASSUS_CAN_PARTITIONED) != 0;
+    for (const auto& plugin : plugins_) {
+        const bool made_for_parts = (plugin.capabilities & DELASSUS_CAN_PARTITIONED) != 0;
+        if (plugin.missing(needs) == 0 && made_for_parts == in_parts) names.push_back(plugin.name);
+    }
     return names;
 }
 

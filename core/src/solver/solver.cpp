@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "delassus/distributed.hpp"
@@ -148,8 +149,10 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
     const auto& cones = problem.problem().cones;
     const bool only_cones =
         std::all_of(cones.begin(), cones.end(), [](const Cone& cone) { return operations_of(cone).is_cone; });
-    judge(report, only_cones,
-          [&] { return n > 0 ? rounding_of_balance(problem.problem(), solution) : RoundingOfBalance(); });
+    const auto rounding = [&] {
+        return n > 0 ? rounding_of_balance(problem.problem(), solution) : RoundingOfBalance();
+    };
+    judge(report, only_cones, std::ref(rounding));  // a std::function that allocates nothing
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
     return report;
 }

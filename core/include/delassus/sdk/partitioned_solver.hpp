@@ -129,6 +129,7 @@ private:
 class PartitionedSolver : public Solver {
 public:
     using LocalView = LocalProblemView;
+    using LocalBase = PartitionedSolver;
 
     virtual void analyze(const LocalProblemView& problem) = 0;
     virtual void factorize(const LocalProblemView& problem) = 0;

@@ -156,6 +156,11 @@ private:
 
     // ---- Partitioned problems: a class derived from PartitionedSolver (sdk/partitioned_solver.hpp) takes them ----
 
+    /// As the base, whose overloads the class's own hide.
+    static auto& partitioned(Instance& instance) {
+        return static_cast<typename Implementation::LocalBase&>(instance.solver);
+    }
+
     using LocalCall = std::int32_t (*)(void*, const delassus_local_problem*);
     using LocalSolve = std::int32_t (*)(void*, const delassus_local_problem*, const delassus_request*, double*, double*,
                                         delassus_outcome*);
@@ -165,7 +170,7 @@ private:
             return [](void* solver, const delassus_local_problem* problem) -> std::int32_t {
                 auto& instance = *static_cast<Instance*>(solver);
                 return guarded(instance.error, [&] {
-                    instance.solver.analyze(typename Implementation::LocalView(*problem));
+                    partitioned(instance).analyze(typename Implementation::LocalView(*problem));
                     return DELASSUS_SOLVED;
                 });
             };
@@ -177,7 +182,7 @@ private:
             return [](void* solver, const delassus_local_problem* problem) -> std::int32_t {
                 auto& instance = *static_cast<Instance*>(solver);
                 return guarded(instance.error, [&] {
-                    instance.solver.factorize(typename Implementation::LocalView(*problem));
+                    partitioned(instance).factorize(typename Implementation::LocalView(*problem));
                     return DELASSUS_SOLVED;
                 });
             };
@@ -190,9 +195,9 @@ private:
                       double* lambda, delassus_outcome* outcome) -> std::int32_t {
                 auto& instance = *static_cast<Instance*>(solver);
                 return solve(instance, *outcome, [&] {
-                    return instance.solver.solve(typename Implementation::LocalView(*problem), Request(*request),
-                                                 MutableVectorView(x, problem->n),
-                                                 MutableVectorView(lambda, problem->m));
+                    return partitioned(instance).solve(typename Implementation::LocalView(*problem), Request(*request),
+                                                       MutableVectorView(x, problem->n),
+                                                       MutableVectorView(lambda, problem->m));
                 });
             };
         return nullptr;
@@ -261,7 +266,7 @@ private:
     static std::int32_t analyze(void* solver, const delassus_problem* problem) {
         auto& instance = *static_cast<Instance*>(solver);
         return guarded(instance.error, [&] {
-            instance.solver.analyze(ProblemView(*problem));
+            static_cast<Solver&>(instance.solver).analyze(ProblemView(*problem));
             return DELASSUS_SOLVED;
         });
     }
@@ -269,7 +274,7 @@ private:
     static std::int32_t factorize(void* solver, const delassus_problem* problem) {
         auto& instance = *static_cast<Instance*>(solver);
         return guarded(instance.error, [&] {
-            instance.solver.factorize(ProblemView(*problem));
+            static_cast<Solver&>(instance.solver).factorize(ProblemView(*problem));
             return DELASSUS_SOLVED;
         });
     }
@@ -278,8 +283,9 @@ private:
                               double* lambda, delassus_outcome* outcome) {
         auto& instance = *static_cast<Instance*>(solver);
         return solve(instance, *outcome, [&] {
-            return instance.solver.solve(ProblemView(*problem), Request(*request), MutableVectorView(x, problem->n),
-                                         MutableVectorView(lambda, problem->m));
+            return static_cast<Solver&>(instance.solver)
+                .solve(ProblemView(*problem), Request(*request), MutableVectorView(x, problem->n),
+                       MutableVectorView(lambda, problem->m));
         });
     }
 
