@@ -24,15 +24,15 @@ const RegisterTimestepper trapezoidal_linearized_row{
      .unilateral = false,
      .order = 2,
      .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
-         return std::make_unique<ImplicitMethod>(system, ImplicitCoefficients::newmark(0.5, 0.25),
-                                                 NewtonSettings{.method = "trapezoidal_linearized",
-                                                                .jacobian = values[0].text == "exact" ? Jacobian::Exact
-                                                                                              : Jacobian::Symmetric,
-                                                                .reuse = Reuse::Full,
-                                                                .max_iterations = 1,
-                                                                .linearized = true,
-                                                                .linearization_limit = values[1].real,
-                                                                .largest_turn = values[2].real});
+         return std::make_unique<ImplicitMethod>(
+             system, ImplicitCoefficients::newmark(0.5, 0.25),
+             NewtonSettings{.method = "trapezoidal_linearized",
+                            .jacobian = values[0].text == "exact" ? Jacobian::Exact : Jacobian::Symmetric,
+                            .reuse = Reuse::Full,
+                            .max_iterations = 1,
+                            .linearized = true,
+                            .linearization_limit = values[1].real,
+                            .largest_turn = values[2].real});
      }}};
 
 }  // namespace

@@ -166,8 +166,9 @@ void ShiftedFactor::choose_form() {
         if (keep_Z_ && (plainly_sparse || schur_entries <= std::max(kSmallFactor, 10.0 * quasi->entries())))
             schur = make(Form::Schur);
         const auto is_dear = [&] { return squared_counts_ + schur->flops() > kDearFactor * quasi->flops(); };
-        const bool take_schur = schur && (!quasi || (!is_dear() && (schur->entries() <= kSmallFactor ||
-                                                                    schur->entries() <= 3.0 * quasi->entries())));
+        const bool take_schur =
+            schur && (!quasi ||
+                      (!is_dear() && (schur->entries() <= kSmallFactor || schur->entries() <= 3.0 * quasi->entries())));
         form_ = take_schur ? Form::Schur : Form::QuasiDefinite;
         saddle_ = std::move(take_schur ? schur : quasi);
     } else {

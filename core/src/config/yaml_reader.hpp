@@ -66,7 +66,8 @@ inline void read_map(const Source& source, const YAML::Node& map, std::string_vi
     std::vector<std::string_view> keys;
     for (const auto& handler : handlers) keys.push_back(handler.first);
     if (!map.IsMap())
-        source.refuse(map, fmt::format("{} must be a map of keys to values; its keys are {}", name, fmt::join(keys, ", ")));
+        source.refuse(map,
+                      fmt::format("{} must be a map of keys to values; its keys are {}", name, fmt::join(keys, ", ")));
     std::vector<std::string> seen;
     for (const auto& entry : map) {
         const std::string key = scalar(source, entry.first, "key");

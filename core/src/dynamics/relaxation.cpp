@@ -31,8 +31,10 @@ namespace delassus {
 Relaxation::Relaxation(DynamicalSystem& system, RelaxationSettings settings)
     : system_(system),
       settings_(settings),
-      newton_(system,
-              {.method = "the search for an equilibrium", .jacobian = Jacobian::Symmetric, .max_iterations = 25, .watchdog = true}),
+      newton_(system, {.method = "the search for an equilibrium",
+                       .jacobian = Jacobian::Symmetric,
+                       .max_iterations = 25,
+                       .watchdog = true}),
       n_(system.n()),
       m_(system.m()) {}
 

@@ -230,7 +230,8 @@ void choose_method(SceneSystem& system) {
     system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";
     system.method_reason = "nothing can touch, and " + (stiff.empty() ? "no force is stiff" : stiff);
     if (!system.control)
-        system.integrator_options.insert_or_assign("error_limit", stiff.empty() ? error_limit_of_explicit : error_limit);
+        system.integrator_options.insert_or_assign("error_limit",
+                                                   stiff.empty() ? error_limit_of_explicit : error_limit);
 }
 
 }  // namespace delassus::scene
