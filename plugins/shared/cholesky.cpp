@@ -21,19 +21,6 @@ namespace {
     throw NumericalFailure(std::string(what) + ": CHOLMOD failed with status " + std::to_string(common.status));
 }
 
-/// Sorts the indices whose mark is the row's: where they lie close together, by a walk over the marks.
-void put_in_order(std::vector<std::int32_t>& reach, const std::vector<Eigen::Index>& mark, Eigen::Index row) {
-    if (reach.empty()) return;
-    const auto [lowest, highest] = std::minmax_element(reach.begin(), reach.end());
-    const std::int32_t first = *lowest, last = *highest;
-    constexpr std::size_t steps_in_place_of_one = 8;
-    if (static_cast<std::size_t>(last - first) > steps_in_place_of_one * reach.size())
-        return std::sort(reach.begin(), reach.end());
-    reach.clear();
-    for (std::int32_t j = first; j <= last; ++j)
-        if (mark[static_cast<std::size_t>(j)] == row) reach.push_back(j);
-}
-
 }  // namespace
 
 Cholesky::Cholesky(Kind kind, Ordering ordering, Method method) : kind_(kind) {
@@ -166,7 +153,7 @@ void Cholesky::half_solve(const SparseRows& D, const Visitor& visit) const {
                 j = count[j] > 1 ? row_index[start[j] + 1] : -1;
             }
         }
-        put_in_order(reach, mark, row);
+        std::sort(reach.begin(), reach.end());
         for (const auto j : reach) {
             const double solved = work[j] / value[start[j]];
             work[j] = solved;

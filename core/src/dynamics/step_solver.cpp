@@ -17,6 +17,7 @@
 #include "delassus/sdk/problem_view.hpp"
 #include "dynamics/general_factor.hpp"
 #include "dynamics/islands.hpp"
+#include "problem/symmetry.hpp"
 #include "solver/auto_solver.hpp"
 
 namespace delassus {
@@ -395,17 +396,15 @@ bool StepSolver::Implementation::hold_zero(std::span<const Cone> cones) {
     });
 }
 
-// A mechanism that falls freely does not move its rows, whether they are joints or contacts between its bodies. What D
-// x
-// + b is then comes from the rounding of x = H⁻¹ a, and errors relative to it say nothing. |S D x| ≤ √m ‖x‖_H with
+// A mechanism that falls freely does not move its rows, whether they are joints or contacts between its bodies. What
+// D x + b is then comes from the rounding of x = H⁻¹ a, and errors relative to it say nothing. |S D x| ≤ √m ‖x‖_H with
 // ‖x‖_H = √(aᵀx), of which √(aᵀ diag(H)⁻¹ a) is a first guess. Rows that move by less than 10⁻¹² of that are still.
 double StepSolver::Implementation::share_of_rows(const PreparedProblem& part) {
     const Problem& problem = part.problem();
     double twice_energy = 0.0;
     for (std::int32_t i = 0; i < problem.H.rows; ++i)
-        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
-            if (problem.H.column[e] == i && problem.H.value[e] > 0.0)
-                twice_energy += problem.a[i] * problem.a[i] / problem.H.value[e];
+        if (const double mass = entry_of(problem.H, i, i); mass > 0.0)
+            twice_energy += problem.a[i] * problem.a[i] / mass;
     return twice_energy > 0.0 ? part.meter().reference() / std::sqrt(problem.m() * twice_energy) : 1.0;
 }
 
@@ -499,9 +498,7 @@ double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::sp
     double square = 0.0;
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {
         const double error = error_of(i);
-        if (error == 0.0) continue;
-        for (auto e = problem.H.row_start[i]; e < problem.H.row_start[i + 1]; ++e)
-            if (problem.H.column[e] == i) square += problem.H.value[e] * error * error;
+        if (error != 0.0) square += entry_of(problem.H, i, i) * error * error;
     }
     const double by_masses = share * std::sqrt(std::abs(square)) / reference;
     if (by_masses <= least) return least;  // as at rest

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <ranges>
 
 #include "delassus/error.hpp"
 #include "partitioned/bytes.hpp"
+#include "partitioned/cone_bytes.hpp"
 #include "problem/structure.hpp"
 
 namespace delassus {
@@ -149,17 +151,7 @@ Problem gathered(const Communicator& communicator, const PartitionedProblem& par
         put_matrix(own, part.E);
         put(own, part.a);
         put(own, part.b);
-        std::vector<std::int32_t> shapes;
-        std::vector<double> numbers;
-        for (const Cone& cone : part.cones) {
-            shapes.insert(shapes.end(),
-                          {static_cast<std::int32_t>(cone.kind), cone.rows, static_cast<std::int32_t>(cone.lo.size())});
-            numbers.insert(numbers.end(), cone.parameters.begin(), cone.parameters.end());
-            numbers.insert(numbers.end(), cone.lo.begin(), cone.lo.end());
-            numbers.insert(numbers.end(), cone.hi.begin(), cone.hi.end());
-        }
-        put(own, shapes);
-        put(own, numbers);
+        put_cones(own, part.cones, std::views::iota(std::size_t{0}, part.cones.size()));
     });
     const auto parts = communicator.exchange(std::vector<Bytes>(static_cast<std::size_t>(communicator.size()), own));
     Problem whole;
@@ -173,18 +165,7 @@ Problem gathered(const Communicator& communicator, const PartitionedProblem& par
             for (SparseMatrix* matrix : {&whole.H, &whole.D, &whole.E}) append_rows(reader, *matrix);
             reader.append(whole.a);
             reader.append(whole.b);
-            const auto shapes = reader.next<std::int32_t>();
-            const auto numbers = reader.next<double>();
-            auto next = numbers.begin();
-            for (std::size_t k = 0; k < shapes.size(); k += 3) {
-                Cone cone{static_cast<ConeKind>(shapes[k]), shapes[k + 1], {}, {}, {}};
-                for (double& parameter : cone.parameters) parameter = *next++;
-                cone.lo.assign(next, next + shapes[k + 2]);
-                next += shapes[k + 2];
-                cone.hi.assign(next, next + shapes[k + 2]);
-                next += shapes[k + 2];
-                whole.cones.push_back(std::move(cone));
-            }
+            append_cones(reader, whole.cones);
         }
         const auto n = static_cast<std::int32_t>(part.n_all()), m = static_cast<std::int32_t>(part.m_all());
         whole.H.columns = whole.D.columns = n;

@@ -69,13 +69,6 @@ Differences differences(const Communicator& run, const LocalMatrix& matrix, cons
     const std::int64_t first = start[rank], last = start[rank + 1];
     std::vector<std::vector<Entry>> leaving(processes);
     Differences found;
-    const auto entry_at = [&](std::int64_t row, std::int64_t column) {
-        const auto begin = matrix.column.begin() + matrix.row_start[static_cast<std::size_t>(row - first)];
-        const auto end = matrix.column.begin() + matrix.row_start[static_cast<std::size_t>(row - first) + 1];
-        const auto place = std::lower_bound(begin, end, column);
-        return place != end && *place == column ? matrix.value[static_cast<std::size_t>(place - matrix.column.begin())]
-                                                : 0.0;
-    };
     for (std::int64_t row = first; row < last; ++row)
         for (auto k = matrix.row_start[static_cast<std::size_t>(row - first)];
              k < matrix.row_start[static_cast<std::size_t>(row - first) + 1]; ++k) {
@@ -83,7 +76,7 @@ Differences differences(const Communicator& run, const LocalMatrix& matrix, cons
             const double value = matrix.value[static_cast<std::size_t>(k)];
             found.size = std::max(found.size, std::abs(value));
             if (column >= first && column < last) {
-                found.asymmetry = std::max(found.asymmetry, std::abs(value - entry_at(column, row)));
+                found.asymmetry = std::max(found.asymmetry, std::abs(value - entry_of(matrix, column - first, row)));
             } else {
                 const auto owner =
                     static_cast<std::size_t>(std::upper_bound(start.begin(), start.end(), column) - start.begin()) - 1;
@@ -94,7 +87,8 @@ Differences differences(const Communicator& run, const LocalMatrix& matrix, cons
     for (std::size_t p = 0; p < processes; ++p) put(to[p], leaving[p]);
     for (const Bytes& bytes : run.exchange(to))
         for (const Entry& entry : ByteReader(bytes).next<Entry>())
-            found.asymmetry = std::max(found.asymmetry, std::abs(entry.value - entry_at(entry.column, entry.row)));
+            found.asymmetry =
+                std::max(found.asymmetry, std::abs(entry.value - entry_of(matrix, entry.column - first, entry.row)));
     std::vector<double> both = {found.asymmetry, found.size};
     run.max(both);
     return {both[0], both[1]};
@@ -259,7 +253,6 @@ void PreparedPart::Implementation::lay_out() {
     raw.E = raw_of_local(problem.E);
     raw.a = problem.a.data();
     raw.b = problem.b.data();
-    std::size_t parameter_count = 0;
     std::int32_t first_row = 0;
     together(*communicator, [&] {
         if (raw.m >= std::numeric_limits<std::int32_t>::max())
@@ -267,18 +260,9 @@ void PreparedPart::Implementation::lay_out() {
         for (const Cone& cone : problem.cones) {
             cones.push_back(raw_cone(cone, first_row));
             first_row += cone.rows;
-            parameter_count += static_cast<std::size_t>(cones.back().parameter_count);
         }
     });
-    // Side by side, since solvers read them in every sweep.
-    parameters.resize(parameter_count);
-    double* place = parameters.data();
-    for (delassus_cone& cone : cones) {
-        if (cone.parameter_count == 0) continue;
-        std::copy_n(cone.parameters, cone.parameter_count, place);
-        cone.parameters = place;
-        place += cone.parameter_count;
-    }
+    put_side_by_side(cones, parameters);
     raw.cone_count = static_cast<std::int64_t>(cones.size());
     raw.cones = cones.data();
 }

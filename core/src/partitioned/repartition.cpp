@@ -10,6 +10,7 @@
 
 #include "delassus/error.hpp"
 #include "partitioned/bytes.hpp"
+#include "partitioned/cone_bytes.hpp"
 #include "partitioned/halo.hpp"
 #include "partitioned/scotch_module.hpp"
 #include "problem/structure.hpp"
@@ -293,36 +294,6 @@ std::vector<std::int64_t> origin_or_own(const std::vector<std::int64_t>& origin,
     std::vector<std::int64_t> own(static_cast<std::size_t>(count));
     std::iota(own.begin(), own.end(), first);
     return own;
-}
-
-void put_cones(Bytes& bytes, const std::vector<Cone>& cones, const std::vector<std::int64_t>& chosen) {
-    std::vector<std::int32_t> shapes;
-    std::vector<double> numbers;
-    for (const auto k : chosen) {
-        const Cone& cone = cones[static_cast<std::size_t>(k)];
-        shapes.insert(shapes.end(),
-                      {static_cast<std::int32_t>(cone.kind), cone.rows, static_cast<std::int32_t>(cone.lo.size())});
-        numbers.insert(numbers.end(), cone.parameters.begin(), cone.parameters.end());
-        numbers.insert(numbers.end(), cone.lo.begin(), cone.lo.end());
-        numbers.insert(numbers.end(), cone.hi.begin(), cone.hi.end());
-    }
-    put(bytes, shapes);
-    put(bytes, numbers);
-}
-
-void append_cones(ByteReader& reader, std::vector<Cone>& cones) {
-    const auto shapes = reader.next<std::int32_t>();
-    const auto numbers = reader.next<double>();
-    auto next = numbers.begin();
-    for (std::size_t k = 0; k < shapes.size(); k += 3) {
-        Cone cone{static_cast<ConeKind>(shapes[k]), shapes[k + 1], {}, {}, {}};
-        for (double& parameter : cone.parameters) parameter = *next++;
-        cone.lo.assign(next, next + shapes[k + 2]);
-        next += shapes[k + 2];
-        cone.hi.assign(next, next + shapes[k + 2]);
-        next += shapes[k + 2];
-        cones.push_back(std::move(cone));
-    }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string_view>
 #include <tuple>
+#include <vector>
 
 #include "delassus/problem.hpp"
 #include "delassus/sdk/cones.hpp"
@@ -48,6 +49,20 @@ inline delassus_cone raw_cone(const Cone& cone, std::int32_t first_row = 0) {
             kind.parameter_count > 0 ? cone.parameters.data() : nullptr,
             kind.has_bounds ? cone.lo.data() : nullptr,
             kind.has_bounds ? cone.hi.data() : nullptr};
+}
+
+/// Has the cones point to copies of their parameters that stand side by side, since solvers read them in every sweep.
+inline void put_side_by_side(std::vector<delassus_cone>& cones, std::vector<double>& parameters) {
+    std::size_t count = 0;
+    for (const delassus_cone& cone : cones) count += static_cast<std::size_t>(cone.parameter_count);
+    parameters.resize(count);
+    double* place = parameters.data();
+    for (delassus_cone& cone : cones) {
+        if (cone.parameter_count == 0) continue;
+        std::copy_n(cone.parameters, cone.parameter_count, place);
+        cone.parameters = place;
+        place += cone.parameter_count;
+    }
 }
 
 }  // namespace delassus

@@ -275,20 +275,12 @@ void PreparedProblem::Implementation::find_shared_columns() {
 
 void PreparedProblem::Implementation::point_to_arrays() {
     cones.resize(problem.cones.size());
-    std::int32_t first_row = 0, parameter_count = 0;
+    std::int32_t first_row = 0;
     for (std::size_t c = 0; c < cones.size(); ++c) {
         cones[c] = raw_cone(problem.cones[c], first_row);
         first_row += cones[c].rows;
-        parameter_count += cones[c].parameter_count;
     }
-    parameters.resize(static_cast<std::size_t>(parameter_count));
-    double* place = parameters.data();
-    for (delassus_cone& cone : cones) {
-        if (cone.parameter_count == 0) continue;
-        std::copy_n(cone.parameters, cone.parameter_count, place);
-        cone.parameters = place;
-        place += cone.parameter_count;
-    }
+    put_side_by_side(cones, parameters);
     raw.law = static_cast<std::int32_t>(problem.law);
     raw.H = raw_of(problem.H);
     raw.D = raw_of(problem.D);

@@ -41,10 +41,12 @@ void visit_with_transpose(const SparseMatrix& matrix, Visit visit) {
     }
 }
 
-/// The value at a place; 0 where a well-formed matrix has no entry.
-inline double entry_of(const SparseMatrix& matrix, std::int32_t row, std::int32_t column) {
-    const auto begin = matrix.column.begin() + matrix.row_start[row];
-    const auto end = matrix.column.begin() + matrix.row_start[row + 1];
+/// The value at a place; 0 where a well-formed matrix has no entry. The matrix has the members of SparseMatrix, with
+/// indices of any size.
+template <class Matrix, class Index>
+double entry_of(const Matrix& matrix, Index row, Index column) {
+    const auto begin = matrix.column.begin() + matrix.row_start[static_cast<std::size_t>(row)];
+    const auto end = matrix.column.begin() + matrix.row_start[static_cast<std::size_t>(row) + 1];
     const auto found = std::lower_bound(begin, end, column);
     return found != end && *found == column ? matrix.value[static_cast<std::size_t>(found - matrix.column.begin())]
                                             : 0.0;
