@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <ranges>
 
 #include "delassus/error.hpp"
 #include "partitioned/bytes.hpp"
@@ -151,7 +150,9 @@ Problem gathered(const Communicator& communicator, const PartitionedProblem& par
         put_matrix(own, part.E);
         put(own, part.a);
         put(own, part.b);
-        put_cones(own, part.cones, std::views::iota(std::size_t{0}, part.cones.size()));
+        std::vector<std::size_t> all(part.cones.size());
+        std::iota(all.begin(), all.end(), std::size_t{0});
+        put_cones(own, part.cones, all);
     });
     const auto parts = communicator.exchange(std::vector<Bytes>(static_cast<std::size_t>(communicator.size()), own));
     Problem whole;
