@@ -2,6 +2,7 @@
 // The linearised implicit Euler method for differential variational inequalities (seed eq. 123, 148): one linear or
 // cone problem a step, contacts and impacts included. Order 1.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -9,8 +10,8 @@
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
-#include "dynamics/memory.hpp"
 #include "dynamics/step_error.hpp"
+#include "dynamics/step_memory.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "problem/copy_cone.hpp"
@@ -87,30 +88,30 @@ public:
         left_.clear();
     }
 
-    // h, whether there are multipliers, the multipliers, what is remembered of velocities, whether errors were left,
-    // the errors, and the impulses of unilateral blocks.
-    std::vector<double> save() const override {
-        std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0};
-        memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
-        error_.save(memory);
-        memory.push_back(left_.empty() ? 0.0 : 1.0);
-        memory.insert(memory.end(), left_.begin(), left_.end());
-        kept_.append_to(memory);
+    // h; the errors of the last steps' velocities and the errors that solves left; the multipliers.
+    StepMemory memory() const override {
+        StepMemory memory;
+        memory.numbers = {last_h_};
+        for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
+        memory.of_columns.push_back(left_);
+        memory.of_rows = {multipliers_};
+        memory.impulses = kept_;
         return memory;
     }
-    void load(const std::vector<double>& memory) override {
+    void set_memory(StepMemory memory) override {
         restart();
-        std::span<const double> rest = memory;
-        const auto take = [&](std::size_t count) {
-            const auto taken = take_from(rest, count, "euler_implicit_linearized");
-            return std::vector<double>(taken.begin(), taken.end());
-        };
-        const std::vector<double> head = take(2);
-        last_h_ = head[0];
-        if (head[1] != 0.0) multipliers_ = take(static_cast<std::size_t>(m_));
-        error_.load(rest, static_cast<std::size_t>(n_));
-        if (take(1)[0] != 0.0) left_ = take(static_cast<std::size_t>(n_));
-        kept_.load(rest);
+        last_h_ = memory.numbers.at(0);
+        std::array<std::vector<double>, StepError::kept> errors;
+        for (std::size_t k = 0; k < errors.size(); ++k) errors[k] = std::move(memory.of_columns.at(k));
+        error_.load(std::move(errors));
+        left_ = std::move(memory.of_columns.at(StepError::kept));
+        multipliers_ = std::move(memory.of_rows.at(0));
+        kept_ = std::move(memory.impulses);
+    }
+    std::vector<double> save() const override { return flat(memory()); }
+    void load(const std::vector<double>& memory) override {
+        set_memory(unflattened(memory, this->memory(), static_cast<std::size_t>(n_), static_cast<std::size_t>(m_),
+                               "euler_implicit_linearized"));
     }
 
 private:
@@ -135,6 +136,7 @@ private:
         solution_.x = state.v;
         double scale = 0.0;
         for (const double momentum : problem_.a) scale = std::max(scale, std::abs(momentum));
+        scale = solver.largest_on_all(scale);
         solve(solver, report);
         note_left(solver.left());
         drop_negligible(scale);
@@ -180,7 +182,7 @@ private:
             return false;
         };
         if (!once()) return;
-        for (int i = 0; !settled(i); ++i) {
+        for (int i = 0; !solver.on_all(settled(i)); ++i) {
             if (i == most_iterations) {
                 report.solved = false;
                 report.message = "the speeds of sliding contacts did not settle";
@@ -486,6 +488,7 @@ const RegisterTimestepper euler_implicit_linearized_row{
      .constraints = true,
      .unilateral = true,
      .sleeping = true,
+     .shared = true,
      .order = 1,
      .make = [](DynamicalSystem& system, const std::vector<OptionValue>& values) -> std::unique_ptr<Timestepper> {
          return std::make_unique<EulerImplicitLinearized>(system, values);

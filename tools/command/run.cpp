@@ -3,17 +3,23 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <span>
 
 #include "command.hpp"
+#include "delassus/communicator.hpp"
+#include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "delassus/scene_schema.hpp"
 #include "delassus/simulation.hpp"
+#include "on_all_processes.hpp"
 #include "output/run_folder.hpp"
 #include "output/run_report.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
+#include "process/watched_process.hpp"
 #include "scene_arguments.hpp"
 #include "simulation/run_loop.hpp"
 #include "support/text_file.hpp"
@@ -39,8 +45,8 @@ double seconds_since(Clock::time_point begin) {
 /// A line on a terminal that says how far a run is and when it will be done; nothing where there is no terminal.
 class Progress {
 public:
-    explicit Progress(const std::vector<Simulation>& simulations)
-        : simulations_(simulations), terminal_(isatty(STDERR_FILENO) != 0), start_(done()) {}
+    Progress(const std::vector<Simulation>& simulations, bool first_process)
+        : simulations_(simulations), terminal_(first_process && isatty(STDERR_FILENO) != 0), start_(done()) {}
 
     void show() {
         if (!terminal_ || seconds_since(shown_) < 0.1) return;
@@ -83,21 +89,43 @@ int exit_code_of(RunStatus status) {
     return status == RunStatus::Unsupported ? exit_unsupported : exit_not_converged;
 }
 
+bool on_any(const Communicator& run, bool own) {
+    std::int64_t any = own ? 1 : 0;
+    run.max(std::span(&any, 1));
+    return any != 0;
+}
+
+/// Everything on disk; folder: of process 0, null on the others.
+void checkpoint(std::vector<Simulation>& simulations, RunFolder* folder) {
+    for (auto& simulation : simulations) simulation.gather();
+    if (folder != nullptr) folder->checkpoint();
+}
+
 /// Steps until the end, an interrupt or a failure.
-RunResult advance(std::vector<Simulation>& simulations, RunFolder* folder) {
-    Progress progress(simulations);
+RunResult advance(const Communicator& run, std::vector<Simulation>& simulations, RunFolder* folder) {
+    Progress progress(simulations, run.rank() == 0);
     const auto stepped = [&](std::size_t system) {
         if (folder != nullptr) folder->add_step(system);
+        if (on_any(run, folder != nullptr && folder->checkpoint_is_due())) checkpoint(simulations, folder);
         progress.show();
     };
-    RunResult result = run_to_end(simulations, {stepped, interrupted});
+    RunResult result = run_to_end(simulations, {stepped, [&] { return on_any(run, interrupted()); }});
     progress.clear();
     if (result.status == RunStatus::Interrupted)
         result.message = fmt::format("stopped at t = {:.9g} s; --resume goes on from there", reached_time(simulations));
     return result;
 }
 
-void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
+void print_shares(const std::vector<Simulation::Share>& shares) {
+    constexpr double MiB = 1048576.0;
+    for (std::size_t p = 0; p < shares.size(); ++p)
+        fmt::print("  process {}: {} bodies, {} ghosts, {} rows at the end; {:.1f} MiB at most, {:.1f} MiB sent\n", p,
+                   shares[p].bodies, shares[p].ghosts, shares[p].rows, static_cast<double>(shares[p].peak_memory) / MiB,
+                   static_cast<double>(shares[p].bytes_sent) / MiB);
+}
+
+void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& shares, RunStatus status) {
+    auto of_system = shares.begin();
     for (auto& simulation : simulations) {
         const auto& system = simulation.system();
         const auto& totals = simulation.totals();
@@ -141,11 +169,12 @@ void print_summary(std::vector<Simulation>& simulations, RunStatus status) {
         if (totals.near_goal_solves > 0)
             fmt::print("  {} solves ended above the tolerance that their steps are worth, within what is good enough\n",
                        totals.near_goal_solves);
+        print_shares(*of_system++);
     }
     if (status != RunStatus::Finished) fmt::print("{}\n", status_word(status));
 }
 
-int run(const RunArguments& arguments) {
+void check(const RunArguments& arguments) {
     if (arguments.every < 1) throw InputError("--every must be at least 1");
     if (arguments.pictures.value_or(0) < 0) throw InputError("--pictures must be at least 0");
     if (arguments.dump < 0) throw InputError("--dump-problems must be at least 1");
@@ -156,47 +185,85 @@ int run(const RunArguments& arguments) {
         throw InputError("--dump-problems writes into the folder of -o; give one");
     if (arguments.contact_forces && arguments.output.empty() && !resume)
         throw InputError("--contact-forces writes into the folder of -o; give one");
+}
 
+/// The run's folder, on process 0; on the others what it has to do with the simulations alone. Null without a folder.
+std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArguments& arguments, const Scene& scene,
+                                       std::vector<Simulation>& simulations) {
+    std::unique_ptr<RunFolder> folder;
+    bool contact_forces = arguments.contact_forces;
+    together(run, [&] {
+        if (!arguments.resume.empty()) {
+            Checkpoint checkpoint = RunFolder::checkpoint_of(arguments.resume, scene);
+            if (arguments.contact_forces && !checkpoint.contact_forces)
+                throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
+                                             arguments.resume.string()));
+            contact_forces = checkpoint.contact_forces;
+            if (run.rank() > 0)
+                for (std::size_t i = 0; i < simulations.size(); ++i)
+                    simulations[i].load(std::move(checkpoint.systems[i].simulation));
+        }
+    });
+    together(run, [&] {
+        if (run.rank() > 0) return;
+        if (!arguments.resume.empty()) {
+            folder =
+                std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every, arguments.pictures);
+        } else if (!arguments.output.empty()) {
+            folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
+                                                 arguments.every, arguments.contact_forces, arguments.pictures);
+        }
+        if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
+    });
+    if (contact_forces)
+        for (auto& simulation : simulations) simulation.gather_contacts();
+    return folder;
+}
+
+int run_on(const Communicator& run, const RunArguments& arguments) {
+    check(arguments);
+    const bool first = run.rank() == 0;
     Scene scene = read(arguments.scene);
     const Registry registry(absolute(arguments.scene.plugin_path));
     std::vector<Simulation> simulations;
     simulations.reserve(scene.systems.size());
     for (auto& system : scene.systems) simulations.emplace_back(system, registry);
-
-    std::unique_ptr<RunFolder> folder;
-    if (resume) {
-        folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every, arguments.pictures);
-        if (arguments.contact_forces && !folder->contact_forces())
-            throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
-                                         arguments.resume.string()));
-    } else if (!arguments.output.empty()) {
-        folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
-                                             arguments.every, arguments.contact_forces, arguments.pictures);
-    }
-    if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
+    const bool shared = std::any_of(simulations.begin(), simulations.end(),
+                                    [](const Simulation& simulation) { return simulation.shared(); });
+    if (shared && arguments.dump > 0)
+        throw InputError("--dump-problems writes whole problems, which no process has here; start one process");
+    const auto folder = open_folder(run, arguments, scene, simulations);
 
     install_interrupt_handler();
     for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
     install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
-    const RunResult result = advance(simulations, folder.get());
-    if (const auto bytes = guard.release())
+    const RunResult result = advance(run, simulations, folder.get());
+    if (const auto bytes = guard.release(); bytes > 0 && first)
         fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
 
-    const std::string report = run_report_json(arguments.scene.file.filename().string(), scene, simulations, result);
-    if (folder) {
-        folder->checkpoint();
-        folder->write_report(report);
-    }
+    SharesOfSystems shares;
+    for (const auto& simulation : simulations) shares.push_back(simulation.shares());
+    const std::string report =
+        run_report_json(arguments.scene.file.filename().string(), scene, simulations, result, shares);
+    if (on_any(run, folder != nullptr)) checkpoint(simulations, folder.get());
+    if (folder) folder->write_report(report);
+    if (!first) return exit_code_of(result.status);
     if (arguments.json) {
         fmt::print("{}", report);
     } else {
-        print_summary(simulations, result.status);
+        print_summary(simulations, shares, result.status);
     }
     for (const auto& simulation : simulations)
         for (const auto& warning : simulation.warnings()) fmt::print(stderr, "delassus: {}\n", warning);
     if (!result.message.empty()) fmt::print(stderr, "delassus: {}\n", result.message);
     return exit_code_of(result.status);
+}
+
+int run(const RunArguments& arguments) {
+    if (process_count() == 1) return run_on(*single_process(), arguments);
+    continue_in_watched_child(fmt::format("process {} of {}", process_rank(), process_count()), exit_not_converged);
+    return on_all_processes([&](const std::shared_ptr<const Communicator>& run) { return run_on(*run, arguments); });
 }
 
 }  // namespace

@@ -487,6 +487,9 @@ public:
     [[nodiscard]] std::array<Vector3, 2> velocities(const State& state, BodyIndex index) const;
     /// Of bodies; the spheres of nodes are not among them.
     [[nodiscard]] const std::vector<Shape>& shapes() const;
+    /// m, since finish(): how near shapes must be for a contact, and their median size; 0 where none can touch.
+    [[nodiscard]] double envelope() const;
+    [[nodiscard]] double size_of_shapes() const;
     /// Whether shapes or nodes could meet, so that contacts are looked for; after finish().
     [[nodiscard]] bool detects_contacts() const;
     /// Rows of joint `index` within all_constraints() and all_multipliers(): first row and count.
@@ -544,6 +547,19 @@ public:
     [[nodiscard]] double kinetic_energy(const State& state) const;
     /// Linear momentum (kg m/s), and angular momentum about the origin (kg m²/s), world frame.
     [[nodiscard]] std::array<Vector3, 2> momentum(const State& state) const;
+
+    // ---- Some bodies of another system ----
+    /// Numbers in the other system, ascending, of what this one has in the same order.
+    struct PartNumbers {
+        std::vector<std::int32_t> shapes, joints;
+        std::vector<std::int32_t> motors, actuators;  ///< those with a force limit, counted among such
+        std::vector<BodyIndex> touched;               ///< of this system: others may touch them that are not in it
+    };
+    /// After finish(), of a system of some bodies of `whole`: takes the scales of the whole for its own (the envelope,
+    /// the resolution of gaps, the speed of recovery), and gives its unilateral blocks the keys that they have there.
+    void be_part_of(const MultibodySystem& whole, PartNumbers numbers);
+    /// The joints whose whole turns are counted, in the order of turns().
+    [[nodiscard]] std::vector<std::int32_t> counted_joints() const;
 
     // ---- DynamicalSystem ----
     [[nodiscard]] std::int32_t n() const override;

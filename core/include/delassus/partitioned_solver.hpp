@@ -59,6 +59,12 @@ public:
     /// then; elsewhere the answer is NaN without x. Collective.
     [[nodiscard]] double natural(const double* x, const double* lambda) const;
 
+    /// ErrorMeter::reference() and norm_in_rows() of all parts together. v: n, own part. Collective.
+    [[nodiscard]] double reference() const;
+    [[nodiscard]] double norm_in_rows(std::span<const double> v) const;
+    /// The velocities without reactions: x ← H⁻¹ a, own part. Throws Unsupported where H is not definite. Collective.
+    void free_velocities(std::vector<double>& x) const;
+
 private:
     friend class PartitionedSolver;
     friend class PartMeter;

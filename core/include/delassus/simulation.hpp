@@ -94,6 +94,7 @@ struct SimulationState {
 
 class EnergyGuard;
 class LookAhead;
+class SharedRun;
 
 /// One system of a scene, advanced step by step by its timestepper and its solver.
 ///
@@ -154,6 +155,27 @@ public:
     /// rounding.
     [[nodiscard]] DELASSUS_API std::string start() const;
 
+    // ---- Several processes ----
+    //
+    // Where a launcher started several processes, each makes the same simulations and calls the same members in the
+    // same order. They share the bodies of a system where the method and the solver can (docs/partitioned.md,
+    // "Simulating"); else each computes the whole.
+
+    /// Whether this and other processes share the system's bodies.
+    [[nodiscard]] bool shared() const { return shared_ != nullptr; }
+    /// What a process had in the last step, and cost.
+    struct Share {
+        std::int64_t bodies = 0, ghosts = 0, rows = 0;
+        std::int64_t bytes_sent = 0, peak_memory = 0;  ///< bytes, since the start
+    };
+    /// By rank; empty where nothing is shared. Collective.
+    [[nodiscard]] DELASSUS_API std::vector<Share> shares() const;
+    /// Brings together what save() needs; before each save() where bodies are shared. Collective.
+    DELASSUS_API void gather();
+    /// Has contacts() know all contacts on process 0, from the next step on; elsewhere each has its own.
+    DELASSUS_API void gather_contacts();
+
+    /// Throws InputError where bodies are shared and gather() was not called since the last step.
     [[nodiscard]] DELASSUS_API SimulationState save() const;
     /// Throws InputError if the sizes are not the system's.
     DELASSUS_API void load(SimulationState state);
@@ -180,6 +202,11 @@ private:
     void add_unilateral_forces(std::vector<double>& force) const;
     /// The timestepper and what controls its steps.
     void make_method();
+    /// Shares the bodies with the other processes, where there are any and the system, its method and solver allow it.
+    void share(const Registry& registry);
+    /// A step of the timestepper, with the other processes if need be.
+    void take_step(State& state, double h, StepReport& report);
+    [[nodiscard]] std::vector<double> memory_of_method() const;
     /// Has the system choose anew which rows to keep where it must; the method then starts anew. steps: so far. Returns
     /// whether it did.
     bool renew_rows(State& state, std::int64_t steps);
@@ -204,6 +231,9 @@ private:
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next
     std::vector<double> constraint_;
     std::unique_ptr<EnergyGuard> guard_;
+    std::unique_ptr<SharedRun> shared_;  // empty where this process steps all bodies
+    std::vector<double> gathered_;       // the memory of the method for all bodies, after step gathered_at_
+    std::int64_t gathered_at_ = -1;
 };
 
 }  // namespace delassus

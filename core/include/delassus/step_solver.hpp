@@ -20,6 +20,8 @@
 
 namespace delassus {
 
+class SharedSteps;
+
 /// Effort since the counters were reset.
 struct SolverEffort {
     std::int64_t solves = 0;         ///< calls of solve()
@@ -122,6 +124,17 @@ public:
 
     /// Asked about each part of a problem; null: all of them are solved. Not owned.
     RestingParts* resting = nullptr;
+
+    /// The processes that step the rest of the system, where there are several: problems are solved with them, and
+    /// solve() is collective. Null: this process steps all of it. Not owned.
+    SharedSteps* shared = nullptr;
+    /// Whether it is so on all of these processes. Collective.
+    [[nodiscard]] DELASSUS_API bool on_all(bool own) const;
+    /// The largest of these processes' values. Collective.
+    [[nodiscard]] DELASSUS_API double largest_on_all(double own) const;
+
+    /// As given, but for the name, which is `auto` if there was none.
+    [[nodiscard]] DELASSUS_API const SolverConfig& config() const;
 
     /// A part of a problem that is solved apart from the rest.
     struct Part {

@@ -69,6 +69,7 @@ struct EmbeddedError {
 };
 
 struct ContinuousExtension;
+struct StepMemory;
 
 /// A method, made for one system. It keeps what belongs to the method (accelerations, multipliers) from step to step.
 class DELASSUS_API Timestepper {
@@ -113,6 +114,11 @@ public:
     /// floats, has to go, and what it leaves of its iterations may follow the tolerance. Default: nothing.
     virtual void choose_steps(double /*tolerance*/) {}
 
+    /// The memory of the method by what it belongs to, where TimestepperInfo::shared (dynamics/step_memory.hpp).
+    /// Throws Unsupported elsewhere.
+    [[nodiscard]] virtual StepMemory memory() const;
+    virtual void set_memory(StepMemory memory);
+
     /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
     [[nodiscard]] virtual std::vector<double> save() const;
     virtual void load(const std::vector<double>& memory);
@@ -132,6 +138,7 @@ struct TimestepperInfo {
     bool constraints = false;  ///< takes bilateral constraints
     bool unilateral = false;   ///< takes contacts, stops and bounded motors
     bool sleeping = false;     ///< one problem a step for velocities: parts that stand still may be left out
+    bool shared = false;       ///< several processes may each step their bodies of a system (docs/partitioned.md)
     int order = 1;             ///< of convergence, for smooth systems and the default options
     /// system outlives the stepper; the values are checked, one for each option.
     std::unique_ptr<Timestepper> (*make)(DynamicalSystem& system, const std::vector<OptionValue>& values) = nullptr;

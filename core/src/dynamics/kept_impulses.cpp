@@ -61,6 +61,14 @@ void KeptImpulses::sort() {
     if (!std::is_sorted(entries_.begin(), entries_.end(), before)) std::sort(entries_.begin(), entries_.end(), before);
 }
 
+void KeptImpulses::drop_zeros() {
+    std::erase_if(entries_, [this](const Entry& entry) {
+        const auto first = impulses_.begin() + entry.first;
+        return std::all_of(first, first + entry.rows, [](double value) { return value == 0.0; });
+    });
+    next_ = 0;
+}
+
 void KeptImpulses::append_to(std::vector<double>& memory) const {
     for (const auto& [key, first, rows] : entries_) {
         memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),

@@ -31,6 +31,8 @@ public:
     /// For checkpoints: of each block its key in two halves, which a double holds exactly, its number of rows and its
     /// impulses.
     void append_to(std::vector<double>& memory) const;
+    /// Forgets the blocks without an impulse: a start without one is the same as one that is not found.
+    void drop_zeros();
     /// Takes what append_to() gave. Throws InputError if it ends within a block.
     void load(std::span<const double> memory);
 

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "dynamics/memory.hpp"
+#include <utility>
 
 namespace delassus {
 
@@ -33,20 +32,18 @@ void StepError::forget() {
     for (auto* part : {&before_, &change_, &jumps_[0], &jumps_[1], &jumps_[2], &error_}) part->clear();
 }
 
-void StepError::save(std::vector<double>& memory) const {
-    memory.push_back(before_.empty() ? 0.0 : 1.0);
-    for (const auto* part : {&before_, &change_, &jumps_[0], &jumps_[1]})
-        memory.insert(memory.end(), part->begin(), part->end());
+std::array<std::vector<double>, StepError::kept> StepError::save() const {
+    return {before_, change_, jumps_[0], jumps_[1]};
 }
 
-void StepError::load(std::span<const double>& rest, std::size_t n) {
+void StepError::load(std::array<std::vector<double>, kept> memory) {
     forget();
-    const auto take = [&rest](std::size_t count) { return take_from(rest, count, "the last steps' velocities"); };
-    if (take(1)[0] == 0.0) return;
-    for (auto* part : {&before_, &change_, &jumps_[0], &jumps_[1]}) {
-        const auto values = take(n);
-        part->assign(values.begin(), values.end());
-    }
+    const std::size_t n = memory[0].size();
+    if (n == 0) return;
+    before_ = std::move(memory[0]);
+    change_ = std::move(memory[1]);
+    jumps_[0] = std::move(memory[2]);
+    jumps_[1] = std::move(memory[3]);
     jumps_[2].assign(n, 0.0);
     error_.assign(n, 0.0);
 }

@@ -22,11 +22,12 @@ public:
 
     DELASSUS_API void forget();
 
-    /// Appends what a checkpoint keeps.
-    DELASSUS_API void save(std::vector<double>& memory) const;
-    /// Takes it from the front of rest, and leaves what follows. n: of the velocities. Throws InputError where it is
-    /// too short.
-    DELASSUS_API void load(std::span<const double>& rest, std::size_t n);
+    /// How many numbers of each velocity a checkpoint keeps.
+    static constexpr std::size_t kept = 4;
+    /// These, n each; empty before the first step.
+    [[nodiscard]] DELASSUS_API std::array<std::vector<double>, kept> save() const;
+    /// Takes what save() gave, all of one size.
+    DELASSUS_API void load(std::array<std::vector<double>, kept> memory);
 
 private:
     std::vector<double> before_, change_;

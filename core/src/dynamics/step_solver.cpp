@@ -17,6 +17,8 @@
 #include "delassus/sdk/problem_view.hpp"
 #include "dynamics/general_factor.hpp"
 #include "dynamics/islands.hpp"
+#include "dynamics/shared_steps.hpp"
+#include "dynamics/step_tolerance.hpp"
 #include "problem/symmetry.hpp"
 #include "solver/auto_solver.hpp"
 
@@ -105,16 +107,9 @@ struct StepSolver::Implementation {
     [[nodiscard]] bool follows_method() const {
         return !config.sweeps && !method_error.empty() && (!config.tolerance || config.name == auto_name);
     }
-    /// The tolerance of a part then.
-    [[nodiscard]] double goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const;
-    /// Its upper bound: what is left of a joint's velocity becomes drift.
-    static double loosest_goal(const PreparedProblem& part) {
-        return (part.needs() & DELASSUS_CAN_FREE) != 0 ? 1e-4 : 1e-2;
-    }
-    /// An error within this multiple of the upper bound is used where nothing better is found.
-    static constexpr double usable = 3.0;
-    /// Sets the tolerance of a part. A tolerance that the configuration names is kept at least.
-    void set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns, SolveSettings& of) const;
+    /// The tolerance of a part then; nothing otherwise.
+    [[nodiscard]] std::optional<double> goal_for(const PreparedProblem& part,
+                                                 std::span<const std::int32_t> columns) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
     /// solution, what it is worth in report.
     void solve_again(const PreparedProblem& prepared, Instance& by, SolveSettings again, Solution& solution,
@@ -139,10 +134,10 @@ struct StepSolver::Implementation {
     }
     /// The same of an answer that also balances. That error is relative to the momenta, whatever the reactions are: a
     /// mechanism that falls freely has rows that hold at the speeds of the step before, too.
-    static bool is_rounding(const Errors& error) { return rows_are_rounding(error) && error.balance <= rounding_limit; }
+    static bool is_rounding(const Errors& error) {
+        return rows_are_rounding(error) && error.balance <= rounding_limit_of_steps;
+    }
 
-    /// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
-    static constexpr double rounding_limit = 1e-8;
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
 
@@ -202,6 +197,13 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     self.method_error = method_error;
     ++self.effort.solves;
     self.left.assign(static_cast<std::size_t>(problem.n()), 0.0);
+    if (shared) {
+        PartResult result;
+        result.solved = shared->solve(problem, solution, warm_start, self.settings,
+                                      self.follows_method() ? method_error : std::span<const double>{}, result.effort);
+        std::ranges::fill(self.left, result.effort.worst_natural);
+        return self.take(result);
+    }
     const auto n = static_cast<std::size_t>(problem.n()), m = static_cast<std::size_t>(problem.m());
     KeptKind& kind = self.kind(problem.name);
     warm_start = warm_start && solution.x.size() == n && solution.lambda.size() == m;
@@ -333,7 +335,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
-    set_tolerance(prepared, columns, part_settings);
+    set_step_tolerance(config, prepared.needs(), goal_for(prepared, columns), part_settings);
     if (share < suspicious) {
         const double least = rounding_of_motion / share;
         part_settings.tolerance = std::max(part_settings.tolerance, least);
@@ -365,14 +367,14 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     // What nobody asked for ends no run.
     if (!done() && part_settings.needed > 0.0 && report.status != Status::Infeasible)
         report.near_goal = std::max(report.error.natural, report.error.balance) <=
-                           config.tolerance.value_or(usable * loosest_goal(prepared));
+                           config.tolerance.value_or(usable_multiple * loosest_goal(prepared.needs()));
     result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
     if (done()) return;
     result.solved = false;
     spent.worst_miss = std::max(spent.worst_miss, std::max(report.error.natural, report.error.balance) /
-                                                      std::max(part_settings.tolerance, rounding_limit));
+                                                      std::max(part_settings.tolerance, rounding_limit_of_steps));
     if (spent.unsolved.empty())
         spent.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
@@ -469,46 +471,22 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
     report = std::move(second);
 }
 
-void StepSolver::Implementation::set_tolerance(const PreparedProblem& part, std::span<const std::int32_t> columns,
-                                               SolveSettings& of) const {
-    constexpr double slack = 30.0, far_below = 1e-2;
-    if (!follows_method()) {
-        // Contacts may have no answer to a default tolerance that anybody finds.
-        if (config.tolerance || config.sweeps || (part.needs() & DELASSUS_CAN_FRICTION) == 0 ||
-            (part.needs() & DELASSUS_CAN_FREE) != 0)
-            return;
-        of.needed = of.tolerance;
-        of.usable = far_below * loosest_goal(part);
-        return;
-    }
-    const double goal = goal_for(part, columns);
-    if (config.tolerance && goal >= *config.tolerance) return;
-    of.tolerance = goal;
-    of.needed = config.tolerance.value_or(std::min(slack * goal, usable * loosest_goal(part)));
-    if (!config.tolerance) of.usable = std::max(of.needed, loosest_goal(part));
-}
-
-double StepSolver::Implementation::goal_for(const PreparedProblem& part, std::span<const std::int32_t> columns) const {
-    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, many = 300.0;
+std::optional<double> StepSolver::Implementation::goal_for(const PreparedProblem& part,
+                                                           std::span<const std::int32_t> columns) const {
+    if (!follows_method()) return {};
     const Problem& problem = part.problem();
-    const double reference = part.meter().reference();
-    const auto error_of = [&](std::int32_t i) {
-        return method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
-    };
+    std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
     double square = 0.0;
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {
-        const double error = error_of(i);
+        const double error = method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
+        errors[static_cast<std::size_t>(i)] = error;
         if (error != 0.0) square += entry_of(problem.H, i, i) * error * error;
     }
-    const double by_masses = share * std::sqrt(std::abs(square)) / reference;
-    if (by_masses <= least) return least;  // as at rest
-    std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
-    for (std::int32_t i = 0; i < problem.H.rows; ++i) errors[static_cast<std::size_t>(i)] = error_of(i);
-    const double in_rows = share_in_rows * part.meter().norm_in_rows(errors) / reference;
-    // Few rows are solved exactly for next to nothing.
-    const double share_of_many = std::min(1.0, part.problem().m() / many);
-    return std::clamp(std::min(by_masses, in_rows), least,
-                      std::max(least, loosest_goal(part) * std::pow(share_of_many, 3)));
+    return goal_of({.in_masses = std::sqrt(std::abs(square)),
+                    .in_rows = part.meter().norm_in_rows(errors),
+                    .reference = part.meter().reference(),
+                    .rows = static_cast<double>(problem.m())},
+                   part.needs());
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
@@ -545,6 +523,16 @@ sdk::Team StepSolver::team() const {
     return threads ? threads->team() : sdk::Team();
 }
 
+bool StepSolver::on_all(bool own) const {
+    return shared ? shared->on_all(own) : own;
+}
+double StepSolver::largest_on_all(double own) const {
+    return shared ? shared->largest_on_all(own) : own;
+}
+const SolverConfig& StepSolver::config() const {
+    return implementation_->config;
+}
+
 std::span<const double> StepSolver::left() const {
     return implementation_->left;
 }
@@ -563,6 +551,7 @@ std::vector<std::string> StepSolver::loaded() const {
     std::set<std::string> names;
     for (const KeptKind& kind : implementation_->kinds)
         for (const Instance& instance : kind.instances) names.insert(instance.loaded.begin(), instance.loaded.end());
+    if (shared) names.insert(shared->loaded().begin(), shared->loaded().end());
     return {names.begin(), names.end()};
 }
 

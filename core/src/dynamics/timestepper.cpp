@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "dynamics/step_memory.hpp"
 #include "support/nearest_name.hpp"
 
 namespace delassus {
@@ -66,6 +67,13 @@ void Timestepper::step(State& state, double h, StepSolver& solver, StepReport& r
             "under strong pressure make it; take shorter steps ({})",
             state.t, h, refusal.what()));
     }
+}
+
+StepMemory Timestepper::memory() const {
+    throw Unsupported("this method does not say what its memory belongs to");
+}
+void Timestepper::set_memory(StepMemory /*memory*/) {
+    throw Unsupported("this method does not say what its memory belongs to");
 }
 
 std::vector<double> Timestepper::save() const {

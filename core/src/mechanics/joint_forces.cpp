@@ -149,6 +149,12 @@ void MultibodySystem::set_turns(const State& state, const std::vector<double>& t
     }
 }
 
+std::vector<std::int32_t> MultibodySystem::counted_joints() const {
+    std::vector<std::int32_t> joints;
+    for (const auto& one : implementation_->counted) joints.push_back(one.joint);
+    return joints;
+}
+
 void MultibodySystem::follow(const State& state) {
     if (!implementation_->counted.empty()) set_turns(state, turns(state));
 }

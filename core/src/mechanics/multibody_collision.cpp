@@ -97,6 +97,28 @@ void MultibodySystem::Implementation::make_detector() {
     detector = make_collision_detector(std::move(setup));
 }
 
+void MultibodySystem::be_part_of(const MultibodySystem& whole, PartNumbers numbers) {
+    auto& self = *implementation_;
+    self.must_be_finished();
+    if (numbers.shapes.size() != self.shapes.size() || numbers.joints.size() != self.joints.size() ||
+        numbers.motors.size() != self.bounded_motors.size() ||
+        numbers.actuators.size() != self.bounded_actuators.size())
+        throw InputError("a part of a system needs a number for each shape, joint, bounded motor and bounded actuator");
+    self.size = whole.implementation_->size;
+    self.envelope = whole.implementation_->envelope;
+    self.recovery = whole.recovery_speed();
+    for (auto& body : self.moving)
+        if (std::binary_search(numbers.touched.begin(), numbers.touched.end(), body.body)) body.alone = false;
+    self.numbers = std::move(numbers);
+}
+
+double MultibodySystem::envelope() const {
+    return implementation_->envelope;
+}
+double MultibodySystem::size_of_shapes() const {
+    return implementation_->size;
+}
+
 double MultibodySystem::free_fall() const {
     return vector(implementation_->gravity).norm();
 }
@@ -107,6 +129,7 @@ double MultibodySystem::gap_resolution() const {
 
 double MultibodySystem::recovery_speed() const {
     const auto& self = *implementation_;
+    if (self.recovery) return *self.recovery;
     if (self.size == 0.0) return DynamicalSystem::recovery_speed();
     constexpr double share = 0.01;
     if (const double g = vector(self.gravity).norm(); g > 0.0) return share * std::sqrt(g * self.size);

@@ -78,6 +78,8 @@ struct MultibodySystem::Implementation {
     bool gyroscopic = false;            // a moving body whose moments differ
     double load_factor = 1.0;           // of weight and loads
     double size = 0.0;                  // the median of the shapes that collide
+    PartNumbers numbers;                // of a part of another system; empty otherwise
+    std::optional<double> recovery;     // likewise, m/s
     std::unique_ptr<CollisionDetector> detector;
     struct MeshTouching;
     std::shared_ptr<MeshTouching> mesh_touching;  // null: no two meshes can meet

@@ -42,9 +42,14 @@ std::uint64_t short_feature(std::uint32_t feature) {
     return kind << 10 | (edges ? (of_a & 0x1f) << 5 | (of_b & 0x1f) : (of_a | of_b) & 0x3ff);
 }
 
-std::uint64_t key_of(const ContactPoint& contact) {
-    const auto number = [](std::int32_t value) { return static_cast<std::uint64_t>(value); };
-    return key_of(KeyKind::Contact, number(contact.shape_a), number(contact.shape_b), short_feature(contact.feature));
+/// Of what a part of another system has as its k-th.
+std::uint64_t number_in(const std::vector<std::int32_t>& numbers, std::size_t k) {
+    return numbers.empty() ? k : static_cast<std::uint64_t>(numbers[k]);
+}
+
+std::uint64_t key_of(const ContactPoint& contact, const std::vector<std::int32_t>& shapes) {
+    return key_of(KeyKind::Contact, number_in(shapes, static_cast<std::size_t>(contact.shape_a)),
+                  number_in(shapes, static_cast<std::size_t>(contact.shape_b)), short_feature(contact.feature));
 }
 
 }  // namespace
@@ -185,12 +190,12 @@ void MultibodySystem::Implementation::collect_limits(double h, UnilateralRows& r
         if (!std::isnan(limits.lower) && now.value - limits.lower < reach) {
             put_coordinate_row(joint, turns, at, 1.0, rows);
             rows.end_row(now.value - limits.lower, now.rate);
-            rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Lower, k));
+            rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Lower, number_in(numbers.joints, k)));
         }
         if (!std::isnan(limits.upper) && limits.upper - now.value < reach) {
             put_coordinate_row(joint, turns, at, -1.0, rows);
             rows.end_row(limits.upper - now.value, -now.rate);
-            rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Upper, k));
+            rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Upper, number_in(numbers.joints, k)));
         }
     }
 }
@@ -201,7 +206,8 @@ void MultibodySystem::Implementation::collect_frictions(UnilateralRows& rows) co
         const auto& joint = joints[static_cast<std::size_t>(index)];
         put_coordinate_row(joint, turns, at, 1.0, rows);
         rows.end_row(0.0, prescribed_rate_of(joint, turns, at));
-        rows.end_block(box, key_of(KeyKind::Friction, static_cast<std::uint64_t>(index), turns ? 1 : 0));
+        rows.end_block(
+            box, key_of(KeyKind::Friction, number_in(numbers.joints, static_cast<std::size_t>(index)), turns ? 1 : 0));
     }
 }
 
@@ -212,7 +218,7 @@ void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& r
         const bool turns = joint.parameters.kind == JointKind::Revolute;
         put_coordinate_row(joint, turns, at, 1.0, rows);
         rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - motor.speed.value(t));
-        rows.end_block(motor.box, key_of(KeyKind::Motor, k));
+        rows.end_block(motor.box, key_of(KeyKind::Motor, number_in(numbers.motors, k)));
     }
 }
 
@@ -230,7 +236,7 @@ void MultibodySystem::Implementation::collect_actuators(double t, double h, Unil
         const double gain = one.kd + h * one.kp;
         put_coordinate_row(joint, turns, at, 1.0, rows);
         rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - force / gain);
-        rows.end_block(one.box, key_of(KeyKind::Actuator, k), 0.0, 1.0 / gain);
+        rows.end_block(one.box, key_of(KeyKind::Actuator, number_in(numbers.actuators, k)), 0.0, 1.0 / gain);
     }
 }
 
@@ -299,7 +305,7 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
             b.put(direction, 1.0, rows);
             rows.end_row(gap, prescribed.empty() ? 0.0 : direction.dot(b.velocity - a.velocity));
         };
-        const auto key = key_of(contact);
+        const auto key = key_of(contact, numbers.shapes);
         put_row(normal, contact.gap);
         if (material.friction == 0.0 && leaves_out) {
             rows.end_block(Cone::nonnegative(1), key, material.restitution);

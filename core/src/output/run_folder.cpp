@@ -71,12 +71,7 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& sce
 RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every,
                      std::optional<std::int64_t> pictures)
     : folder_(std::move(folder)), scene_(scene.canonical), simulations_(simulations), every_(every) {
-    Checkpoint checkpoint = read_checkpoint(folder_ / "checkpoint.json");
-    if (checkpoint.scene != scene.canonical || checkpoint.systems.size() != simulations.size())
-        throw InputError(
-            fmt::format("the run in {} was of another scene, or with other settings; give the same "
-                        "scene, --set, --solver, --integrator and --step (--end may differ)",
-                        folder_.string()));
+    Checkpoint checkpoint = checkpoint_of(folder_, scene);
     contact_forces_ = checkpoint.contact_forces;
     for (std::size_t i = 0; i < simulations.size(); ++i) {
         frame_times_.push_back(std::move(checkpoint.systems[i].frame_times));
@@ -84,6 +79,16 @@ RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation
         simulations[i].load(std::move(checkpoint.systems[i].simulation));
     }
     open(scene, true, pictures);
+}
+
+Checkpoint RunFolder::checkpoint_of(const fs::path& folder, const Scene& scene) {
+    Checkpoint checkpoint = read_checkpoint(folder / "checkpoint.json");
+    if (checkpoint.scene != scene.canonical || checkpoint.systems.size() != scene.systems.size())
+        throw InputError(
+            fmt::format("the run in {} was of another scene, or with other settings; give the same "
+                        "scene, --set, --solver, --integrator and --step (--end may differ)",
+                        folder.string()));
+    return checkpoint;
 }
 
 RunFolder::~RunFolder() = default;
@@ -128,7 +133,10 @@ void RunFolder::add_step(std::size_t system) {
     const Simulation& simulation = simulations_[system];
     trajectory_->add_step(system, simulation.record());
     if (simulation.record().step % every_ == 0) add_frame(system);
-    if (std::chrono::steady_clock::now() - last_checkpoint_ > between_checkpoints) checkpoint();
+}
+
+bool RunFolder::checkpoint_is_due() const {
+    return std::chrono::steady_clock::now() - last_checkpoint_ > between_checkpoints;
 }
 
 void RunFolder::add_frame(std::size_t system) {

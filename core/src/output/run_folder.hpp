@@ -35,6 +35,8 @@ public:
     /// another scene.
     RunFolder(std::filesystem::path folder, const Scene& scene, std::vector<Simulation>& simulations,
               std::int64_t every, std::optional<std::int64_t> pictures = {});
+    /// The checkpoint of a run folder. Throws InputError if there is none or if it belongs to another scene.
+    [[nodiscard]] static Checkpoint checkpoint_of(const std::filesystem::path& folder, const Scene& scene);
     ~RunFolder();
     RunFolder(const RunFolder&) = delete;
     RunFolder& operator=(const RunFolder&) = delete;
@@ -42,10 +44,12 @@ public:
     /// Also writes the problem with rows of every `every`-th step, counted from step one.
     void dump_problems(std::int64_t every);
 
-    /// Takes note of the step that the simulation has just taken. Checkpoints every few seconds.
+    /// Takes note of the step that the simulation has just taken.
     void add_step(std::size_t system);
+    /// Whether the last checkpoint is some seconds old.
+    [[nodiscard]] bool checkpoint_is_due() const;
 
-    /// Everything on disk, up to the last step taken.
+    /// Everything on disk, up to the last step taken. Where bodies are shared, after Simulation::gather().
     void checkpoint();
 
     [[nodiscard]] bool contact_forces() const { return contact_forces_; }

@@ -53,7 +53,7 @@ std::string_view status_word(RunStatus status) {
 }
 
 std::string run_report_json(const std::string& scene, const Scene& read, std::vector<Simulation>& simulations,
-                            const RunResult& result) {
+                            const RunResult& result, const SharesOfSystems& shares) {
     Json json = {{"scene", scene},
                  {"title", read.title},
                  {"status", status_word(result.status)},
@@ -98,6 +98,16 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
                     {"t", simulation.state().t},
                     {"warnings", simulation.warnings()}};
         add_totals(simulation.totals(), one);
+        const std::size_t number = json["systems"].size();
+        if (number < shares.size() && !shares[number].empty()) {
+            Json& processes = one["processes"] = Json::array();
+            for (const Simulation::Share& share : shares[number])
+                processes.push_back({{"bodies", share.bodies},
+                                     {"ghosts", share.ghosts},
+                                     {"rows", share.rows},
+                                     {"bytes_sent", share.bytes_sent},
+                                     {"peak_memory", share.peak_memory}});
+        }
         one["bodies"] = std::move(bodies);
         json["systems"].push_back(std::move(one));
     }

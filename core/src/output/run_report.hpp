@@ -14,8 +14,12 @@ namespace delassus {
 /// The status of a run as reports say it: finished, unsolved, interrupted or failed.
 DELASSUS_API std::string_view status_word(RunStatus status);
 
+/// Simulation::shares() of each system; nothing where no process asked.
+using SharesOfSystems = std::vector<std::vector<Simulation::Share>>;
+
 /// The report as JSON text (docs/running.md).
 DELASSUS_API std::string run_report_json(const std::string& scene, const Scene& read,
-                                         std::vector<Simulation>& simulations, const RunResult& result);
+                                         std::vector<Simulation>& simulations, const RunResult& result,
+                                         const SharesOfSystems& shares = {});
 
 }  // namespace delassus

@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "delassus/communicator.hpp"
+#include "delassus/export.hpp"
 
 namespace delassus {
 
 /// For a vector of which each process owns a contiguous range: the entries of others that this process needs, its
 /// ghosts, and who needs which of its own. Local vectors hold the own entries, then the ghosts by ascending number.
-class Halo {
+class DELASSUS_API Halo {
 public:
     Halo() = default;
     /// start: of the ranges, processes + 1. wanted: numbers through all processes, in any order, repeated or not; own

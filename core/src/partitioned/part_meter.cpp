@@ -302,6 +302,22 @@ double PartMeter::natural(const double* x, const double* lambda) {
     return std::sqrt(sums[0]) / reference_;
 }
 
+double PartMeter::norm_in_rows(const double* v) {
+    take_x(v);
+    std::vector<double> sum = {0.0};
+    for (std::size_t c = 0; c < part_.cones.size(); ++c) {
+        const auto& cone = part_.cones[c];
+        for (std::int64_t row = cone.first_row; row < cone.first_row + cone.rows; ++row) {
+            double speed = 0.0;
+            for_entries(part_.problem.D, row,
+                        [&](std::int64_t j, double value) { speed += value * x_[part_.columns.place(j)]; });
+            sum[0] += square(scaling_[c] * speed);
+        }
+    }
+    part_.communicator->sum(sum);
+    return std::sqrt(sum[0]);
+}
+
 RoundingOfBalance PartMeter::rounding_of_balance(const double* x, const double* lambda) {
     const auto& problem = part_.problem;
     take_x(x);

@@ -20,6 +20,9 @@ public:
 
     [[nodiscard]] Errors measure(const double* x, const double* lambda);
     [[nodiscard]] double natural(const double* x, const double* lambda);
+    [[nodiscard]] double reference() const { return reference_; }
+    /// ‖S D v‖ of the own part v.
+    [[nodiscard]] double norm_in_rows(const double* v);
     [[nodiscard]] RoundingOfBalance rounding_of_balance(const double* x, const double* lambda);
 
 private:

@@ -180,6 +180,22 @@ double PreparedPart::natural(const double* x, const double* lambda) const {
     return implementation_->measuring().natural(x, lambda);
 }
 
+double PreparedPart::reference() const {
+    return implementation_->measuring().reference();
+}
+
+double PreparedPart::norm_in_rows(std::span<const double> v) const {
+    return implementation_->measuring().norm_in_rows(v.data());
+}
+
+void PreparedPart::free_velocities(std::vector<double>& x) const {
+    const auto& self = *implementation_;
+    if (!self.inverse && !self.factors)
+        throw Unsupported("several processes find velocities without reactions only where H is definite");
+    x = self.problem.a;
+    self.apply_inverse(x);
+}
+
 PartMeter& PreparedPart::Implementation::measuring() const {
     if (structure == Structure::Unsymmetric)
         throw Unsupported("the errors of a partitioned problem cannot be measured where H is unsymmetric");

@@ -40,7 +40,7 @@ std::string choices(const YAML::Node& node, const std::string& step) {
 
 }  // namespace
 
-void set_value(Source& source, YAML::Node root, const std::string& path, const std::string& text) {
+void set_value(Source& source, const YAML::Node& root, const std::string& path, const std::string& text) {
     const std::string place = fmt::format("--set {}={}", path, text);
     YAML::Node value;
     try {

@@ -10,9 +10,12 @@
 #include <map>
 #include <optional>
 
+#include "delassus/communicator.hpp"
+#include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
 #include "simulation/look_ahead.hpp"
+#include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
 #include "simulation/touching.hpp"
@@ -82,6 +85,42 @@ void require_law(const SceneSystem& system, const Registry& registry, Law law) {
                     coulomb ? "associated" : "coulomb", fmt::join(registry.capable(needs), ", ")));
 }
 
+std::vector<std::string> methods_to_share() {
+    std::vector<std::string> names;
+    for (const TimestepperInfo& one : timesteppers())
+        if (one.shared) names.push_back(one.name);
+    return names;
+}
+
+bool can_be_shared(const std::string& method) {
+    const auto names = methods_to_share();
+    return std::find(names.begin(), names.end(), method) != names.end();
+}
+
+/// Whether the solver that the scene names takes problems in parts; auto does.
+bool takes_parts(const SceneSystem& system, const Registry& registry) {
+    const std::string& name = system.solver.name;
+    if (name.empty() || name == auto_name) return true;
+    const PluginInfo info = is_library_path(name) ? registry.load(name)->info() : solver_info(registry, name);
+    return (info.capabilities & DELASSUS_CAN_PARTITIONED) != 0;
+}
+
+/// Whether several processes share the bodies of a system. Smooth systems whose method they cannot share are computed
+/// whole by each, as linear solvers for several processes ask.
+bool shares_bodies(const SceneSystem& system, const Registry& registry) {
+    if (process_count() == 1 || !SharedRun::obstacle(system).empty() || !takes_parts(system, registry)) return false;
+    return can_be_shared(system.integrator) || system.system->has_unilateral();
+}
+
+/// Where bodies are shared and the scene does not name its method, one that can be shared.
+void choose_method_to_share(SceneSystem& system, const Registry& registry) {
+    if (!shares_bodies(system, registry) || can_be_shared(system.integrator) || system.method_reason.empty()) return;
+    system.method_reason = fmt::format("several processes cannot share {}", system.integrator);
+    system.integrator = methods_to_share().front();
+    system.integrator_options.clear();
+    if (system.coordinates_chosen) system.coordinates = Coordinates::Maximal;
+}
+
 std::string describe(const Assembly& change) {
     return fmt::format(
         "bodies were moved by up to {:.3g} m and {:.3g} rad, and their velocities changed by up to {:.3g} "
@@ -94,6 +133,7 @@ std::string describe(const Assembly& change) {
 Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
     if (!system.leave_out) solver_->leave_nothing_out();
+    choose_method_to_share(system, registry);
     const bool in_joints = system.coordinates == Coordinates::Joint;
     const auto with_name = [&](const auto& make) {
         try {
@@ -111,6 +151,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         check_solver(registry, solver);
         require_law(system, registry, solver_->law());
         assembly_ = system.system->assemble();
+        share(registry);
         if (!in_joints) make_method();
         if (system.sleeping) {
             if (in_joints)
@@ -145,11 +186,33 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
 Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
 
+void Simulation::share(const Registry& registry) {
+    if (!shares_bodies(*system_, registry)) return;
+    const auto refuse = [](const std::string& what, const std::string& advice) {
+        throw Unsupported(
+            fmt::format("several processes cannot share bodies with {}; {}, or start one process", what, advice));
+    };
+    if (!can_be_shared(system_->integrator))
+        refuse(fmt::format("the integrator {}", system_->integrator),
+               fmt::format("name {}", fmt::join(methods_to_share(), " or ")));
+    if (system_->coordinates == Coordinates::Joint) refuse("joint coordinates", "remove \"coordinates\"");
+    if (system_->sleeping) refuse("bodies that sleep", "remove \"sleeping\"");
+    if (system_->control) refuse("steps chosen by a tolerance", "give a fixed \"step\"");
+    if (!system_->leave_out) refuse("nothing left out", "leave out that option");
+    shared_ = std::make_unique<SharedRun>(*system_, communicator_of_run(), registry, *solver_);
+}
+
 void Simulation::make_method() {
     control_.reset();
     ahead_.reset();
     revision_ = system_->system->revision();
     timestepper_ = make_timestepper(system_->integrator, dynamics(), system_->integrator_options);
+    if (shared_) {
+        shared_->restart();
+        gathered_ = timestepper_->save();
+        gathered_at_ = now_.step;
+        return;
+    }
     if (system_->control) {
         control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
     } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
@@ -228,7 +291,7 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
         advance_within_error(state, step.end, report.step);
     } else {
         try {
-            timestepper_->step(state, report.h, *solver_, report.step);
+            take_step(state, report.h, report.step);
         } catch (const StepTooLong& failure) {
             advance_in_parts(state, report, memory, failure);
         }
@@ -288,7 +351,7 @@ void Simulation::advance_in_parts(State& state, AdaptiveStepReport& report, cons
         report.step.clear();
         try {
             for (std::int64_t i = 0; i < parts; ++i) {
-                timestepper_->step(state, h, *solver_, part);
+                take_step(state, h, part);
                 if (part.linearization_rounding > most_rounding) throw StepTooLong(failure.what());
                 part.follow(report.step);
                 std::swap(report.step, part);
@@ -340,6 +403,11 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
             totals.start_energy, record_.energy, scale, taken.h, system_->integrator, limits.energy_growth));
 }
 
+void Simulation::take_step(State& state, double h, StepReport& report) {
+    if (!shared_) return timestepper_->step(state, h, *solver_, report);
+    shared_->step(state, h, *timestepper_, *solver_, report);
+}
+
 const StepRecord& Simulation::step() {
     const auto begin = Clock::now();
     const auto where = [&] {
@@ -354,6 +422,7 @@ const StepRecord& Simulation::step() {
         } else if (!ahead_) {
             renew_rows(next, now_.step);
         }
+        if (shared_) shared_->prepare(next, fixed_step(next.t, system_->end, system_->step).h, timestepper_);
     } catch (const StepFailure& error) {
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
     }
@@ -415,6 +484,7 @@ const StepRecord& Simulation::step() {
     record_.contacts = report.unilateral_blocks;
     record_.penetration = 0.0;
     for (const auto& contact : report.contacts) record_.penetration = std::max(record_.penetration, -contact.gap);
+    if (shared_) record_.penetration = shared_->penetration();
     const SolverEffort& effort = solver_->effort();
     record_.newton_iterations = report.newton_iterations;
     record_.solver_iterations = effort.iterations;
@@ -529,6 +599,9 @@ std::vector<std::string> Simulation::warnings() const {
                             system_->name, fall, 100.0 * share, system_->integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
     }
+    if (shared_ && !system_->method_reason.empty() && system_->method_reason.find("several processes") == 0)
+        sentences.push_back(fmt::format("system \"{}\": {}; {} took its place, which is less exact", system_->name,
+                                        system_->method_reason, system_->integrator));
     if (equilibrium_ && equilibrium_->smallest_eigenvalue < 0.0)
         sentences.push_back(fmt::format(
             "system \"{}\": the equilibrium in which the run begins is unstable (smallest eigenvalue {:.3g} "
@@ -554,6 +627,27 @@ std::string Simulation::start() const {
     return clause;
 }
 
+void Simulation::gather() {
+    if (!shared_ || gathered_at_ == now_.step) return;
+    gathered_ = flat(shared_->memory(*timestepper_));
+    gathered_at_ = now_.step;
+}
+
+void Simulation::gather_contacts() {
+    if (shared_) shared_->gather_contacts();
+}
+
+std::vector<Simulation::Share> Simulation::shares() const {
+    return shared_ ? shared_->shares() : std::vector<Share>{};
+}
+
+std::vector<double> Simulation::memory_of_method() const {
+    if (!shared_) return timestepper_->save();
+    if (gathered_at_ != now_.step)
+        throw InputError("the processes did not bring together what a checkpoint needs: call gather() before save()");
+    return gathered_;
+}
+
 SimulationState Simulation::save() const {
     SimulationState result = now_;
     const MultibodySystem& mechanics = *system_->system;
@@ -566,7 +660,7 @@ SimulationState Simulation::save() const {
         else
             result.rows_left_out.push_back(row);
     result.turns = mechanics.turns(state());
-    result.memory = timestepper_->save();
+    result.memory = memory_of_method();
     if (control_) result.control = control_->save();
     if (ahead_) result.ahead = ahead_->save();
     if (sleeping_) result.sleeping = sleeping_->save();
@@ -593,6 +687,11 @@ void Simulation::load(SimulationState state) {
     system_->system->set_turns(bodies_at(state.state, bodies_), state.turns);
     make_method();
     timestepper_->load(state.memory);
+    if (shared_) {
+        shared_->set_memory(timestepper_->memory());
+        gathered_ = state.memory;
+        gathered_at_ = state.step;
+    }
     if (control_) control_->load(state.control);
     if (ahead_ && state.ahead.empty()) ahead_->begin(state.state);
     if (ahead_ && !state.ahead.empty()) {

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How exactly the problem of a step, or a part of it, is solved (docs/tolerance.md).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "delassus/needs.hpp"
+#include "delassus/plugin.h"
+#include "delassus/solver.hpp"
+#include "delassus/solver_config.hpp"
+
+namespace delassus {
+
+/// Tolerances below this are beyond what rounding allows in some problems: missing them is no miss by orders.
+inline constexpr double rounding_limit_of_steps = 1e-8;
+/// An error within this multiple of the upper bound is used where nothing better is found.
+inline constexpr double usable_multiple = 3.0;
+
+/// The upper bound of a part's tolerance: what is left of a joint's velocity becomes drift.
+inline double loosest_goal(std::uint64_t needs) {
+    return (needs & DELASSUS_CAN_FREE) != 0 ? 1e-4 : 1e-2;
+}
+
+/// What a goal follows from.
+struct ErrorOfMethod {
+    double in_masses;  ///< √(Σ H_ii e_i²), e being the method's own error in the velocities
+    double in_rows;    ///< ‖S D e‖
+    double reference;  ///< ErrorMeter::reference()
+    double rows;       ///< of the part
+};
+
+/// Rows far from the method's own error need not be solved below it.
+inline double goal_of(const ErrorOfMethod& error, std::uint64_t needs) {
+    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, many = 300.0;
+    const double by_masses = share * error.in_masses / error.reference;
+    if (by_masses <= least) return least;  // as at rest
+    const double in_rows = share_in_rows * error.in_rows / error.reference;
+    // Few rows are solved exactly for next to nothing.
+    const double share_of_many = std::min(1.0, error.rows / many);
+    return std::clamp(std::min(by_masses, in_rows), least,
+                      std::max(least, loosest_goal(needs) * std::pow(share_of_many, 3)));
+}
+
+/// Sets the tolerance of a part. A tolerance that the configuration names is kept at least. goal: of goal_of(), where
+/// tolerances follow from the error of the method.
+inline void set_step_tolerance(const SolverConfig& config, std::uint64_t needs, std::optional<double> goal,
+                               SolveSettings& of) {
+    constexpr double slack = 30.0, far_below = 1e-2;
+    if (!goal) {
+        // Contacts may have no answer to a default tolerance that anybody finds.
+        if (config.tolerance || config.sweeps || (needs & DELASSUS_CAN_FRICTION) == 0 ||
+            (needs & DELASSUS_CAN_FREE) != 0)
+            return;
+        of.needed = of.tolerance;
+        of.usable = far_below * loosest_goal(needs);
+        return;
+    }
+    if (config.tolerance && *goal >= *config.tolerance) return;
+    of.tolerance = *goal;
+    of.needed = config.tolerance.value_or(std::min(slack * *goal, usable_multiple * loosest_goal(needs)));
+    if (!config.tolerance) of.usable = std::max(of.needed, loosest_goal(needs));
+}
+
+}  // namespace delassus
