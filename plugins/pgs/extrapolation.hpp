@@ -11,11 +11,13 @@
 // which every sweep lowers (README.md). So an extrapolated point has to prove itself: a few sweeps later φ must be
 // below that of the point before the extrapolation, or the sweeps go on from there. Under the Coulomb law s is De
 // Saxcé's term μ‖u_t‖ in the normal rows, held as it was at that point: the solution minimises φ with its own s.
+// Where others hold parts of the problem, the sums are those of all parts: two reductions each time.
 #pragma once
 
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "delassus/sdk/anderson.hpp"
@@ -52,19 +54,24 @@ public:
     /// looks().
     void after(Model& model, SweepState& state) {
         if (memory_ == 0 || ++sweeps_ % period != 0) return;
-        const double length = weigh_step(model, state);
-        const double without_sliding = model.objective(state);
-        if (tried_ && !has_proved_itself(without_sliding + model.work_against(sliding_, state), length)) {
+        weigh_step(model, state);
+        double sums[4] = {squared_length(), model.objective(state), 0.0,
+                          model.work_against(model.sliding_terms(), state)};
+        if (tried_) sums[2] = model.work_against(sliding_, state);
+        model.others().sum(sums);
+        const double length = std::sqrt(sums[0]);
+        if (tried_ && !has_proved_itself(sums[1] + sums[2], length)) {
             move(model, plain_, state);
             anderson_.clear();
             tried_ = false;
             return;
         }
         sliding_ = model.sliding_terms();
-        objective_ = without_sliding + model.work_against(sliding_, state);
+        objective_ = sums[1] + sums[3];
         length_ = length;
         plain_.swap(end_);
-        anderson_.push(step_, plain_, model.team());
+        anderson_.push(step_, plain_, model.team(),
+                       [&model](std::span<double> products) { model.others().sum(products); });
         pending_ = tried_ = anderson_.extrapolate(next_, model.team());
     }
 
@@ -77,8 +84,8 @@ private:
         return objective < objective_ - rounding || (objective <= objective_ + rounding && length <= length_);
     }
 
-    /// The latest sweep's end and step, weighed by the metric; returns the length of the step.
-    double weigh_step(const Model& model, SweepState& state) {
+    /// The latest sweep's end and step, weighed by the metric.
+    void weigh_step(const Model& model, SweepState& state) {
         const auto lambda = model.swept(state);
         end_.resize(lambda.size());
         step_.resize(lambda.size());
@@ -90,8 +97,9 @@ private:
             step = end - begin_.segment(first, size).cwiseProduct(metric);
             squares_[static_cast<std::size_t>(part)] = step.squaredNorm();
         });
-        return std::sqrt(std::accumulate(squares_.begin(), squares_.end(), 0.0));
     }
+    /// Of the latest step.
+    [[nodiscard]] double squared_length() const { return std::accumulate(squares_.begin(), squares_.end(), 0.0); }
 
     /// λ ← one that is weighed by the metric.
     void move(const Model& model, const sdk::Vector& weighed, SweepState& state) const {

@@ -13,6 +13,7 @@
 #include "delassus/sdk/delassus_operator.hpp"
 #include "delassus/sdk/dense_algebra.hpp"
 #include "delassus/sdk/team.hpp"
+#include "other_parts.hpp"
 #include "sweep.hpp"
 #include "sweep_order.hpp"
 
@@ -64,6 +65,11 @@ public:
     /// call.
     void use(const sdk::Team& team) { team_ = team; }
     [[nodiscard]] const sdk::Team& team() const { return team_; }
+    /// The model is that of one part; the others must live as long as it. Only sweeps on velocities take parts. Columns
+    /// that several parts have are whole in each, with a share of H and a: the problem's, divided by the number of
+    /// parts.
+    void join(const OtherParts& others) { others_ = &others; }
+    [[nodiscard]] const OtherParts& others() const { return *others_; }
 
     /// The operator is factorised; exact: one-contact problems are solved. Throws std::length_error where N would be
     /// too large to form.
@@ -151,6 +157,7 @@ public:
         run_pieces(Direction::Forward, [&](std::size_t k) {
             rows_.transpose_multiply_add(state.lambda.data(), state.z.data(), order_.piece[k], order_.piece[k + 1]);
         });
+        reconcile(state);
     }
     /// λ of a state; m, as the problem counts rows.
     void reactions(const SweepState& state, sdk::Vector& lambda) const {
@@ -165,10 +172,11 @@ public:
     void sweep_in_place(const SweepRule& rule, SweepState& state) const {
         run_pieces(rule.direction,
                    [&](std::size_t k) { visit_range(rule, state, state.z, order_.piece[k], order_.piece[k + 1]); });
+        reconcile(state);
     }
 
     /// As sweep_in_place, and what look() would return if each block's residual were that of the moment of its visit:
-    /// about the error before the sweep, at no pass over the rows of its own.
+    /// about the error before the sweep, at no pass over the rows of its own. This and what follows is of the own part.
     [[nodiscard]] double recorded_sweep(const SweepRule& rule, SweepState& state) {
         sums_.assign(order_.piece.size() - 1, 0.0);
         run_pieces(rule.direction, [&](std::size_t k) {
@@ -176,6 +184,7 @@ public:
             visit_range(rule, state, state.z, order_.piece[k], order_.piece[k + 1], &record);
             sums_[k] = record.sum;
         });
+        reconcile(state);
         return std::accumulate(sums_.begin(), sums_.end(), 0.0);
     }
 
@@ -184,6 +193,7 @@ public:
         next = state.z;
         visit_range(rule, state, next, 0, blocks_.size());
         state.z.swap(next);
+        reconcile(state);
     }
 
     /// The sum of the squared natural residuals of all blocks (sdk::NaturalResidual, not yet divided by the reference).
@@ -214,7 +224,8 @@ public:
         for (std::size_t k = 0; k < terms.size(); ++k) sum += terms[k] * lambda[rows_.groups()[k].first];
         return sum;
     }
-    /// ½λᵀNλ + rᵀλ, up to a constant; on velocities that is ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖².
+    /// ½λᵀNλ + rᵀλ, up to a constant; on velocities that is ½‖v̂‖² + bᵀλ − ½‖L⁻¹a‖². With the shares of H that join()
+    /// asks for, the parts' objectives add up to that of all: k copies of an entry are each 1/√k of it.
     [[nodiscard]] double objective(SweepState& state) {
         const auto lambda = swept(state);
         if (on_velocities_) return 0.5 * state.z.squaredNorm() + lambda.dot(offset_);
@@ -226,6 +237,13 @@ public:
         sdk::Vector result;
         to_sweep(N.diagonal(), result);
         return result.unaryExpr([](double diagonal) { return diagonal > 0.0 ? std::sqrt(diagonal) : 1.0; });
+    }
+
+    /// Where v̂'s entry of a column stands in a state; on velocities.
+    [[nodiscard]] std::size_t place_of_column(std::size_t column) const {
+        if (order_.range.empty()) return column;
+        const auto width = static_cast<std::size_t>(rows_.width());
+        return static_cast<std::size_t>(order_.range[column / width]) * width + column % width;
     }
 
     [[nodiscard]] bool on_velocities() const { return on_velocities_; }
@@ -244,6 +262,10 @@ private:
             visit<false>(rows_, first, last, local_, rule, offset_.data(), state.z.data(), next.data(), nullptr,
                          record);
         }
+    }
+
+    void reconcile(SweepState& state) const {
+        if (others_->exist()) others_->reconcile({state.z.data(), static_cast<std::size_t>(state.z.size())});
     }
 
     // visit(k) for all pieces of the order, those of a phase by the members of the team.
@@ -422,6 +444,8 @@ private:
         local_.inverse.insert(local_.inverse.end(), result.data(), result.data() + result.size());
     }
 
+    static inline const OtherParts none_;
+    const OtherParts* others_ = &none_;
     sdk::CompressedRows with_compliance_;  // D̂ where there is E
     bool on_velocities_ = false;
     Eigen::Index states_ = 0;  // entries of z without padding

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "delassus/error.hpp"
@@ -19,7 +20,7 @@ struct Case {
     const char* plugin;
     double tolerance;   // of the natural error, small enough for velocities to 1e-9
     std::int64_t most;  // iterations; what takes more is compared after few
-    std::int64_t few;
+    std::int64_t few;   // 0: not compared, since iterates depend on the processes; Coulomb's velocities neither
     std::vector<Law> laws;
 };
 
@@ -82,14 +83,21 @@ protected:
         if (refused || !solvers.at(run.get()).refusal(part, settings).empty()) return false;
         std::int64_t most = given.most;
         Answer one = solve(alone, whole, given.tolerance, most);
-        if (one.report.status != Status::Solved) one = solve(alone, whole, given.tolerance, most = given.few);
+        if (given.few == 0) {
+            if (one.report.status != Status::Solved) return false;
+            most *= 3;
+        } else if (one.report.status != Status::Solved) {
+            one = solve(alone, whole, given.tolerance, most = given.few);
+        }
         const Answer all = solve(run, part, given.tolerance, most);
         const std::int64_t first = part.problem().column_start[static_cast<std::size_t>(run->rank())];
         std::vector<double> sums(3, 0.0);
         add_squares(part.problem(), first, all.x.data(), one.x.data() + first, sums);
         run->sum(sums);
         EXPECT_EQ(name_of(all.report.status), name_of(one.report.status)) << all.report.message;
-        EXPECT_LE(std::sqrt(sums[0]), 1e-9 * std::sqrt(std::max(sums[1], sums[2])))
+        const bool unique = given.few > 0 || problem.law == Law::Associated;
+        const double allowed = unique ? 1e-9 : std::numeric_limits<double>::infinity();
+        EXPECT_LE(std::sqrt(sums[0]), allowed * std::sqrt(std::max(sums[1], sums[2])))
             << "after " << all.report.iterations << " and " << one.report.iterations << " iterations, natural "
             << all.report.error.natural << " and " << one.report.error.natural;
         compared[std::string(name_of(one.report.status))] += 1;
@@ -170,7 +178,8 @@ TEST_P(PartitionedPlugins, TakeOneBodyThatTouchesAll) {
 INSTANTIATE_TEST_SUITE_P(All, PartitionedPlugins,
                          testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}},
                                          Case{"ipm_petsc", 1e-10, 100, 3, {Law::Associated}},
-                                         Case{"admm_petsc", 1e-11, 300, 5, {Law::Associated, Law::Coulomb}}),
+                                         Case{"admm_petsc", 1e-11, 300, 5, {Law::Associated, Law::Coulomb}},
+                                         Case{"pgs_petsc", 1e-12, 2000, 0, {Law::Associated, Law::Coulomb}}),
                          [](const auto& each) { return std::string(each.param.plugin); });
 
 }  // namespace

@@ -101,6 +101,14 @@ void Bodies::find_blocks(const sdk::LocalProblemView& problem) {
 
 void Bodies::factorize(const sdk::LocalProblemView& problem) {
     if (!has_blocks_) return;
+    const sdk::CompressedRows H = fetched(problem);
+    const auto n = static_cast<std::int32_t>(columns_.size());
+    const auto whole = problem_of(problem, n, {n, n, H.start.back(), H.start.data(), H.column.data(), H.value.data()},
+                                  block_start_, block_index_);
+    processes_.together([&] { inverse_.factorize(sdk::ProblemView(whole)); });
+}
+
+sdk::CompressedRows Bodies::fetched(const sdk::LocalProblemView& problem) const {
     const auto width = diagonal_ ? std::size_t{1} : at(width_);
     std::vector<double> values(width * at(columns_.size()), 0.0);  // rows of H over their blocks
     std::vector<std::int32_t> block_of(at(columns_.size()));
@@ -117,23 +125,18 @@ void Bodies::factorize(const sdk::LocalProblemView& problem) {
         }
     }
     columns_.bring(values.data(), static_cast<int>(width));
-    std::vector<std::int32_t> start(1, 0), column;
-    std::vector<double> value;
-    start.reserve(block_of.size() + 1);
-    column.reserve(values.size());
-    value.reserve(values.size());
+    sdk::CompressedRows H;
+    H.clear();
+    H.start.reserve(block_of.size() + 1);
+    H.column.reserve(values.size());
+    H.value.reserve(values.size());
     for (std::size_t row = 0; row < block_of.size(); ++row) {
         const auto block = at(block_of[row]);
-        for (auto i = block_start_[block]; i < block_start_[block + 1]; ++i) {
-            column.push_back(block_index_[at(i)]);
-            value.push_back(values[width * row + at(i - block_start_[block])]);
-        }
-        start.push_back(static_cast<std::int32_t>(column.size()));
+        for (auto i = block_start_[block]; i < block_start_[block + 1]; ++i)
+            H.put(block_index_[at(i)], values[width * row + at(i - block_start_[block])]);
+        H.end_row();
     }
-    const auto n = static_cast<std::int32_t>(columns_.size());
-    const auto whole = problem_of(problem, n, {n, n, start.back(), start.data(), column.data(), value.data()},
-                                  block_start_, block_index_);
-    processes_.together([&] { inverse_.factorize(sdk::ProblemView(whole)); });
+    return H;
 }
 
 void Bodies::multiply_add(const sdk::LocalProblemView& problem, const sdk::Vector& v, sdk::Vector& result) const {

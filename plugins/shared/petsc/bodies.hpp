@@ -18,11 +18,17 @@ public:
     void analyze(const Processes& processes, const sdk::LocalProblemView& problem);
     /// Collective. Throws sdk::NumericalFailure on all processes if a block is not positive definite on any.
     void factorize(const sdk::LocalProblemView& problem);
+    /// H of all local columns, where it is diagonal or of blocks; zeros inside of blocks are stored. Collective.
+    [[nodiscard]] sdk::CompressedRows fetched(const sdk::LocalProblemView& problem) const;
 
     [[nodiscard]] const Processes& processes() const { return processes_; }
     [[nodiscard]] const Exchange& columns() const { return columns_; }
     /// Of all local columns, where H is diagonal or of blocks; else its kind is None.
     [[nodiscard]] const sdk::HInverse& inverse() const { return inverse_; }
+
+    /// The blocks of H as in delassus_problem, with local columns; no blocks where H couples bodies.
+    [[nodiscard]] const std::vector<std::int32_t>& block_start() const { return block_start_; }
+    [[nodiscard]] const std::vector<std::int32_t>& block_index() const { return block_index_; }
 
     /// result += D v; own rows, v local columns.
     void multiply_add(const sdk::LocalProblemView& problem, const sdk::Vector& v, sdk::Vector& result) const;

@@ -2,6 +2,9 @@
 // Anderson acceleration of a fixed-point iteration y ← F(y).
 #pragma once
 
+#include <functional>
+#include <span>
+
 #include "delassus/sdk/problem_view.hpp"
 #include "delassus/sdk/team.hpp"
 
@@ -18,8 +21,12 @@ public:
     /// Forgets all differences; the next point pushed starts anew.
     void clear() { count_ = 0, position_ = 0, has_point_ = false; }
 
-    /// Takes a point's f and F (y itself is F − f).
-    void push(const Vector& f, const Vector& F, const Team& team = {});
+    /// values ← their sums over all processes that hold entries of the same vectors.
+    using Sum = std::function<void(std::span<double> values)>;
+
+    /// Takes a point's f and F (y itself is F − f). sum: absent, or called once where the point is not the first one;
+    /// all processes then do the same.
+    void push(const Vector& f, const Vector& F, const Team& team = {}, const Sum& sum = {});
 
     /// next ← the accelerated point from the latest push; false if there is no difference yet, or none that helps.
     [[nodiscard]] bool extrapolate(Vector& next, const Team& team = {});
@@ -32,6 +39,7 @@ private:
     Vector f_, F_;             // of the latest point
     Vector slope_;             // df_ᵀ f_
     Eigen::MatrixXd sums_;     // by parts of the rows: df_ᵀ times the latest difference and f_
+    Vector totals_;            // of the columns of sums_
 };
 
 }  // namespace delassus::sdk

@@ -20,11 +20,12 @@ DELASSUS_SDK_FUNCTION void Anderson::reset(Eigen::Index size, int memory) {
     f_.resize(size);
     F_.resize(size);
     sums_.resize(2 * memory, Team::parts_of(size));
+    totals_.resize(2 * memory);
     clear();
 }
 
 // One pass over the memory. Differences are not scaled: their lengths stand on the diagonal of the Gram matrix.
-DELASSUS_SDK_FUNCTION void Anderson::push(const Vector& f, const Vector& F, const Team& team) {
+DELASSUS_SDK_FUNCTION void Anderson::push(const Vector& f, const Vector& F, const Team& team, const Sum& sum) {
     const bool differs = has_point_;
     const int kept = differs ? std::min(count_ + 1, memory_) : 0, place = position_;
     team.for_parts(f.size(), [&](Eigen::Index part, Eigen::Index first, Eigen::Index size) {
@@ -45,14 +46,17 @@ DELASSUS_SDK_FUNCTION void Anderson::push(const Vector& f, const Vector& F, cons
     });
     has_point_ = true;
     if (!differs) return;
-    for (int k = 0; k < kept; ++k) {
-        double product = 0.0, slope = 0.0;
+    auto totals = totals_.head(2 * kept);
+    totals.setZero();
+    for (int k = 0; k < kept; ++k)
         for (Eigen::Index part = 0; part < sums_.cols(); ++part) {
-            product += sums_(k, part);
-            slope += sums_(memory_ + k, part);
+            totals[k] += sums_(k, part);
+            totals[kept + k] += sums_(memory_ + k, part);
         }
-        gram_(place, k) = gram_(k, place) = product;
-        slope_[k] = slope;
+    if (sum) sum({totals.data(), static_cast<std::size_t>(totals.size())});
+    for (int k = 0; k < kept; ++k) {
+        gram_(place, k) = gram_(k, place) = totals[k];
+        slope_[k] = totals[kept + k];
     }
     if (!(gram_(place, place) > 0.0)) {  // the same point again
         gram_.row(place).head(kept).setZero();
