@@ -34,7 +34,7 @@ std::string crowd() {
         text += fmt::format(
             "  - {{name: s{}, density: 1000, position: [{:.6f}, {:.6f}, {:.6f}], shapes: [{{sphere: {{radius: "
             "{:.6f}}}}}]}}\n",
-            k, place(random), 0.5 * place(random), 1.2 + place(random), radius(random));
+            k, 0.7 * place(random), 0.4 * place(random), 1.2 + 0.7 * place(random), radius(random));
     text += "  - {name: plate, density: 500, position: [0, 0, 1.9], shapes: [{box: {size: [2, 1, 0.05]}}]}\n";
     text += "joints:\n";
     for (int k = 0; k < 60; k += 3)

@@ -2,6 +2,8 @@
 // Kinematic bodies and follower loads against closed forms.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 #include <string>

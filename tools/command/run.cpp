@@ -36,6 +36,8 @@ struct RunArguments {
     std::int64_t every = 1, dump = 0;
     std::optional<std::int64_t> pictures;
     bool contact_forces = false, json = false;
+
+    [[nodiscard]] bool has_folder() const { return !output.empty() || !resume.empty(); }
 };
 
 double seconds_since(Clock::time_point begin) {
@@ -102,9 +104,12 @@ void checkpoint(std::vector<Simulation>& simulations, RunFolder* folder) {
 }
 
 /// Steps until the end, an interrupt or a failure.
-RunResult advance(const Communicator& run, std::vector<Simulation>& simulations, RunFolder* folder) {
+RunResult advance(const Communicator& run, std::vector<Simulation>& simulations, RunFolder* folder,
+                  const RunArguments& arguments) {
     Progress progress(simulations, run.rank() == 0);
     const auto stepped = [&](std::size_t system) {
+        Simulation& simulation = simulations[system];
+        if (arguments.has_folder() && simulation.record().step % arguments.every == 0) simulation.gather_contacts();
         if (folder != nullptr) folder->add_step(system);
         if (on_any(run, folder != nullptr && folder->checkpoint_is_due())) checkpoint(simulations, folder);
         progress.show();
@@ -191,14 +196,12 @@ void check(const RunArguments& arguments) {
 std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArguments& arguments, const Scene& scene,
                                        std::vector<Simulation>& simulations) {
     std::unique_ptr<RunFolder> folder;
-    bool contact_forces = arguments.contact_forces;
     together(run, [&] {
         if (!arguments.resume.empty()) {
             Checkpoint checkpoint = RunFolder::checkpoint_of(arguments.resume, scene);
             if (arguments.contact_forces && !checkpoint.contact_forces)
                 throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
                                              arguments.resume.string()));
-            contact_forces = checkpoint.contact_forces;
             if (run.rank() > 0)
                 for (std::size_t i = 0; i < simulations.size(); ++i)
                     simulations[i].load(std::move(checkpoint.systems[i].simulation));
@@ -215,8 +218,6 @@ std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArgumen
         }
         if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
     });
-    if (contact_forces)
-        for (auto& simulation : simulations) simulation.gather_contacts();
     return folder;
 }
 
@@ -238,7 +239,7 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
     for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
     install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
-    const RunResult result = advance(run, simulations, folder.get());
+    const RunResult result = advance(run, simulations, folder.get(), arguments);
     if (const auto bytes = guard.release(); bytes > 0 && first)
         fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
 
@@ -246,7 +247,7 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
     for (const auto& simulation : simulations) shares.push_back(simulation.shares());
     const std::string report =
         run_report_json(arguments.scene.file.filename().string(), scene, simulations, result, shares);
-    if (on_any(run, folder != nullptr)) checkpoint(simulations, folder.get());
+    if (arguments.has_folder()) checkpoint(simulations, folder.get());
     if (folder) folder->write_report(report);
     if (!first) return exit_code_of(result.status);
     if (arguments.json) {

@@ -172,7 +172,8 @@ public:
     [[nodiscard]] DELASSUS_API std::vector<Share> shares() const;
     /// Brings together what save() needs; before each save() where bodies are shared. Collective.
     DELASSUS_API void gather();
-    /// Has contacts() know all contacts on process 0, from the next step on; elsewhere each has its own.
+    /// Has contacts() know all contacts of the last step on process 0; before, and elsewhere, each process knows its
+    /// own. Call it once after a step. Collective.
     DELASSUS_API void gather_contacts();
 
     /// Throws InputError where bodies are shared and gather() was not called since the last step.

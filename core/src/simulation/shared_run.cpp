@@ -41,8 +41,8 @@ std::vector<Bytes> to_all(const Communicator& communicator, const Bytes& bytes) 
 }  // namespace
 
 std::string SharedRun::obstacle(const SceneSystem& system) {
-    if (system.system->node_count() > 0 || !system.elastic_blocks.empty()) return "it has elastic bodies or nodes";
-    if (!system.beams.empty()) return "it has beams";
+    if (system.system->node_count() > 0 || !system.elastic_blocks.empty()) return "elastic bodies or nodes";
+    if (!system.beams.empty()) return "beams";
     return {};
 }
 
@@ -276,7 +276,6 @@ void SharedRun::complete(StepReport& report, double h) {
                         static_cast<double>(loads.size());
     const auto most = static_cast<double>(*std::max_element(loads.begin(), loads.end()));
     unbalanced_ = steps_since_ + 1 >= fewest_steps && most > imbalance * mean;
-    if (gathers_contacts_) collect_contacts(report);
 }
 
 void SharedRun::collect_contacts(StepReport& report) const {

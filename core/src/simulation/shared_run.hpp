@@ -24,7 +24,7 @@ namespace delassus {
 /// own bodies alone. Members marked collective are called by all processes in the same order, with the same states.
 class SharedRun {
 public:
-    /// Why the bodies of a system cannot be shared: a clause; empty if they can.
+    /// What of a system cannot be shared; empty if all can.
     static std::string obstacle(const SceneSystem& system);
 
     /// system and registry outlive this; solver takes the scene's configuration from there and is told of this.
@@ -38,7 +38,7 @@ public:
     /// memory of before. Collective.
     void prepare(const State& whole, double h, std::unique_ptr<Timestepper>& timestepper);
     /// A step, after prepare(). report: as of the whole system, but for contacts and reactions, which are those of this
-    /// process, or of all on process 0 after gather_contacts(). Collective.
+    /// process. Collective.
     void step(State& whole, double h, Timestepper& timestepper, StepSolver& solver, StepReport& report);
 
     /// The memory of the method for the whole system, the same on all processes. Collective.
@@ -48,7 +48,8 @@ public:
     /// Forgets what the method remembers; the next prepare() begins anew.
     void restart();
 
-    void gather_contacts() { gathers_contacts_ = true; }
+    /// Brings the contacts and reactions of all processes to process 0. Collective.
+    void collect_contacts(StepReport& report) const;
     /// Of all processes, in the last step, m; ≥ 0.
     [[nodiscard]] double penetration() const { return penetration_; }
     [[nodiscard]] int processes() const { return communicator_->size(); }
@@ -68,7 +69,6 @@ private:
     /// Puts the own bodies of all processes into the whole state.
     void exchange_states(const State& local, State& whole) const;
     void complete(StepReport& report, double h);
-    void collect_contacts(StepReport& report) const;
 
     SceneSystem& system_;
     std::shared_ptr<const Communicator> communicator_;
@@ -81,7 +81,7 @@ private:
     PartOfSystem part_;
     std::vector<std::int32_t> local_;  ///< moving bodies of the part, by number among all moving ones
     StepMemory begin_;                 ///< for the next share_out(), where there is no method yet
-    bool has_begin_ = false, unbalanced_ = false, gathers_contacts_ = false;
+    bool has_begin_ = false, unbalanced_ = false;
     std::int64_t steps_since_ = 0, divisions_ = 0;
     double penetration_ = 0.0;
 };

@@ -105,6 +105,14 @@ bool takes_parts(const SceneSystem& system, const Registry& registry) {
     return (info.capabilities & DELASSUS_CAN_PARTITIONED) != 0;
 }
 
+std::vector<std::string> solvers_in_parts(const Registry& registry) {
+    std::vector<std::string> names = {std::string(auto_name)};
+    for (const PluginInfo& plugin : registry.plugins())
+        if ((plugin.capabilities & DELASSUS_CAN_PARTITIONED) != 0 && (plugin.flags & DELASSUS_FLAG_PEER) == 0)
+            names.push_back(plugin.name);
+    return names;
+}
+
 /// Whether several processes share the bodies of a system. Smooth systems whose method they cannot share are computed
 /// whole by each, as linear solvers for several processes ask.
 bool shares_bodies(const SceneSystem& system, const Registry& registry) {
@@ -187,18 +195,26 @@ Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
 
 void Simulation::share(const Registry& registry) {
-    if (!shares_bodies(*system_, registry)) return;
+    if (process_count() == 1) return;
     const auto refuse = [](const std::string& what, const std::string& advice) {
-        throw Unsupported(
-            fmt::format("several processes cannot share bodies with {}; {}, or start one process", what, advice));
+        throw Unsupported(fmt::format("several processes cannot share a system {}; {}start one process", what, advice));
     };
+    if (!shares_bodies(*system_, registry)) {
+        if (!system_->system->has_unilateral()) return;
+        if (const std::string obstacle = SharedRun::obstacle(*system_); !obstacle.empty())
+            refuse("with contacts or stops that has " + obstacle, "");
+        throw Unsupported(
+            fmt::format("several processes cannot share contacts and stops with {}; name {}, or start one "
+                        "process",
+                        system_->solver.name, fmt::join(solvers_in_parts(registry), ", ")));
+    }
     if (!can_be_shared(system_->integrator))
-        refuse(fmt::format("the integrator {}", system_->integrator),
-               fmt::format("name {}", fmt::join(methods_to_share(), " or ")));
-    if (system_->coordinates == Coordinates::Joint) refuse("joint coordinates", "remove \"coordinates\"");
-    if (system_->sleeping) refuse("bodies that sleep", "remove \"sleeping\"");
-    if (system_->control) refuse("steps chosen by a tolerance", "give a fixed \"step\"");
-    if (!system_->leave_out) refuse("nothing left out", "leave out that option");
+        refuse(fmt::format("with the integrator {}", system_->integrator),
+               fmt::format("name {}, or ", fmt::join(methods_to_share(), " or ")));
+    if (system_->coordinates == Coordinates::Joint) refuse("in joint coordinates", "remove \"coordinates\", or ");
+    if (system_->sleeping) refuse("in which bodies sleep", "remove \"sleeping\", or ");
+    if (system_->control) refuse("with steps chosen by a tolerance", "give a fixed \"step\", or ");
+    if (!system_->leave_out) refuse("of which nothing is left out", "");
     shared_ = std::make_unique<SharedRun>(*system_, communicator_of_run(), registry, *solver_);
 }
 
@@ -634,7 +650,7 @@ void Simulation::gather() {
 }
 
 void Simulation::gather_contacts() {
-    if (shared_) shared_->gather_contacts();
+    if (shared_) shared_->collect_contacts(report_.step);
 }
 
 std::vector<Simulation::Share> Simulation::shares() const {
