@@ -231,7 +231,8 @@ double SharedSteps::goal_for(const PreparedPart& part, std::span<const double> o
     return goal_of({.in_masses = std::sqrt(std::abs(square)),
                     .in_rows = part.norm_in_rows(own_error),
                     .reference = part.reference(),
-                    .rows = static_cast<double>(part.problem().m_all())},
+                    .rows = static_cast<double>(part.problem().m_all()),
+                    .gathered = true},
                    part.needs());
 }
 

@@ -30,18 +30,20 @@ struct ErrorOfMethod {
     double in_rows;    ///< ‖S D e‖
     double reference;  ///< ErrorMeter::reference()
     double rows;       ///< of the part
+    /// The part may be a whole pile, of which other ways of solving see each heap apart.
+    bool gathered = false;
 };
 
 /// Rows far from the method's own error need not be solved below it.
 inline double goal_of(const ErrorOfMethod& error, std::uint64_t needs) {
-    constexpr double share = 0.5, share_in_rows = 0.75, least = 1e-8, many = 300.0;
+    constexpr double share = 0.5, share_in_rows = 0.75, many = 300.0;
+    // Few rows are solved exactly for next to nothing.
+    const double share_of_many = std::pow(std::min(1.0, error.rows / many), 3);
+    const double least = error.gathered ? 1e-8 + 1e-2 * share_of_many * loosest_goal(needs) : 1e-8;
     const double by_masses = share * error.in_masses / error.reference;
     if (by_masses <= least) return least;  // as at rest
     const double in_rows = share_in_rows * error.in_rows / error.reference;
-    // Few rows are solved exactly for next to nothing.
-    const double share_of_many = std::min(1.0, error.rows / many);
-    return std::clamp(std::min(by_masses, in_rows), least,
-                      std::max(least, loosest_goal(needs) * std::pow(share_of_many, 3)));
+    return std::clamp(std::min(by_masses, in_rows), least, std::max(least, loosest_goal(needs) * share_of_many));
 }
 
 /// Sets the tolerance of a part. A tolerance that the configuration names is kept at least. goal: of goal_of(), where

@@ -119,6 +119,7 @@ struct PartitionedSolver::Implementation {
     std::shared_ptr<const Communicator> communicator;
     std::unique_ptr<PluginInstance> instance;  // or, for auto:
     std::unique_ptr<Ranking> ranking;
+    bool simulation = false;  // by which of its rules
     PluginInfo info_of_auto;
     std::map<std::pair<std::string, OptionTexts>, PartitionedSolver> solvers;
     bool analyzed = false;
@@ -180,13 +181,13 @@ struct PartitionedSolver::Implementation {
                          SolveReport& report);
     [[nodiscard]] const RankingRule& rule_of(const PreparedPart& problem, double tolerance) const {
         const auto rows = std::min<std::int64_t>(problem.raw().m_all, std::numeric_limits<std::int32_t>::max());
-        return ranking->rule({problem.needs(), tolerance, false}, static_cast<std::int32_t>(rows));
+        return ranking->rule({problem.needs(), tolerance, simulation}, static_cast<std::int32_t>(rows));
     }
 };
 
 PartitionedSolver::PartitionedSolver(const Registry& registry, SolverConfig config,
                                      std::shared_ptr<const Communicator> communicator)
-    : implementation_(new Implementation{registry, std::move(config), std::move(communicator), {}, {}, {}, {}}) {
+    : implementation_(new Implementation{registry, std::move(config), std::move(communicator), {}, {}, false, {}, {}}) {
     auto& self = *implementation_;
     together(*self.communicator, [&] {
         OptionTexts options = self.config.options;
@@ -194,6 +195,7 @@ PartitionedSolver::PartitionedSolver(const Registry& registry, SolverConfig conf
             throw InputError("a partitioned problem is solved by one solver; leave out the option \"finish\"");
         if (self.config.name == auto_name) {
             self.ranking = std::make_unique<Ranking>(ranking_of(registry, options));
+            self.simulation = by_rules_of_simulations(registry, options);
             self.info_of_auto = auto_info(registry);
             return;
         }
@@ -290,6 +292,10 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
     for (const auto& ranked : stages) {
         const bool own_law = !ranked.stage.law || *ranked.stage.law == problem.problem().law;
         if (!own_law || !can(registry, ranked.solver, problem.needs())) continue;
+        if (ranked.stage.patient && best <= settings.usable) {
+            report.near_goal = true;
+            break;
+        }
         auto place = solvers.find({ranked.solver, ranked.options});
         if (place == solvers.end()) {
             SolverConfig one;
@@ -316,10 +322,11 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
         report.stages.push_back({done.solver, done.options, done.law, ranked.stage.reason, stage.tolerance, done.status,
                                  done.message, done.iterations, done.seconds_setup + done.seconds_solve,
                                  done.error.natural});
-        const bool good = std::isfinite(done.error.natural) && done.error.natural < best;
+        const double worst = std::max(done.error.natural, done.error.balance);
+        const bool good = std::isfinite(worst) && worst < best;
         if (good || !started || done.status == Status::Solved) {
             own = std::move(next);
-            best = done.error.natural;
+            best = worst;
             started = true;
             report.claimed_residual = done.claimed_residual;
         }
@@ -329,6 +336,10 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
             done.status == Status::TimeLimit || (ranked.last && done.status != Status::Solved))
             break;
         if (done.status == Status::Solved) report.status = Status::Stalled;
+        if (!ranked.stage.to_goal && best <= settings.needed) {
+            report.near_goal = true;
+            break;
+        }
     }
     std::vector<std::string> names;
     for (const auto& stage : report.stages) names.push_back(stage.solver);

@@ -132,6 +132,10 @@ std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) 
     return names;
 }
 
+bool by_rules_of_simulations(const Registry& registry, const OptionTexts& options) {
+    return read_options(registry, options).simulation;
+}
+
 Ranking ranking_of(const Registry& registry, const OptionTexts& options) {
     return read_options(registry, options).ranking;
 }
