@@ -137,7 +137,7 @@ protected:
         return largest;
     }
     /// Runs a scene in one process and in several; the reports.
-    void compare(const char* text, std::vector<int> counts, double positions, double velocities) {
+    void compare(const char* text, std::vector<int> counts, double positions, double velocities, int divisions = 1) {
         const std::string file = scene(text);
         ASSERT_EQ(run_command("run " + file + " -o " + (folder / "one").string()).exit_code, 0);
         const Json one = report("one");
@@ -149,6 +149,7 @@ protected:
             ASSERT_EQ(several["systems"][0]["processes"].size(), static_cast<std::size_t>(processes));
             std::int64_t bodies = 0;
             for (const Json& process : several["systems"][0]["processes"]) bodies += process["bodies"].get<int>();
+            EXPECT_GE(several["systems"][0]["divisions"], divisions);
             EXPECT_EQ(6 * bodies, one["systems"][0]["velocities"].get<int>());
             const auto [x, v] = differences(one, several);
             EXPECT_LE(x, positions) << "m";
@@ -172,6 +173,18 @@ TEST_F(SharedRun, OneBodyThatTouchesManyAndLinksAcrossTheCuts) {
 
 TEST_F(SharedRun, AChainIsCut) {
     compare(chain, {3}, 1e-9, 1e-7);
+}
+
+// Two flocks fly through one another: all bodies change their domains.
+TEST_F(SharedRun, BodiesThatFlyFarChangeProcesses) {
+    compare(
+        "{step: 0.0031, end: 0.5, gravity: [0, 0, -1], solver: {tolerance: 1.0e-10}, materials: {m: {friction: 0.3, "
+        "restitution: 0.5}}, bodies: [{name: 'a_{i}_{j}', density: 900, position: [-3, 0, 1], velocity: [9, 0, 0], "
+        "angular_velocity: [0, 3, 1], shapes: [{box: {size: [0.1, 0.12, 0.11]}, material: m}], repeat: {count: [6, 5, "
+        "1], spacing: [0.3, 0.3, 0]}}, {name: 'b_{i}_{j}', density: 800, position: [1.5, 0.15, 1.06], velocity: [-9, "
+        "0.123, 0], shapes: [{sphere: {radius: 0.06}, material: m}], repeat: {count: [6, 5, 1], spacing: [0.3, 0.3, "
+        "0]}}]}",
+        {2, 3}, 1e-8, 1e-6, 3);
 }
 
 TEST_F(SharedRun, MoreProcessesThanBodies) {

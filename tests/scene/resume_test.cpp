@@ -119,7 +119,7 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
               "the checkpoint cannot be used: it was written by another version of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 4}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 5, \"scene\": \"\", \"contact_forces\": false, "
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 6, \"scene\": \"\", \"contact_forces\": false, "
                    "\"systems\": [{\"name\": "
                    "\"a\", \"step\": 1, \"t\": \"3ff\"}]}"),
               "the checkpoint cannot be used: a number is damaged");

@@ -121,8 +121,9 @@ RunResult advance(const Communicator& run, std::vector<Simulation>& simulations,
     return result;
 }
 
-void print_shares(const std::vector<Simulation::Share>& shares) {
+void print_shares(const std::vector<Simulation::Share>& shares, std::int64_t divisions) {
     constexpr double MiB = 1048576.0;
+    if (!shares.empty()) fmt::print("  bodies shared out among {} processes {} times\n", shares.size(), divisions);
     for (std::size_t p = 0; p < shares.size(); ++p)
         fmt::print("  process {}: {} bodies, {} ghosts, {} rows at the end; {:.1f} MiB at most, {:.1f} MiB sent\n", p,
                    shares[p].bodies, shares[p].ghosts, shares[p].rows, static_cast<double>(shares[p].peak_memory) / MiB,
@@ -174,7 +175,7 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
         if (totals.near_goal_solves > 0)
             fmt::print("  {} solves ended above the tolerance that their steps are worth, within what is good enough\n",
                        totals.near_goal_solves);
-        print_shares(*of_system++);
+        print_shares(*of_system++, simulation.divisions());
     }
     if (status != RunStatus::Finished) fmt::print("{}\n", status_word(status));
 }

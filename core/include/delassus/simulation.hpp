@@ -168,6 +168,8 @@ public:
         std::int64_t bodies = 0, ghosts = 0, rows = 0;
         std::int64_t bytes_sent = 0, peak_memory = 0;  ///< bytes, since the start
     };
+    /// How often the bodies were shared out so far; 0 where they are not shared.
+    [[nodiscard]] DELASSUS_API std::int64_t divisions() const;
     /// By rank; empty where nothing is shared. Collective.
     [[nodiscard]] DELASSUS_API std::vector<Share> shares() const;
     /// Brings together what save() needs; before each save() where bodies are shared. Collective.

@@ -100,6 +100,7 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
         add_totals(simulation.totals(), one);
         const std::size_t number = json["systems"].size();
         if (number < shares.size() && !shares[number].empty()) {
+            one["divisions"] = simulation.divisions();
             Json& processes = one["processes"] = Json::array();
             for (const Simulation::Share& share : shares[number])
                 processes.push_back({{"bodies", share.bodies},

@@ -653,6 +653,10 @@ void Simulation::gather_contacts() {
     if (shared_) shared_->collect_contacts(report_.step);
 }
 
+std::int64_t Simulation::divisions() const {
+    return shared_ ? shared_->divisions() : 0;
+}
+
 std::vector<Simulation::Share> Simulation::shares() const {
     return shared_ ? shared_->shares() : std::vector<Share>{};
 }
