@@ -241,6 +241,7 @@ void PreparedPart::Implementation::lay_out() {
     together(*communicator, [&] {
         if (raw.m >= std::numeric_limits<std::int32_t>::max())
             throw InputError("one process has more than 2147483646 rows of D; start more processes");
+        cones.reserve(problem.cones.size());
         for (const Cone& cone : problem.cones) {
             cones.push_back(raw_cone(cone, first_row));
             first_row += cone.rows;

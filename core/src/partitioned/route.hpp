@@ -50,8 +50,9 @@ public:
     }
 
 private:
-    /// About so many bytes leave a process at once.
-    static constexpr std::size_t bytes_at_once = 8 << 20;
+    /// About so many bytes leave a process at once; the second number counts where there are many processes, of which
+    /// most get nothing.
+    static constexpr std::size_t bytes_at_once = 1 << 20, bytes_for_one = 1 << 16;
 
     [[nodiscard]] std::size_t processes() const { return static_cast<std::size_t>(run_.size()); }
     [[nodiscard]] std::size_t rank() const { return static_cast<std::size_t>(run_.rank()); }
@@ -79,7 +80,7 @@ private:
             result.resize(static_cast<std::size_t>(after(from_.back())));
             for (std::size_t p = 0; p < place.size(); ++p) place[p] = static_cast<std::size_t>(after(from_[p]));
         });
-        const std::size_t quota = std::max(bytes_at_once / processes(), sizeof(Value)) / sizeof(Value);
+        const std::size_t quota = std::max(bytes_at_once / processes(), bytes_for_one) / sizeof(Value);
         std::vector<std::int64_t> next(to_.begin(), to_.end() - 1);
         std::vector<std::vector<std::byte>> pieces(processes());
         std::int64_t left = 1;
