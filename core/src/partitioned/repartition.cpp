@@ -2,6 +2,9 @@
 #include "delassus/repartition.hpp"
 
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -436,6 +439,18 @@ PartitionedProblem moved(const Communicator& communicator, PartitionedProblem pr
     return problem;
 }
 
+namespace {
+
+/// Gives pages that nothing uses back to the system: glibc keeps those of arrays below 32 MiB, of which the graph and
+/// the messages were many, and a solver's arrays do not all fit where those were.
+void release_pages() {
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+}
+
+}  // namespace
+
 PartitionedProblem repartition(const Communicator& communicator, PartitionedProblem problem, Partitioning how) {
     if (communicator.size() == 1 || problem.n_all() == 0) return problem;
     if (how == Partitioning::Automatic) how = chosen_partitioning(communicator, problem);
@@ -452,7 +467,10 @@ PartitionedProblem repartition(const Communicator& communicator, PartitionedProb
         VertexRange graph = graph_of(communicator, problem, bodies);
         scotch(communicator.handle(), graph, part);
     }
-    return moved(communicator, std::move(problem), part);
+    release_pages();
+    problem = moved(communicator, std::move(problem), part);
+    release_pages();
+    return problem;
 }
 
 }  // namespace delassus
