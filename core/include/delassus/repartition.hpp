@@ -47,9 +47,9 @@ enum class Partitioning {
 [[nodiscard]] DELASSUS_API PartitionedProblem repartition(const Communicator& communicator, PartitionedProblem problem,
                                                           Partitioning how = Partitioning::Automatic);
 
-/// Moves each own body k to the process target[k]; one entry for each entry of bodies_of(). As repartition().
-/// Collective.
-[[nodiscard]] DELASSUS_API PartitionedProblem moved(const Communicator& communicator, const PartitionedProblem& problem,
+/// Moves each own body k to the process target[k]; one entry for each entry of bodies_of(). As repartition(). Beside
+/// the part there stands at most its largest array once more, and some megabytes on their way. Collective.
+[[nodiscard]] DELASSUS_API PartitionedProblem moved(const Communicator& communicator, PartitionedProblem problem,
                                                     const std::vector<std::int32_t>& target);
 
 /// The first columns of the own bodies: body_start, or where nobody said it, the diagonal blocks of H of at most 16

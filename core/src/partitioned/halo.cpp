@@ -67,4 +67,25 @@ void Halo::add(const Communicator& communicator, std::vector<double>& local) con
     }
 }
 
+// Sorted now and then, so that columns that many rows share are kept a few times only.
+std::vector<std::int64_t> foreign_numbers(const Communicator& communicator, const std::vector<std::int64_t>& start,
+                                          std::initializer_list<const LocalMatrix*> matrices) {
+    const auto rank = static_cast<std::size_t>(communicator.rank());
+    std::vector<std::int64_t> numbers;
+    std::size_t sorted = 0;
+    const auto sort_out = [&] {
+        std::sort(numbers.begin(), numbers.end());
+        numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+        sorted = numbers.size();
+    };
+    for (const LocalMatrix* matrix : matrices)
+        for (const auto column : matrix->column) {
+            if (column >= start[rank] && column < start[rank + 1]) continue;
+            numbers.push_back(column);
+            if (numbers.size() >= 2 * sorted + 4096) sort_out();
+        }
+    sort_out();
+    return numbers;
+}
+
 }  // namespace delassus

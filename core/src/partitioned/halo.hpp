@@ -3,11 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <vector>
 
-#include "delassus/communicator.hpp"
 #include "delassus/export.hpp"
+#include "delassus/partitioned.hpp"
 
 namespace delassus {
 
@@ -46,5 +47,11 @@ private:
     std::vector<std::size_t> ghost_start_;              // of each owner's among them, processes + 1
     std::vector<std::vector<std::int64_t>> needed_by_;  // own places, by process
 };
+
+/// The columns of these matrices that other processes own, ascending, without repetition. start: of the ranges of all
+/// processes, processes + 1. Takes memory for them alone. Not collective.
+[[nodiscard]] std::vector<std::int64_t> foreign_numbers(const Communicator& communicator,
+                                                        const std::vector<std::int64_t>& start,
+                                                        std::initializer_list<const LocalMatrix*> matrices);
 
 }  // namespace delassus

@@ -24,8 +24,10 @@ double square(double value) {
     return value * value;
 }
 
-/// Sums up so many parts of rows at once: the memory of a message stays small.
-constexpr std::size_t rows_at_once = 65536;
+/// Sums up so many rows at once: they are a copy, and each time costs a vector of all columns.
+std::size_t rows_at_once(std::int64_t rows) {
+    return std::clamp<std::size_t>(static_cast<std::size_t>(rows) / 16, 4096, 65536);
+}
 
 }  // namespace
 
@@ -60,6 +62,7 @@ void PartMeter::add_squares_of_rows(std::vector<double>& diagonal) const {
         own.clear();
         first = next;
     };
+    const std::size_t at_once = rows_at_once(problem.m());
     for (std::int64_t row = 0; row < problem.m(); ++row) {
         std::size_t last = processes;
         for_entries(problem.D, row, [&](std::int64_t j, double value) {
@@ -72,7 +75,7 @@ void PartMeter::add_squares_of_rows(std::vector<double>& diagonal) const {
         });
         if (last != processes) foreign[last].parts.end_row();
         own.end_row();
-        if (own.rows() == rows_at_once) flush_own(row + 1);
+        if (own.rows() == at_once) flush_own(row + 1);
     }
     if (own.rows() > 0) flush_own(problem.m());
     std::vector<Bytes> to(processes);

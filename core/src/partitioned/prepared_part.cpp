@@ -226,28 +226,12 @@ void PreparedPart::Implementation::count_cones() {
 }
 
 void PreparedPart::Implementation::find_halos() {
-    const auto rank = static_cast<std::size_t>(communicator->rank());
-    const auto foreign = [&](const LocalMatrix& matrix, const std::vector<std::int64_t>& start,
-                             std::vector<std::int64_t>& wanted) {
-        // Sorted now and then, so that columns that many rows share are kept a few times only.
-        std::size_t sorted = 0;
-        for (const auto column : matrix.column) {
-            if (column >= start[rank] && column < start[rank + 1]) continue;
-            wanted.push_back(column);
-            if (wanted.size() < 2 * sorted + 4096) continue;
-            std::sort(wanted.begin(), wanted.end());
-            wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-            sorted = wanted.size();
-        }
-    };
-    std::vector<std::int64_t> wanted;
-    foreign(problem.H, problem.column_start, wanted);
-    coupled = largest(static_cast<std::int64_t>(wanted.size())) > 0;
-    foreign(problem.D, problem.column_start, wanted);
-    columns = Halo(*communicator, problem.column_start, std::move(wanted));
-    wanted.clear();
-    foreign(problem.E, problem.row_start, wanted);
-    rows = Halo(*communicator, problem.row_start, std::move(wanted));
+    coupled =
+        largest(static_cast<std::int64_t>(foreign_numbers(*communicator, problem.column_start, {&problem.H}).size())) >
+        0;
+    columns = Halo(*communicator, problem.column_start,
+                   foreign_numbers(*communicator, problem.column_start, {&problem.H, &problem.D}));
+    rows = Halo(*communicator, problem.row_start, foreign_numbers(*communicator, problem.row_start, {&problem.E}));
 }
 
 void PreparedPart::Implementation::lay_out() {
@@ -273,6 +257,7 @@ void PreparedPart::Implementation::lay_out() {
     together(*communicator, [&] {
         if (raw.m >= std::numeric_limits<std::int32_t>::max())
             throw InputError("one process has more than 2147483646 rows of D; start more processes");
+        cones.reserve(problem.cones.size());
         for (const Cone& cone : problem.cones) {
             cones.push_back(raw_cone(cone, first_row));
             first_row += cone.rows;

@@ -2,16 +2,19 @@
 #include "delassus/repartition.hpp"
 
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
+#include <tuple>
 
 #include "delassus/error.hpp"
 #include "partitioned/bytes.hpp"
-#include "partitioned/cone_bytes.hpp"
 #include "partitioned/halo.hpp"
+#include "partitioned/route.hpp"
 #include "partitioned/scotch_module.hpp"
 #include "problem/structure.hpp"
 #include "support/module.hpp"
@@ -60,7 +63,8 @@ private:
 }  // namespace
 
 PartitionQuality measure_partition(const Communicator& communicator, const PartitionedProblem& problem) {
-    const Halo halo(communicator, problem.column_start, problem.D.column);
+    const Halo halo(communicator, problem.column_start,
+                    foreign_numbers(communicator, problem.column_start, {&problem.D}));
     std::vector<std::int64_t> sums(3, 0), largest(2, 0);
     together(communicator, [&] {
         each_cone(problem, [&](std::size_t, std::int64_t first, std::int64_t last) {
@@ -142,36 +146,49 @@ struct Edge {
     std::int64_t from, to, weight;
 };
 
-/// Sorts the edges and adds up the weights of equal ones.
-void merge(std::vector<Edge>& edges) {
-    std::sort(edges.begin(), edges.end(),
-              [](const Edge& l, const Edge& r) { return std::tie(l.from, l.to) < std::tie(r.from, r.to); });
-    std::size_t kept = 0;
-    for (const Edge& edge : edges) {
-        if (kept > 0 && edges[kept - 1].from == edge.from && edges[kept - 1].to == edge.to) {
-            edges[kept - 1].weight += edge.weight;
-        } else {
-            edges[kept++] = edge;
-        }
+/// Edges of one process's bodies. Equal ones are added up now and then, so that they take memory once or twice.
+class EdgeBag {
+public:
+    void add(const Edge& edge) {
+        edges_.push_back(edge);
+        if (edges_.size() >= 2 * merged_ + 65536) merge();
     }
-    edges.resize(kept);
-}
+    /// Sorts the edges and adds up the weights of equal ones.
+    void merge() {
+        std::sort(edges_.begin(), edges_.end(),
+                  [](const Edge& l, const Edge& r) { return std::tie(l.from, l.to) < std::tie(r.from, r.to); });
+        merged_ = 0;
+        for (const Edge& edge : edges_) {
+            if (merged_ > 0 && edges_[merged_ - 1].from == edge.from && edges_[merged_ - 1].to == edge.to) {
+                edges_[merged_ - 1].weight += edge.weight;
+            } else {
+                edges_[merged_++] = edge;
+            }
+        }
+        edges_.resize(merged_);
+    }
+    [[nodiscard]] const std::vector<Edge>& edges() const { return edges_; }
+    void release() { std::vector<Edge>().swap(edges_); }
 
-/// The graph of bodies: an edge for each two that share a cone, as heavy as they share cones, or an entry of H; a body
-/// is as heavy as its columns and its share of the rows.
-VertexRange graph_of(const Communicator& communicator, const PartitionedProblem& problem,
-                     const std::vector<std::int64_t>& bodies, std::vector<std::int64_t>& body_first) {
-    const auto own = rank_of(communicator), processes = static_cast<std::size_t>(communicator.size());
-    body_first = {0};
-    for (const auto count : communicator.all(static_cast<std::int64_t>(bodies.size())))
-        body_first.push_back(body_first.back() + count);
-    std::vector<std::int64_t> wanted = problem.D.column;
-    wanted.insert(wanted.end(), problem.H.column.begin(), problem.H.column.end());
-    const Halo halo(communicator, problem.column_start, std::move(wanted));
+private:
+    std::vector<Edge> edges_;
+    std::size_t merged_ = 0;
+};
+
+/// The edges that the own cones and rows of H make, by the process that has the body they start at.
+std::vector<EdgeBag> own_edges(const Communicator& communicator, const PartitionedProblem& problem,
+                               const std::vector<std::int64_t>& bodies, const std::vector<std::int64_t>& body_first) {
+    const auto own = rank_of(communicator);
+    const Halo halo(communicator, problem.column_start,
+                    foreign_numbers(communicator, problem.column_start, {&problem.D, &problem.H}));
     const auto own_body = body_of_columns(problem, bodies, body_first[own], problem.column_start[own]);
     const Numbers body(communicator, halo, own_body);
 
-    std::vector<Edge> edges;
+    std::vector<EdgeBag> bags(static_cast<std::size_t>(communicator.size()));
+    const auto add = [&](const Edge& edge) {
+        const auto p = std::upper_bound(body_first.begin(), body_first.end(), edge.from) - body_first.begin() - 1;
+        bags[static_cast<std::size_t>(p)].add(edge);
+    };
     std::vector<std::int64_t> some;
     const auto bodies_among = [&](std::span<const std::int64_t> columns) {
         some.clear();
@@ -187,105 +204,131 @@ VertexRange graph_of(const Communicator& communicator, const PartitionedProblem&
         constexpr std::size_t few = 4;
         for (std::size_t i = 0; i < some.size() && (i == 0 || some.size() <= few); ++i)
             for (std::size_t j = i + 1; j < some.size(); ++j) {
-                edges.push_back({some[i], some[j], weight});
-                edges.push_back({some[j], some[i], weight});
+                add({some[i], some[j], weight});
+                add({some[j], some[i], weight});
             }
     };
-    each_cone(problem, [&](std::size_t, std::int64_t first, std::int64_t last) {
-        bodies_among(columns_of(problem.D, first, last));
-        // Rows count for the first body; a loop is kept as the carrier of this weight.
-        if (!some.empty()) edges.push_back({some[0], some[0], last - first});
-        connect(1);
-    });
-    for (std::int64_t row = 0; row < problem.n(); ++row) {
-        const auto from = own_body[static_cast<std::size_t>(row)];
-        for (const auto column : columns_of(problem.H, row, row + 1))
-            if (const auto to = body.of(column); to != from) edges.push_back({from, to, 1});
-    }
-    merge(edges);
-    std::vector<std::vector<Edge>> by_process(processes);
-    for (const Edge& edge : edges) {
-        const auto p = std::upper_bound(body_first.begin(), body_first.end(), edge.from) - body_first.begin() - 1;
-        by_process[static_cast<std::size_t>(p)].push_back(edge);
-    }
-    std::vector<Bytes> to(processes);
-    for (std::size_t p = 0; p < processes; ++p) put(to[p], by_process[p]);
-    edges.clear();
-    for (const Bytes& bytes : communicator.exchange(to)) ByteReader(bytes).append(edges);
-    merge(edges);
-
-    VertexRange graph;
-    graph.vertices_all = body_first.back();
-    for (std::size_t k = 0; k < bodies.size(); ++k)
-        graph.weight.push_back((k + 1 < bodies.size() ? bodies[k + 1] : problem.column_start[own + 1]) - bodies[k]);
-    graph.start.assign(bodies.size() + 1, 0);
-    for (const Edge& edge : edges) {
-        const auto k = static_cast<std::size_t>(edge.from - body_first[own]);
-        if (edge.to == edge.from) {
-            graph.weight[k] += edge.weight;
-            continue;
+    together(communicator, [&] {
+        each_cone(problem, [&](std::size_t, std::int64_t first, std::int64_t last) {
+            bodies_among(columns_of(problem.D, first, last));
+            // Rows count for the first body; a loop is kept as the carrier of this weight.
+            if (!some.empty()) add({some[0], some[0], last - first});
+            connect(1);
+        });
+        for (std::int64_t row = 0; row < problem.n(); ++row) {
+            const auto from = own_body[static_cast<std::size_t>(row)];
+            for (const auto column : columns_of(problem.H, row, row + 1))
+                if (const auto to = body.of(column); to != from) add({from, to, 1});
         }
-        ++graph.start[k + 1];
-        graph.neighbour.push_back(edge.to);
-        graph.edge_weight.push_back(edge.weight);
-    }
-    std::partial_sum(graph.start.begin(), graph.start.end(), graph.start.begin());
+        for (EdgeBag& bag : bags) bag.merge();
+    });
+    return bags;
+}
+
+/// The graph of bodies: an edge for each two that share a cone, as heavy as they share cones, or an entry of H; a body
+/// is as heavy as its columns and its share of the rows.
+VertexRange graph_of(const Communicator& communicator, const PartitionedProblem& problem,
+                     const std::vector<std::int64_t>& bodies) {
+    const auto own = rank_of(communicator);
+    std::vector<std::int64_t> body_first = {0};
+    for (const auto count : communicator.all(static_cast<std::int64_t>(bodies.size())))
+        body_first.push_back(body_first.back() + count);
+    auto bags = own_edges(communicator, problem, bodies, body_first);
+    std::vector<Bytes> to(bags.size());
+    together(communicator, [&] {
+        for (std::size_t p = 0; p < to.size(); ++p) {
+            if (p == own) continue;
+            put(to[p], bags[p].edges());
+            bags[p].release();
+        }
+    });
+    auto from = communicator.exchange(to);
+    to = {};
+    VertexRange graph;
+    together(communicator, [&] {
+        for (std::size_t p = 0; p < from.size(); ++p) {
+            if (p == own) continue;
+            for (const Edge& edge : ByteReader(from[p]).next<Edge>()) bags[own].add(edge);
+            Bytes().swap(from[p]);
+        }
+        bags[own].merge();
+        graph.vertices_all = body_first.back();
+        for (std::size_t k = 0; k < bodies.size(); ++k)
+            graph.weight.push_back((k + 1 < bodies.size() ? bodies[k + 1] : problem.column_start[own + 1]) - bodies[k]);
+        graph.start.assign(bodies.size() + 1, 0);
+        for (const Edge& edge : bags[own].edges()) {
+            const auto k = static_cast<std::size_t>(edge.from - body_first[own]);
+            if (edge.to == edge.from) {
+                graph.weight[k] += edge.weight;
+                continue;
+            }
+            ++graph.start[k + 1];
+            graph.neighbour.push_back(edge.to);
+            graph.edge_weight.push_back(edge.weight);
+        }
+        std::partial_sum(graph.start.begin(), graph.start.end(), graph.start.begin());
+    });
     return graph;
 }
 
-/// What goes to one process: rows of a matrix with new columns, ascending.
-void put_rows(Bytes& bytes, const LocalMatrix& matrix, const std::vector<std::int64_t>& rows, const Numbers& place) {
-    std::vector<std::int64_t> length, column;
-    std::vector<double> value;
+/// Gives the entries the new numbers of their columns, ascending within each row.
+void renumber(LocalMatrix& matrix, const Numbers& place) {
     std::vector<std::pair<std::int64_t, double>> entries;
-    for (const auto row : rows) {
+    for (std::size_t row = 0; row < static_cast<std::size_t>(matrix.rows); ++row) {
+        const auto begin = static_cast<std::size_t>(matrix.row_start[row]),
+                   end = static_cast<std::size_t>(matrix.row_start[row + 1]);
         entries.clear();
-        for (auto k = matrix.row_start[static_cast<std::size_t>(row)];
-             k < matrix.row_start[static_cast<std::size_t>(row) + 1]; ++k)
-            entries.emplace_back(place.of(matrix.column[static_cast<std::size_t>(k)]),
-                                 matrix.value[static_cast<std::size_t>(k)]);
+        for (auto k = begin; k < end; ++k) entries.emplace_back(place.of(matrix.column[k]), matrix.value[k]);
         std::sort(entries.begin(), entries.end(), [](const auto& l, const auto& r) { return l.first < r.first; });
-        length.push_back(static_cast<std::int64_t>(entries.size()));
-        for (const auto& [j, number] : entries) {
-            column.push_back(j);
-            value.push_back(number);
-        }
+        for (auto k = begin; k < end; ++k) std::tie(matrix.column[k], matrix.value[k]) = entries[k - begin];
     }
-    put(bytes, length);
-    put(bytes, column);
-    put(bytes, value);
 }
 
-void append_rows(ByteReader& reader, LocalMatrix& matrix) {
-    for (const auto length : reader.next<std::int64_t>()) {
-        matrix.row_start.push_back(matrix.row_start.back() + length);
-        ++matrix.rows;
-    }
-    reader.append(matrix.column);
-    reader.append(matrix.value);
+void move_rows(const Route& rows, LocalMatrix& matrix) {
+    rows.move(matrix.row_start, matrix.column, &matrix.value);
+    matrix.rows = static_cast<std::int64_t>(matrix.row_start.size()) - 1;
 }
 
-template <class Value>
-void put_chosen(Bytes& bytes, const std::vector<Value>& values, const std::vector<std::int64_t>& chosen) {
-    std::vector<Value> some;
-    some.reserve(chosen.size());
-    for (const auto k : chosen) some.push_back(values[static_cast<std::size_t>(k)]);
-    put(bytes, some);
-}
-
-/// Where each process begins when own things of which counts[q] go to q are moved, and where those of this process
-/// that go to q begin.
-std::vector<std::int64_t> new_starts(const Communicator& communicator, const std::vector<std::int64_t>& counts,
-                                     std::vector<std::int64_t>& first) {
-    const auto processes = static_cast<std::size_t>(communicator.size());
+void move_cones(const Communicator& communicator, const Route& route, std::vector<Cone>& cones) {
+    struct Shape {
+        std::int32_t kind, rows, bounds;
+    };
+    std::vector<Shape> shapes;
     std::vector<std::int64_t> start = {0};
-    first.assign(processes, 0);
-    for (std::size_t q = 0; q < processes; ++q) {
-        const auto from = communicator.all(counts[q]);
-        first[q] = start.back() + std::accumulate(from.begin(), from.begin() + communicator.rank(), std::int64_t{0});
-        start.push_back(start.back() + std::accumulate(from.begin(), from.end(), std::int64_t{0}));
-    }
-    return start;
+    std::vector<double> numbers;  // of each cone: parameters, lower bounds, upper bounds
+    together(communicator, [&] {
+        shapes.reserve(cones.size());
+        start.reserve(cones.size() + 1);
+        for (const Cone& cone : cones) {
+            shapes.push_back(
+                {static_cast<std::int32_t>(cone.kind), cone.rows, static_cast<std::int32_t>(cone.lo.size())});
+            for (const std::span<const double> some :
+                 {std::span<const double>(cone.parameters), std::span(cone.lo), std::span(cone.hi)})
+                numbers.insert(numbers.end(), some.begin(), some.end());
+            start.push_back(static_cast<std::int64_t>(numbers.size()));
+        }
+        std::vector<Cone>().swap(cones);
+    });
+    route.move(shapes);
+    route.move(start, numbers, static_cast<std::vector<double>*>(nullptr));
+    together(communicator, [&] {
+        cones.reserve(shapes.size());
+        auto next = numbers.cbegin();
+        for (const Shape& shape : shapes) {
+            Cone& cone = cones.emplace_back();
+            cone.kind = static_cast<ConeKind>(shape.kind);
+            cone.rows = shape.rows;
+            const auto take = [&](auto to, std::ptrdiff_t count) {
+                std::copy(next, next + count, to);
+                next += count;
+            };
+            take(cone.parameters.begin(), static_cast<std::ptrdiff_t>(cone.parameters.size()));
+            cone.lo.resize(static_cast<std::size_t>(shape.bounds));
+            cone.hi.resize(static_cast<std::size_t>(shape.bounds));
+            take(cone.lo.begin(), shape.bounds);
+            take(cone.hi.begin(), shape.bounds);
+        }
+    });
 }
 
 std::vector<std::int64_t> origin_or_own(const std::vector<std::int64_t>& origin, std::int64_t first,
@@ -296,120 +339,117 @@ std::vector<std::int64_t> origin_or_own(const std::vector<std::int64_t>& origin,
     return own;
 }
 
+/// The process of each cone: where most of its entries' columns go; of equally many, the smallest.
+std::vector<std::int32_t> targets_of_cones(const Communicator& communicator, const PartitionedProblem& problem,
+                                           const Numbers& process) {
+    std::vector<std::int32_t> target(problem.cones.size(), communicator.rank());
+    std::vector<std::int32_t> votes;
+    each_cone(problem, [&](std::size_t k, std::int64_t first, std::int64_t last) {
+        votes.clear();
+        for (const auto column : columns_of(problem.D, first, last))
+            votes.push_back(static_cast<std::int32_t>(process.of(column)));
+        std::sort(votes.begin(), votes.end());
+        std::ptrdiff_t most = 0;
+        for (auto at = votes.begin(); at != votes.end();) {
+            const auto end = std::upper_bound(at, votes.end(), *at);
+            if (end - at > most) {
+                most = end - at;
+                target[k] = *at;
+            }
+            at = end;
+        }
+    });
+    return target;
+}
+
 }  // namespace
 
-PartitionedProblem moved(const Communicator& communicator, const PartitionedProblem& problem,
+// Columns are renumbered where they are. Then one array after another moves, and the old one is freed before the next:
+// beside the part there are, at most, its largest array once more and the pieces that are on their way.
+PartitionedProblem moved(const Communicator& communicator, PartitionedProblem problem,
                          const std::vector<std::int32_t>& target) {
-    const auto own = rank_of(communicator), processes = static_cast<std::size_t>(communicator.size());
+    const auto own = rank_of(communicator);
     const auto bodies = bodies_of(communicator, problem);
     together(communicator, [&] {
         if (target.size() != bodies.size() || std::any_of(target.begin(), target.end(), [&](std::int32_t p) {
                 return p < 0 || p >= communicator.size();
             }))
             throw InputError(fmt::format("{} bodies need as many processes from 0 to {} to go to, not {} numbers",
-                                         bodies.size(), processes - 1, target.size()));
+                                         bodies.size(), communicator.size() - 1, target.size()));
     });
     const std::int64_t first_column = problem.column_start[own], first_row = problem.row_start[own];
-
-    // Columns by the process that they go to, in their order.
-    std::vector<std::vector<std::int64_t>> columns_to(processes), rows_to(processes), cones_to(processes),
-        bodies_to(processes);
-    std::vector<std::int64_t> goes_to(static_cast<std::size_t>(problem.n()));
-    for (std::size_t k = 0; k < bodies.size(); ++k) {
-        const auto end = k + 1 < bodies.size() ? bodies[k + 1] - first_column : problem.n();
-        const auto q = static_cast<std::size_t>(target[k]);
-        bodies_to[q].push_back(static_cast<std::int64_t>(k));
-        for (auto column = bodies[k] - first_column; column < end; ++column) {
-            goes_to[static_cast<std::size_t>(column)] = target[k];
-            columns_to[q].push_back(column);
-        }
-    }
-    const auto counts_of = [](const std::vector<std::vector<std::int64_t>>& to) {
-        std::vector<std::int64_t> counts;
-        for (const auto& list : to) counts.push_back(static_cast<std::int64_t>(list.size()));
-        return counts;
-    };
-    PartitionedProblem result;
-    result.name = problem.name;
-    result.law = problem.law;
-    result.source = problem.source;
-    result.notes = problem.notes;
-    std::vector<std::int64_t> first_new;
-    result.column_start = new_starts(communicator, counts_of(columns_to), first_new);
-    std::vector<std::int64_t> new_column(static_cast<std::size_t>(problem.n()));
-    for (std::size_t q = 0; q < processes; ++q)
-        for (const auto column : columns_to[q]) new_column[static_cast<std::size_t>(column)] = first_new[q]++;
-
-    std::vector<std::int64_t> wanted = problem.D.column;
-    wanted.insert(wanted.end(), problem.H.column.begin(), problem.H.column.end());
-    const Halo halo(communicator, problem.column_start, std::move(wanted));
-    const Numbers place(communicator, halo, new_column), process(communicator, halo, goes_to);
-
-    // A cone goes where most of its entries' columns go; of equally many, to the smaller process.
-    std::map<std::int64_t, std::int64_t> votes;
-    each_cone(problem, [&](std::size_t k, std::int64_t first, std::int64_t last) {
-        votes.clear();
-        for (const auto column : columns_of(problem.D, first, last)) ++votes[process.of(column)];
-        const auto most = std::max_element(votes.begin(), votes.end(),
-                                           [](const auto& l, const auto& r) { return l.second < r.second; });
-        const auto q = most == votes.end() ? own : static_cast<std::size_t>(most->first);
-        cones_to[q].push_back(static_cast<std::int64_t>(k));
-        for (auto row = first; row < last; ++row) rows_to[q].push_back(row);
-    });
-    result.row_start = new_starts(communicator, counts_of(rows_to), first_new);
-    std::vector<std::int64_t> new_row(static_cast<std::size_t>(problem.m()));
-    for (std::size_t q = 0; q < processes; ++q)
-        for (const auto row : rows_to[q]) new_row[static_cast<std::size_t>(row)] = first_new[q]++;
-    result.cone_start = new_starts(communicator, counts_of(cones_to), first_new);
-    const Halo row_halo(communicator, problem.row_start, problem.E.column);
-    const Numbers row_place(communicator, row_halo, new_row);
     std::vector<std::int64_t> has_E = {problem.E.columns > 0 ? 1 : 0};
     communicator.max(has_E);
 
-    std::vector<Bytes> to(processes);
+    std::vector<std::int32_t> column_target(static_cast<std::size_t>(problem.n()));
+    std::vector<std::int64_t> goes_to(column_target.size());
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+        const auto end = k + 1 < bodies.size() ? bodies[k + 1] - first_column : problem.n();
+        for (auto column = bodies[k] - first_column; column < end; ++column)
+            column_target[static_cast<std::size_t>(column)] = target[k];
+    }
+    goes_to.assign(column_target.begin(), column_target.end());
+    const Route columns(communicator, column_target);
+    std::vector<std::int32_t> cone_target, row_target;
+    problem.body_start.clear();
+    {
+        const Halo halo(communicator, problem.column_start,
+                        foreign_numbers(communicator, problem.column_start, {&problem.D, &problem.H}));
+        const auto new_column = columns.numbers();
+        const Numbers place(communicator, halo, new_column), process(communicator, halo, goes_to);
+        together(communicator, [&] {
+            cone_target = targets_of_cones(communicator, problem, process);
+            each_cone(problem, [&](std::size_t k, std::int64_t first, std::int64_t last) {
+                row_target.insert(row_target.end(), static_cast<std::size_t>(last - first), cone_target[k]);
+            });
+            renumber(problem.H, place);
+            renumber(problem.D, place);
+            for (const auto body : bodies)
+                problem.body_start.push_back(new_column[static_cast<std::size_t>(body - first_column)]);
+        });
+    }
+    const Route rows(communicator, row_target), cones(communicator, cone_target);
+    if (has_E[0] != 0) {
+        if (problem.E.columns == 0) problem.E.row_start.assign(static_cast<std::size_t>(problem.m()) + 1, 0);
+        const Halo halo(communicator, problem.row_start,
+                        foreign_numbers(communicator, problem.row_start, {&problem.E}));
+        const Numbers place(communicator, halo, rows.numbers());
+        renumber(problem.E, place);
+    }
     together(communicator, [&] {
-        const auto column_origin = origin_or_own(problem.column_origin, first_column, problem.n()),
-                   row_origin = origin_or_own(problem.row_origin, first_row, problem.m());
-        LocalMatrix no_E;
-        no_E.row_start.assign(static_cast<std::size_t>(problem.m()) + 1, 0);
-        for (std::size_t q = 0; q < processes; ++q) {
-            std::vector<std::int64_t> body_columns;
-            for (const auto k : bodies_to[q])
-                body_columns.push_back(
-                    new_column[static_cast<std::size_t>(bodies[static_cast<std::size_t>(k)] - first_column)]);
-            put(to[q], body_columns);
-            put_rows(to[q], problem.H, columns_to[q], place);
-            put_rows(to[q], problem.D, rows_to[q], place);
-            put_rows(to[q], problem.E.columns > 0 ? problem.E : no_E, rows_to[q], row_place);
-            put_chosen(to[q], problem.a, columns_to[q]);
-            put_chosen(to[q], problem.b, rows_to[q]);
-            put_chosen(to[q], column_origin, columns_to[q]);
-            put_chosen(to[q], row_origin, rows_to[q]);
-            put_cones(to[q], problem.cones, cones_to[q]);
-        }
+        problem.column_origin = origin_or_own(problem.column_origin, first_column, problem.n());
+        problem.row_origin = origin_or_own(problem.row_origin, first_row, problem.m());
     });
-    auto from = communicator.exchange(to);
-    to.clear();
-    together(communicator, [&] {
-        result.H.columns = result.D.columns = problem.n_all();
-        result.E.columns = has_E[0] != 0 ? problem.m_all() : 0;
-        for (Bytes& bytes : from) {
-            ByteReader reader(bytes);
-            reader.append(result.body_start);
-            append_rows(reader, result.H);
-            append_rows(reader, result.D);
-            append_rows(reader, result.E);
-            reader.append(result.a);
-            reader.append(result.b);
-            reader.append(result.column_origin);
-            reader.append(result.row_origin);
-            append_cones(reader, result.cones);
-            Bytes().swap(bytes);
-        }
-        if (has_E[0] == 0) result.E = {};
-    });
-    return result;
+    Route(communicator, target).move(problem.body_start);
+    move_rows(rows, problem.D);
+    move_rows(columns, problem.H);
+    if (has_E[0] != 0) {
+        move_rows(rows, problem.E);
+        problem.E.columns = rows.start().back();
+    }
+    columns.move(problem.a);
+    columns.move(problem.column_origin);
+    rows.move(problem.b);
+    rows.move(problem.row_origin);
+    move_cones(communicator, cones, problem.cones);
+    problem.H.columns = problem.D.columns = columns.start().back();
+    problem.column_start = columns.start();
+    problem.row_start = rows.start();
+    problem.cone_start = cones.start();
+    return problem;
 }
+
+namespace {
+
+/// Gives pages that nothing uses back to the system: glibc keeps those of arrays below 32 MiB, of which the graph and
+/// the messages were many, and a solver's arrays do not all fit where those were.
+void release_pages() {
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+}
+
+}  // namespace
 
 PartitionedProblem repartition(const Communicator& communicator, PartitionedProblem problem, Partitioning how) {
     if (communicator.size() == 1 || problem.n_all() == 0) return problem;
@@ -422,11 +462,15 @@ PartitionedProblem repartition(const Communicator& communicator, PartitionedProb
                                                                 "; keep the order of the file"));
     });
     const auto bodies = bodies_of(communicator, problem);
-    std::vector<std::int64_t> body_first;
-    const VertexRange graph = graph_of(communicator, problem, bodies, body_first);
     std::vector<std::int32_t> part;
-    scotch(communicator.handle(), graph, part);
-    return moved(communicator, problem, part);
+    {
+        VertexRange graph = graph_of(communicator, problem, bodies);
+        scotch(communicator.handle(), graph, part);
+    }
+    release_pages();
+    problem = moved(communicator, std::move(problem), part);
+    release_pages();
+    return problem;
 }
 
 }  // namespace delassus

@@ -19,8 +19,8 @@ struct VertexRange {
 }  // namespace delassus
 
 // The module is built together with the library, so C++ types may cross here. part[k] ← the process of own vertex k.
-// Throws InputError on all processes.
+// The graph's arrays are freed as they are copied. Throws InputError on all processes.
 extern "C" {
-using DelassusScotch = void (*)(std::int32_t communicator, const delassus::VertexRange& graph,
+using DelassusScotch = void (*)(std::int32_t communicator, delassus::VertexRange& graph,
                                 std::vector<std::int32_t>& part);
 }

@@ -18,15 +18,16 @@ namespace {
 
 using petsc::check;
 
-/// MatCreateMPIAdj and MatPartitioning own what they are given, and free it.
-PetscInt* given(const std::vector<std::int64_t>& values) {
+/// MatCreateMPIAdj and MatPartitioning own what they are given, and free it. Frees the values.
+PetscInt* given(std::vector<std::int64_t>& values) {
     PetscInt* copy = nullptr;
     check(PetscMalloc1(values.size(), &copy));
     std::transform(values.begin(), values.end(), copy, [](std::int64_t value) { return static_cast<PetscInt>(value); });
+    std::vector<std::int64_t>().swap(values);
     return copy;
 }
 
-void partition(MPI_Comm communicator, const VertexRange& graph, std::vector<std::int32_t>& part) {
+void partition(MPI_Comm communicator, VertexRange& graph, std::vector<std::int32_t>& part) {
     std::int64_t largest =
         std::max<std::int64_t>(graph.vertices_all, static_cast<std::int64_t>(graph.neighbour.size()));
     MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_INT64_T, MPI_MAX, communicator);
@@ -64,7 +65,7 @@ void partition(MPI_Comm communicator, const VertexRange& graph, std::vector<std:
 }  // namespace
 }  // namespace delassus
 
-extern "C" DELASSUS_API void delassus_scotch(std::int32_t communicator, const delassus::VertexRange& graph,
+extern "C" DELASSUS_API void delassus_scotch(std::int32_t communicator, delassus::VertexRange& graph,
                                              std::vector<std::int32_t>& part) {
     try {
         delassus::partition(MPI_Comm_f2c(communicator), graph, part);

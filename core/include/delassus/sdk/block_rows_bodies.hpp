@@ -23,6 +23,8 @@ DELASSUS_SDK_FUNCTION std::vector<RowGroup> row_groups(const ConeRange& cones) {
 DELASSUS_SDK_FUNCTION BlockRows::BlockRows(const Matrix& matrix, std::span<const RowGroup> groups, const double* left,
                                            const double* right, const Team& team) {
     lay_out(matrix, groups);
+    std::vector<std::int32_t>().swap(columns_);
+    start_.shrink_to_fit();
     fill(matrix, groups, left, right, team);
 }
 
