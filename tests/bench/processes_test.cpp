@@ -43,7 +43,7 @@ protected:
 };
 
 constexpr const char* piles =
-    "problems:\n  - {generate: pile, set: {contacts: [300, 600, 1200]}}\n"
+    "problems:\n  - {generate: pile, set: {contacts: [600, 1200, 2400]}}\n"
     "solvers: [apgd_petsc, pgs]\nprocesses: [2, 1]\ntolerances: [1e-3]\nrepeats: 1\nreferences: none\n";
 
 TEST_F(ProcessesSuite, RunsPilesOnOneAndTwoProcesses) {
@@ -73,7 +73,8 @@ TEST_F(ProcessesSuite, RunsPilesOnOneAndTwoProcesses) {
             rows += one.at("m").get<std::int64_t>();
             const Json& seconds = one.at("seconds");
             double sum = 0.0;
-            for (const char* phase : {"products", "projections", "linear_systems", "exchange", "reductions", "waiting"}) {
+            for (const char* phase :
+                 {"products", "projections", "linear_systems", "exchange", "reductions", "waiting"}) {
                 EXPECT_GE(seconds.at(phase), 0.0) << phase;
                 sum += seconds.at(phase).get<double>();
             }
@@ -103,11 +104,13 @@ TEST_F(ProcessesSuite, RunsPilesOnOneAndTwoProcesses) {
 
     const Json processes = bench::analyse(set).at("processes");
     EXPECT_EQ(processes.at("strong").size(), 3U);
-    EXPECT_EQ(processes.at("weak").size(), 2U);  // 300 and 600 contacts a process
+    EXPECT_EQ(processes.at("weak").size(), 2U);  // 600 and 1200 contacts a process
     ASSERT_EQ(processes.at("traffic").size(), 1U);
     EXPECT_EQ(processes.at("traffic").at(0).at("points").size(), 3U);
-    const std::string summary = content_of(folder / "out" / "summary.md"), csv = content_of(folder / "out" / "results.csv");
-    for (const char* title : {"### Strong scaling", "### Weak scaling", "### Growth of what is sent", "### What the time"})
+    const std::string summary = content_of(folder / "out" / "summary.md"),
+                      csv = content_of(folder / "out" / "results.csv");
+    for (const char* title :
+         {"### Strong scaling", "### Weak scaling", "### Growth of what is sent", "### What the time"})
         EXPECT_NE(summary.find(title), std::string::npos) << title;
     EXPECT_NE(csv.find(",method,processes,bytes_an_iteration,ghosts,imbalance,products_s,"), std::string::npos);
     EXPECT_NE(csv.find(",apgd_petsc,2,"), std::string::npos);
@@ -124,9 +127,9 @@ TEST_F(ProcessesSuite, TakesFilesAndFolders) {
     convert.arguments = {"generate", "pile", (folder / "pile.h5").string(), "--set", "contacts=200"};
     convert.timeout = 60.0;
     if (run_child(convert).exit_code != 0) GTEST_SKIP() << "no HDF5 in this build";
-    const auto run = run_suite(
-        suite("problems: [pile.h5, 'pile:contacts=200', friction]\nsolvers: [apgd_petsc]\nlaws: associated\n"
-              "processes: [1, 2]\ntolerances: [1e-3]\nrepeats: 1\n"));
+    const auto run =
+        run_suite(suite("problems: [pile.h5, 'pile:contacts=200', friction]\nsolvers: [apgd_petsc]\nlaws: associated\n"
+                        "processes: [1, 2]\ntolerances: [1e-3]\nrepeats: 1\n"));
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = bench::read_results(folder / "out");
     ASSERT_EQ(set.solves.size(), 6U);
@@ -173,7 +176,9 @@ TEST_F(ProcessesSuite, ATimeOutEndsAllProcesses) {
 Json row_of(const std::string& problem, int processes, double seconds, std::int64_t iterations, double bytes) {
     Json by_process = Json::array();
     for (int p = 0; p < processes; ++p)
-        by_process.push_back({{"seconds", {{"setup", 0.0}, {"solve", seconds}, {"products", 0.5 * seconds}, {"projections", 0.25 * seconds}}}});
+        by_process.push_back(
+            {{"seconds",
+              {{"setup", 0.0}, {"solve", seconds}, {"products", 0.5 * seconds}, {"projections", 0.25 * seconds}}}});
     return {{"problem", problem},
             {"law", "associated"},
             {"tolerance", 1e-3},
@@ -184,8 +189,7 @@ Json row_of(const std::string& problem, int processes, double seconds, std::int6
             {"iterations", iterations},
             {"seconds", {{"setup", 0.0}, {"solve", seconds}}},
             {"peak_memory", 1 << 20},
-            {"parts",
-             {{"bytes_an_iteration", bytes}, {"ghosts", 1}, {"imbalance", 1.0}, {"by_process", by_process}}}};
+            {"parts", {{"bytes_an_iteration", bytes}, {"ghosts", 1}, {"imbalance", 1.0}, {"by_process", by_process}}}};
 }
 
 TEST(AnalyseProcesses, FindsStrongAndWeakScalingAndTheExponent) {
@@ -193,7 +197,7 @@ TEST(AnalyseProcesses, FindsStrongAndWeakScalingAndTheExponent) {
     set.session = {{"machine", {{"cores", 2}}}};
     for (const auto& [name, size] : {std::pair("a", 1000), std::pair("b", 2010), std::pair("c", 4000)})
         set.problems.push_back({{"problem", name}, {"name", name}, {"size", size}, {"family", "piles"}});
-    set.solves = {row_of("a", 1, 1.0, 10, 0.0),   row_of("b", 1, 2.2, 20, 0.0),   row_of("a", 2, 0.625, 10, 100.0),
+    set.solves = {row_of("a", 1, 1.0, 10, 0.0),    row_of("b", 1, 2.2, 20, 0.0),   row_of("a", 2, 0.625, 10, 100.0),
                   row_of("b", 2, 1.25, 20, 160.0), row_of("c", 2, 2.5, 25, 251.5), row_of("c", 4, 1.5, 25, 300.0)};
     set.solves.push_back(row_of("c", 1, 9.0, 25, 0.0));
     set.solves.back()["cause"] = "time_limit";  // counts nowhere

@@ -13,7 +13,7 @@ namespace {
 
 /// Contacts a process that differ by no more than this factor count as equal: a generated pile has the number of
 /// contacts that was asked for only nearly.
-constexpr double same_load = 1.05;
+constexpr double same_load = 1.1;
 
 struct Run {
     const Json* row;
@@ -98,7 +98,8 @@ std::vector<Runs> grouped(const Runs& runs, const Key& key) {
 }
 
 void by_processes(Runs& runs) {
-    std::stable_sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.processes() < b.processes(); });
+    std::stable_sort(runs.begin(), runs.end(),
+                     [](const Run& a, const Run& b) { return a.processes() < b.processes(); });
 }
 
 /// Of one family, law, solver and tolerance: the sets of runs, one for each number of processes, with equal loads.

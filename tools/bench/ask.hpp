@@ -18,8 +18,8 @@ inline constexpr double start_limit = 60.0;
 /// Seconds for the process to end after its last word.
 inline constexpr double exit_limit = 10.0;
 
-/// Starts a worker with the request, or several by the launcher, of which the first answers. hear: takes a line of its answer, and returns the seconds until the next one must
-/// have come. Throws Error if no process can be started.
+/// Starts a worker with the request, or several by the launcher, of which the first answers. hear: takes a line of its
+/// answer, and returns the seconds until the next one must have come. Throws Error if no process can be started.
 ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear,
                 int processes = 1);
 

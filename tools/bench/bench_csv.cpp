@@ -49,9 +49,8 @@ std::string parts_csv(const Json& row) {
 
 std::string solves_csv(const ResultSet& results) {
     std::string text = "problem,hash,n,m,law,solver,tolerance,status,cause,iterations,setup_s,solve_s,slowest_solve_s";
-    const bool parts = std::any_of(results.solves.begin(), results.solves.end(), [](const Json& row) {
-        return row.contains("parts") && !row.at("parts").is_null();
-    });
+    const bool parts = std::any_of(results.solves.begin(), results.solves.end(),
+                                   [](const Json& row) { return row.contains("parts") && !row.at("parts").is_null(); });
     for (const AnswerMeasure& measure : answer_measures())
         if (measure.brief) (text += ',') += measure.name;
     text += ",peak_memory_bytes,message";

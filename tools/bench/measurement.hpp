@@ -17,10 +17,10 @@ namespace delassus::bench {
 struct WorkerSettings {
     std::filesystem::path command;  ///< the delassus command, absolute
     std::vector<std::filesystem::path> plugin_path;
-    std::uint64_t memory_limit = 0;    ///< bytes of address space for each; 0 for none
-    std::function<bool()> cancelled;   ///< true: end the one that runs with what it has reached. May be empty.
-    std::uint64_t resident_limit = 0;  ///< bytes resident in each; 0 for none
-    std::filesystem::path launcher;    ///< mpirun, absolute; empty where no run has several processes
+    std::uint64_t memory_limit = 0;       ///< bytes of address space for each; 0 for none
+    std::function<bool()> cancelled;      ///< true: end the one that runs with what it has reached. May be empty.
+    std::uint64_t resident_limit = 0;     ///< bytes resident in each; 0 for none
+    std::filesystem::path launcher = {};  ///< mpirun, absolute; empty where no run has several processes
 };
 
 /// Where a worker takes a problem from: a file, or a generator with its parameters (delassus/generate.hpp).
@@ -56,14 +56,14 @@ struct MeasureRequest {
 /// The method's name in reports when it runs in so many processes.
 [[nodiscard]] std::string label_in_parts(const std::string& method, int processes);
 
-/// Runs the solver in a process, or processes, of its own; whatever it does there is a row. on_sample is called as the recorded run
-/// goes; may be empty. Throws Error only if no process can be started at all.
+/// Runs the solver in a process, or processes, of its own; whatever it does there is a row. on_sample is called as the
+/// recorded run goes; may be empty. Throws Error only if no process can be started at all.
 [[nodiscard]] Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
                                   const std::function<void(const CurveSample&)>& on_sample = {});
 
-/// Reads the problem in a process of its own. Throws InputError with its sentence if it cannot be read. processes: 0, or
-/// the number of processes that it is going to be shared among at most: one that is made for that, a generated pile or
-/// an HDF5 file, is then not brought into one process.
+/// Reads the problem in a process of its own. Throws InputError with its sentence if it cannot be read. processes: 0,
+/// or the number of processes that it is going to be shared among at most: one that is made for that, a generated pile
+/// or an HDF5 file, is then not brought into one process.
 [[nodiscard]] ProblemFacts describe(const WorkerSettings& worker, const ProblemSource& problem, const std::string& law,
                                     int processes = 0);
 

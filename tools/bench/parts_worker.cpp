@@ -112,7 +112,9 @@ void measure_in_parts(const Channel& channel, const Json& request, const std::sh
         cost = solver.cost();
         return report;
     };
-    const auto send_figures = [&] { channel.send("processes", {{"processes", figures_json(process_reports(problem, cost))}}); };
+    const auto send_figures = [&] {
+        channel.send("processes", {{"processes", figures_json(process_reports(problem, cost))}});
+    };
 
     settings.record_curve = true;
     bool past_limit = false;

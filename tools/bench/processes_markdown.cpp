@@ -54,7 +54,8 @@ std::string table_of(const Json& list, const char* title, const char* what, cons
 }
 
 std::string traffic_text(const Json& list) {
-    MarkdownTable table({"family", "law", "solver", "tolerance", "processes", "bytes/iteration grow as size^", "sizes"});
+    MarkdownTable table(
+        {"family", "law", "solver", "tolerance", "processes", "bytes/iteration grow as size^", "sizes"});
     int count = 0;
     for (const Json& one : list) {
         if (one.at("fit").is_null()) continue;
@@ -82,8 +83,8 @@ std::string split_text(const Json& list) {
                                             integer_text(point.at("processes"))};
             double all = 0.0;
             for (const auto& [phase, seconds] : phases.items()) all += number_of(seconds);
-            for (const char* phase : {"setup", "products", "projections", "linear_systems", "exchange", "reductions",
-                                      "waiting", "other"})
+            for (const char* phase :
+                 {"setup", "products", "projections", "linear_systems", "exchange", "reductions", "waiting", "other"})
                 row.push_back(phases.contains(phase) && all > 0.0
                                   ? fmt::format("{:.1f}", 100.0 * number_of(phases.at(phase)) / all)
                                   : "—");
@@ -97,13 +98,12 @@ std::string split_text(const Json& list) {
 std::string processes_markdown(const ResultSet& results, const Json& analysis) {
     const Json& processes = analysis.at("processes");
     std::string text = table_of(processes.at("strong"), "Strong scaling: the same problem on more processes",
-                                    "Efficiency: T₁ / (P · T) of setup and solve, and of the solve of an iteration; T₁ "
-                                    "is the run on the fewest processes, P how many times as many there are. MiB: of "
-                                    "the largest process. Bytes: of all processes together.",
-                                    "problem") +
+                                "Efficiency: T₁ / (P · T) of setup and solve, and of the solve of an iteration; T₁ "
+                                "is the run on the fewest processes, P how many times as many there are. MiB: of "
+                                "the largest process. Bytes: of all processes together.",
+                                "problem") +
                        table_of(processes.at("weak"), "Weak scaling: as many contacts on each process",
-                                    "Efficiency: T₁ / T of setup and solve, and of the solve of an iteration.",
-                                    "family") +
+                                "Efficiency: T₁ / T of setup and solve, and of the solve of an iteration.", "family") +
                        traffic_text(processes.at("traffic")) + split_text(processes.at("strong"));
     if (!processes.at("beyond_cores").is_null())
         text += fmt::format(

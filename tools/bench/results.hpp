@@ -35,8 +35,8 @@ struct Repeat {
 /// What one of several processes had of a problem in parts, and what the fastest run cost it.
 struct ProcessFigures {
     std::int64_t n = 0, m = 0, ghosts = 0;
-    std::int64_t peak_memory = 0;                       ///< bytes
-    std::optional<std::int64_t> bytes_sent;             ///< by the solver; empty if it does not tell
+    std::int64_t peak_memory = 0;                        ///< bytes
+    std::optional<std::int64_t> bytes_sent;              ///< by the solver; empty if it does not tell
     std::vector<std::pair<std::string, double>> phases;  ///< s, of setup, solve and the phases of the solve
 };
 

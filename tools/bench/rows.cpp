@@ -84,11 +84,14 @@ Json parts_json(const Measurement& row) {
                         {"seconds", seconds}});
     }
     const bool iterated = row.iterations && *row.iterations > 0;
-    return {{"bytes_an_iteration", told && iterated ? Json(static_cast<double>(bytes) / static_cast<double>(*row.iterations)) : Json(nullptr)},
-            {"ghosts", ghosts},
-            {"imbalance",
-             all > 0 ? Json(static_cast<double>(most) * static_cast<double>(row.by_process.size()) / static_cast<double>(all)) : Json(nullptr)},
-            {"by_process", list}};
+    return {
+        {"bytes_an_iteration",
+         told && iterated ? Json(static_cast<double>(bytes) / static_cast<double>(*row.iterations)) : Json(nullptr)},
+        {"ghosts", ghosts},
+        {"imbalance", all > 0 ? Json(static_cast<double>(most) * static_cast<double>(row.by_process.size()) /
+                                     static_cast<double>(all))
+                              : Json(nullptr)},
+        {"by_process", list}};
 }
 
 }  // namespace

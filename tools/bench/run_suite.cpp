@@ -235,8 +235,8 @@ std::vector<bool> sharing_solvers(const Registry& registry, Suite& suite) {
                                                : solver_info(registry, solver.name).capabilities;
         shares.push_back((capabilities & DELASSUS_CAN_PARTITIONED) != 0);
         if (!shares.back())
-            suite.left_out.push_back(fmt::format(
-                "{} runs in one process only, as it does not take problems in parts", label_of(solver)));
+            suite.left_out.push_back(
+                fmt::format("{} runs in one process only, as it does not take problems in parts", label_of(solver)));
     }
     return shares;
 }

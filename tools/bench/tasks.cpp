@@ -51,8 +51,8 @@ void add_solves(Tasks& tasks, const Suite& suite, const std::string& code, const
                         std::vector<std::string> content = {"solve", facts.hash, law, label_of(suite.solvers[s]),
                                                             digits(tolerance)};
                         if (parts) content.push_back(fmt::format("{} processes", processes));
-                        tasks.solves.push_back({key_of_run(std::move(content), suite, code), p, s, law, tolerance,
-                                                parts ? processes : 0});
+                        tasks.solves.push_back(
+                            {key_of_run(std::move(content), suite, code), p, s, law, tolerance, parts ? processes : 0});
                     }
                 }
         }

@@ -86,9 +86,8 @@ void print_processes(const std::vector<ProcessReport>& processes) {
     // Seconds by phase, where the solver tells them: a table.
     std::vector<delassus_phase> told;
     for (int k = 0; k < DELASSUS_PHASE_COUNT; ++k)
-        if (std::any_of(processes.begin(), processes.end(), [k](const ProcessReport& one) {
-                return one.cost.phases[static_cast<std::size_t>(k)] > 0.0;
-            }))
+        if (std::any_of(processes.begin(), processes.end(),
+                        [k](const ProcessReport& one) { return one.cost.phases[static_cast<std::size_t>(k)] > 0.0; }))
             told.push_back(static_cast<delassus_phase>(k));
     if (told.empty()) return;
     const auto heading = [](std::string name) {

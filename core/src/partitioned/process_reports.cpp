@@ -11,8 +11,8 @@ namespace delassus {
 
 namespace {
 
-constexpr std::array<std::string_view, DELASSUS_PHASE_COUNT> phase_names = {
-    "products", "projections", "linear_systems", "exchange", "reductions", "waiting"};
+constexpr std::array<std::string_view, DELASSUS_PHASE_COUNT> phase_names = {"products", "projections", "linear_systems",
+                                                                            "exchange", "reductions",  "waiting"};
 
 /// A double from every process, to the bit.
 std::vector<double> all_of(const Communicator& run, double value) {
@@ -24,7 +24,8 @@ std::vector<double> all_of(const Communicator& run, double value) {
 
 nlohmann::ordered_json seconds_json(const SolveCost& cost) {
     nlohmann::ordered_json json = {{"setup", json_number(cost.setup)}, {"solve", json_number(cost.solve)}};
-    for (std::size_t k = 0; k < phase_names.size(); ++k) json[std::string(phase_names[k])] = json_number(cost.phases[k]);
+    for (std::size_t k = 0; k < phase_names.size(); ++k)
+        json[std::string(phase_names[k])] = json_number(cost.phases[k]);
     return json;
 }
 

@@ -35,11 +35,12 @@ public:
     class Together {
     public:
         Together(CostMeter& meter, delassus_phase phase)
-            : meter_(meter), phase_(phase), begin_(meter.clock_.is_on() ? Clock::now() : Clock::time_point()),
+            : meter_(meter),
+              phase_(phase),
+              begin_(meter.clock_.is_on() ? Clock::now() : Clock::time_point()),
               span_(meter.clock_, phase) {}
         ~Together() {
-            if (meter_.clock_.is_on())
-                meter_.note(phase_, std::chrono::duration<float>(Clock::now() - begin_).count());
+            if (meter_.clock_.is_on()) meter_.note(phase_, std::chrono::duration<float>(Clock::now() - begin_).count());
         }
         Together(const Together&) = delete;
         Together& operator=(const Together&) = delete;

@@ -63,7 +63,7 @@ public:
         inside_ = false;
         on_ = true;
     }
-    [[nodiscard]] bool is_on() const { return on_; }          ///< whether Spans take the time now
+    [[nodiscard]] bool is_on() const { return on_; }  ///< whether Spans take the time now
     [[nodiscard]] bool is_in_iteration() const { return inside_; }
 
     /// Seconds that were taken as one phase's, inside or outside iterations, were another's.
