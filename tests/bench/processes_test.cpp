@@ -30,7 +30,8 @@ protected:
     /// Why runs on several processes cannot be tested here; empty if they can.
     [[nodiscard]] static std::string missing() {
         if (std::system("mpirun --version > /dev/null 2>&1") != 0) return "there is no mpirun";
-        for (const auto& plugin : Registry().plugins())
+        const Registry registry;
+        for (const auto& plugin : registry.plugins())
             if (plugin.name == "apgd_petsc") return {};
         return "apgd_petsc was not built";
     }

@@ -57,9 +57,9 @@ function splitOption(bars) {
     tooltip: { trigger: "item", confine: true, formatter: ({ seriesName, data, name }) =>
       element("div", {}, element("b", { textContent: name }), element("br"), `${spoken(seriesName)}: ${(100 * data.value).toFixed(1)} %, ${seconds(data.seconds)} s`) },
     legend: { top: 0, itemHeight: 8, data: phaseColours.map(([phase]) => ({ name: phase })), formatter: spoken },
-    grid: { left: 320, right: 24, top: 34, bottom: 44 },
+    grid: { left: 240, right: 24, top: 56, bottom: 44 },
     xAxis: { ...linearAxis("share of the time", 28), min: 0, max: 1 },
-    yAxis: { type: "category", inverse: true, data: bars.map(({ name }) => name), axisTick: { show: false }, axisLabel: { width: 300, overflow: "truncate" } },
+    yAxis: { type: "category", inverse: true, data: bars.map(({ name }) => name), axisTick: { show: false }, axisLabel: { width: 228, overflow: "truncate" } },
     series: phaseColours.map(([phase, color]) => ({ name: phase, type: "bar", stack: "time", color, animation: false, barMaxWidth: 16,
       data: bars.map(({ phases, all }) => ({ value: (phases[phase] || 0) / all, seconds: phases[phase] ?? 0 })) })),
   };
@@ -96,7 +96,7 @@ function writeProcesses() {
   const bars = strong.flatMap((one) => one.points.filter((point) => point.phases).map((point) => ({
     name: `${one.solver}, ${one.problem}, ${short(one.tolerance)}: ${point.processes}`, phases: point.phases,
     all: Object.values(point.phases).reduce((sum, value) => sum + value, 0) || 1 })));
-  if (bars.length > 0) chart("what the time goes to, mean of the processes", 80 + 22 * bars.length, () => splitOption(bars));
+  if (bars.length > 0) chart("what the time goes to, mean of the processes", 110 + 22 * bars.length, () => splitOption(bars));
   section("processes", "Processes",
     element("p", { className: "facts", textContent:
       "One problem in parts on several processes. Efficiency is T₁ / (P T) on the same problem, and T₁ / T with as many contacts on each process; T₁ is the run on the fewest processes, " +
