@@ -7,7 +7,7 @@ namespace delassus::petsc {
 
 namespace {
 
-constexpr std::int64_t many_rows = 2000, stride_of_few = 32;
+constexpr std::int64_t many_rows = 4000, stride_of_few = 32;
 
 /// What PETSc itself, not the libraries behind it, has sent to other processes so far.
 double bytes_of_messages() {

@@ -21,7 +21,7 @@ class CostMeter {
 public:
     explicit CostMeter(MPI_Comm communicator, int processes) : communicator_(communicator), processes_(processes) {}
 
-    /// A solve begins. rows: of all processes together. Where a process has less than two thousand, one iteration in 32
+    /// A solve begins. rows: of all processes together. Where a process has less than four thousand, one iteration in 32
     /// is timed: reading the clock must not count.
     void begin(std::int64_t rows);
     /// What it has cost this process since begin(). Collective.
