@@ -64,6 +64,8 @@ void PartitionedAdmm::find_scale(const sdk::LocalProblemView& problem) {
 sdk::Outcome PartitionedAdmm::solve(const sdk::LocalProblemView& problem, const sdk::Request& request,
                                     sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
+    CostMeter& meter = *system_.processes().meter();
+    meter.begin(problem.raw->m_all);
     // Not the penalty that the last solve ended with: a run that goes on from a checkpoint has to take the same path.
     resolvent_.set_penalty(problem, initial_penalty_);
     system_.load(problem);
@@ -82,8 +84,10 @@ sdk::Outcome PartitionedAdmm::solve(const sdk::LocalProblemView& problem, const 
     if (system_.E().nonZeros() > 0) u += system_.E() * reactions_;
     y_ = lambda_ - resolvent_.penalty() * scale_.cwiseProduct(u);
     if (!run.monitor.check(0, nullptr, reactions_, error)) iterate(run);
+    meter.clock().end_iterations();
     lambda = run.monitor.best();
     x = system_.velocity(problem, lambda);
+    run.monitor.outcome().cost = meter.end();
     return run.monitor.outcome();
 }
 
@@ -94,7 +98,8 @@ void PartitionedAdmm::iterate(Run& run) {
     double accepted = 0.0;  // ‖step‖ of the latest point that was not rejected
     while (true) {
         ++run.iteration;
-        law_.apply(y_, lambda_);
+        system_.processes().meter()->clock().next_iteration();
+        project(y_, lambda_);
         w_ = 2.0 * lambda_ - y_;
         resolvent_.apply(w_, mu_, u_);
         if (judge(run)) return;
@@ -120,6 +125,11 @@ void PartitionedAdmm::iterate(Run& run) {
     }
 }
 
+void PartitionedAdmm::project(const sdk::Vector& y, sdk::Vector& lambda) {
+    const auto span = system_.processes().meter()->span(DELASSUS_PHASE_PROJECTIONS);
+    law_.apply(y, lambda);
+}
+
 // μ̂ and û obey the equations of motion up to rounding, so that their natural error costs no product with N; a claim
 // rests on velocities computed anew. True: stop.
 bool PartitionedAdmm::judge(Run& run) {
@@ -138,7 +148,7 @@ bool PartitionedAdmm::change_penalty(const Run& run) {
                                             [this](const sdk::Vector& v) { return system_.norm(v); });
     if (after == before) return false;
     resolvent_.set_penalty(run.problem, after);
-    law_.apply(plain_, lambda_);
+    project(plain_, lambda_);
     y_ = lambda_ + (after / before) * (plain_ - lambda_);
     anderson_.clear();
     return true;

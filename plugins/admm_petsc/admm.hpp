@@ -34,6 +34,7 @@ private:
     struct Run;
     void find_scale(const sdk::LocalProblemView& problem);
     void iterate(Run& run);
+    void project(const sdk::Vector& y, sdk::Vector& lambda);
     bool judge(Run& run);
     bool change_penalty(const Run& run);
 

@@ -50,6 +50,7 @@ void Resolvent::apply_V(sdk::Vector& v) const {
 
 void Resolvent::set_penalty(const sdk::LocalProblemView& problem, double penalty) {
     if (penalty == penalty_) return;
+    const auto span = system_->processes().meter()->span(DELASSUS_PHASE_LINEAR_SYSTEMS);
     penalty_ = penalty;
     find_V();
     ++factorizations_;

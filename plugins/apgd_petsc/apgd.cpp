@@ -68,6 +68,8 @@ void PartitionedGradient::factorize(const sdk::LocalProblemView& problem) {
 sdk::Outcome PartitionedGradient::solve(const sdk::LocalProblemView& problem, const sdk::Request& request,
                                         sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
+    CostMeter& meter = *scaled_.processes().meter();
+    meter.begin(problem.raw->m_all);
     scaled_.load(problem);
     Run run{problem, scaled_, request, sdk::Monitor(request, stall_iterations_)};
     lambda_.setZero(problem.m);
@@ -77,6 +79,7 @@ sdk::Outcome PartitionedGradient::solve(const sdk::LocalProblemView& problem, co
     for (sdk::Vector* v : {&velocity_, &next_, &next_velocity_, &point_, &point_velocity_, &change_, &product_})
         v->setZero(problem.m);
     iterate(run);
+    meter.clock().end_iterations();
     for (sdk::Vector* v :
          {&lambda_, &velocity_, &next_, &next_velocity_, &point_, &point_velocity_, &change_, &product_})
         v->resize(0);
@@ -88,6 +91,7 @@ sdk::Outcome PartitionedGradient::solve(const sdk::LocalProblemView& problem, co
     }
     scaled_.velocity(problem, lambda, x);
     sdk::Outcome& outcome = run.monitor.outcome();
+    outcome.cost = meter.end();
     if (const int processes = scaled_.processes().size(); processes > 1 && outcome.message.empty()) {
         char text[96];
         std::snprintf(text, sizeof text, "%d processes together send %.3g MB an iteration", processes,
@@ -107,6 +111,7 @@ void PartitionedGradient::iterate(Run& run) {
     step_ = 1.0;
     double theta = 1.0, momentum = 0.0;
     while (true) {
+        scaled_.processes().meter()->clock().next_iteration();
         if (gradient_step(run, momentum)) return;
         if (run.judge(natural_)) return;
 

@@ -247,6 +247,7 @@ void ScaledPart::divide() {
 }
 
 void ScaledPart::begin_product(const sdk::Vector& lambda) const {
+    const auto multiplying = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     work_.setZero();
     for (const Slice& slice : slices_)
         if (slice.inertia.entries() > 0)
@@ -259,6 +260,7 @@ void ScaledPart::begin_product(const sdk::Vector& lambda) const {
 }
 
 void ScaledPart::finish_product(const Part& part, sdk::Vector& result) const {
+    const auto multiplying = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     part.of(result).setZero();
     const Slice& slice = slices_[part.slice];
     double* rows = result.data() + slice.first;
@@ -329,6 +331,7 @@ double ScaledPart::natural_square(const Part& part, const sdk::Vector& lambda, c
 }
 
 double ScaledPart::natural(const sdk::Vector& lambda, const sdk::Vector& velocity) const {
+    const auto projecting = processes().meter()->span(DELASSUS_PHASE_PROJECTIONS);
     double sum = 0.0;
     for (const Part& part : parts_) sum += natural_square(part, lambda, velocity);
     return natural_from(processes().sum(sum));
@@ -336,6 +339,7 @@ double ScaledPart::natural(const sdk::Vector& lambda, const sdk::Vector& velocit
 
 // H⁻¹(a + Dᵀλ), or H⁻¹ a without λ, at all local columns.
 sdk::Vector ScaledPart::local_velocity(const sdk::LocalProblemView& problem, const sdk::Vector* lambda) const {
+    const auto multiplying = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     const Exchange& columns = bodies_.columns();
     sdk::Vector v = sdk::Vector::Zero(columns.size());
     if (lambda) bodies_.transpose_multiply_add(problem, *lambda, v);
@@ -347,6 +351,7 @@ sdk::Vector ScaledPart::local_velocity(const sdk::LocalProblemView& problem, con
 }
 
 double ScaledPart::measured(const sdk::LocalProblemView& problem, const sdk::Vector& lambda) const {
+    const auto multiplying = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     sdk::Vector u = problem.b;
     bodies_.multiply_add(problem, local_velocity(problem, &lambda), u);
     if (has_compliance_) {

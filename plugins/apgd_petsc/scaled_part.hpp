@@ -51,6 +51,7 @@ public:
     [[nodiscard]] std::array<double, First + Second> sums_about_product(const sdk::Vector& lambda, const Before& before,
                                                                         const After& after) const {
         std::array<double, First + Second> total = {};
+        const auto projecting = processes().meter()->span(DELASSUS_PHASE_PROJECTIONS);
         for (const Part& part : parts_) {
             const std::array<double, First> sums = before(part);
             for (std::size_t k = 0; k < First; ++k) total[k] += sums[k];

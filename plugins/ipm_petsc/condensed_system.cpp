@@ -92,6 +92,7 @@ void CondensedSystem::apply_T(sdk::Vector& v) const {
 
 void CondensedSystem::factorize(const sdk::LocalProblemView& problem, const Complementarity& cones,
                                 const sdk::Vector& theta) {
+    const auto span = system_->processes().meter()->span(DELASSUS_PHASE_LINEAR_SYSTEMS);
     theta_ = theta;
     if (problem.raw->n_all == 0) return;
     if (!matrix_.get()) system_->make_matrix(problem, groups_, matrix_);

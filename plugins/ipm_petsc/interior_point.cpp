@@ -82,6 +82,8 @@ void PartitionedInteriorPoint::find_scales(const sdk::LocalProblemView& problem)
 sdk::Outcome PartitionedInteriorPoint::solve(const sdk::LocalProblemView& problem, const sdk::Request& request,
                                              sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
+    CostMeter& meter = *processes().meter();
+    meter.begin(problem.raw->m_all);
     system_.load(problem);
     p_.setOnes(problem.m);
     kkt_.load(system_, problem, p_);  // R
@@ -101,6 +103,7 @@ sdk::Outcome PartitionedInteriorPoint::solve(const sdk::LocalProblemView& proble
         }
         iterate(problem, monitor);
     }
+    meter.clock().end_iterations();
     const bool proof = monitor.outcome().status == DELASSUS_INFEASIBLE;  // the directions along which they diverge
     const sdk::Vector& best = monitor.best();
     if (proof) {
@@ -116,6 +119,7 @@ sdk::Outcome PartitionedInteriorPoint::solve(const sdk::LocalProblemView& proble
     }
     std::string& message = monitor.outcome().message;
     message += (message.empty() ? "" : "; ") + kkt_.description();
+    monitor.outcome().cost = meter.end();
     return monitor.outcome();
 }
 
@@ -172,6 +176,8 @@ void PartitionedInteriorPoint::find_residuals() {
 // τ alone.) The predictor is a forecast only, for which 1e-2 is enough.
 bool PartitionedInteriorPoint::step(const sdk::LocalProblemView& problem) {
     constexpr double predictor_residual = 1e-2, loosest = 1e-3, tightest = 1e-10;
+    // All but products, linear systems and sums is work on the cones.
+    const auto span = processes().meter()->span(DELASSUS_PHASE_PROJECTIONS);
     cones_.scale(theta_);
     kkt_.factorize(problem, cones_, theta_);
     const double equations = std::sqrt(processes().sum(f_.cwiseProduct(kkt_.R()).squaredNorm() + g_.squaredNorm()));
@@ -205,6 +211,7 @@ void PartitionedInteriorPoint::iterate(const sdk::LocalProblemView& problem, sdk
     sdk::Outcome& outcome = monitor.outcome();
     std::int64_t iteration = 0;
     while (true) {
+        processes().meter()->clock().next_iteration();
         find_residuals();
         if (!step(problem)) {
             outcome.status = DELASSUS_STALLED;

@@ -147,7 +147,7 @@ TEST_F(SolveInParts, AutoChoosesWhatCan) {
 
 TEST_F(SolveInParts, ProcessesReport) {
     const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
-    const auto reports = process_reports(part);
+    const auto reports = process_reports(part, {});
     ASSERT_EQ(reports.size(), static_cast<std::size_t>(run->size()));
     std::int64_t columns = 0, rows = 0;
     for (const auto& one : reports) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 
@@ -140,6 +141,39 @@ TEST_P(PartitionedPlugins, AgreeOnSharedProblems) {
         }
     EXPECT_GE(taken, 3);
     EXPECT_GE(compared["solved"], 3);
+}
+
+TEST_P(PartitionedPlugins, TellWhatTheTimeGoesTo) {
+    const PreparedPart part(run, part_of(*run, generate("sphere_pile", {{"contacts", 1000.0}})));
+    const Answer answer = solve(run, part, 1e-4, 500);
+    ASSERT_EQ(answer.report.status, Status::Solved) << answer.report.message;
+    const SolveCost& cost = solvers.at(run.get()).cost();
+    double sum = 0.0;
+    for (int k = 0; k < DELASSUS_PHASE_COUNT; ++k) {
+        const double seconds = cost.phases[static_cast<std::size_t>(k)];
+        EXPECT_GE(seconds, 0.0) << name_of(static_cast<delassus_phase>(k));
+        sum += seconds;
+    }
+    EXPECT_GT(cost.phases[DELASSUS_PHASE_PRODUCTS], 0.0);
+    EXPECT_GT(cost.phases[DELASSUS_PHASE_PROJECTIONS], 0.0);
+    EXPECT_GT(cost.setup, 0.0);
+    EXPECT_LE(sum, 3.0 * cost.solve + 0.01) << "on more processes one iteration stands for 32";
+    if (run->size() == 1) {
+        EXPECT_LE(sum, 1.001 * cost.solve);
+        EXPECT_EQ(cost.bytes_sent, 0);
+        EXPECT_EQ(cost.phases[DELASSUS_PHASE_EXCHANGE] + cost.phases[DELASSUS_PHASE_WAITING], 0.0);
+        return;
+    }
+    std::int64_t bytes = cost.bytes_sent;
+    run->sum(std::span(&bytes, 1));
+    EXPECT_GT(bytes, 0);
+    EXPECT_GT(cost.phases[DELASSUS_PHASE_REDUCTIONS] + cost.phases[DELASSUS_PHASE_WAITING], 0.0);
+    // apgd_petsc knows what one product sends; there is one an iteration, some more, and one reduction of 4 numbers.
+    double told = 0.0;
+    if (std::sscanf(answer.report.message.c_str(), "%*d processes together send %lf MB", &told) != 1) return;
+    const double each = static_cast<double>(bytes) / static_cast<double>(answer.report.iterations);
+    EXPECT_GE(each, 0.99 * 1e6 * told);
+    EXPECT_LE(each, 1.5 * (1e6 * told + 32.0 * run->size()));
 }
 
 // More processes than bodies: most own nothing.

@@ -278,7 +278,8 @@ Json analyse(const ResultSet& results) {
             {"scaling", analyse_scaling(rows, problems)},
             {"orders", analyse_orders(results.simulations, results.references)},
             {"failures", count_failures(rows)},
-            {"recording", recording_ratio(rows)}};
+            {"recording", recording_ratio(rows)},
+            {"processes", analyse_processes(results)}};
 }
 
 }  // namespace delassus::bench

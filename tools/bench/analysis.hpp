@@ -21,4 +21,10 @@ inline constexpr double least_time = 1e-5;
 /// `sizes` has the same for the problems of each decade [from, 10 from) of sizes, and is empty where there is but one.
 [[nodiscard]] Json analyse(const ResultSet& results);
 
+/// The part "processes" of it: {"strong": [{"problem", "size", "law", "solver", "tolerance", "points"}], "weak":
+/// [{"family", "load", …, "points"}], "traffic": [{"family", "processes", …, "points": [[size, bytes]], "fit"}],
+/// "beyond_cores"}. A point: {"problem", "size", "processes", "seconds", "efficiency", "iterations",
+/// "efficiency_of_an_iteration", "bytes_an_iteration", "peak_memory", "ghosts", "imbalance", "phases"}.
+[[nodiscard]] Json analyse_processes(const ResultSet& results);
+
 }  // namespace delassus::bench

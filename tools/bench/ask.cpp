@@ -11,8 +11,14 @@ namespace delassus::bench {
 
 namespace {
 
-/// The beginning of the last message of a worker that had no memory left to answer (process/out_of_memory.hpp).
-constexpr std::string_view no_memory = "delassus: out of memory";
+constexpr std::string_view own_words = "delassus: ";
+
+/// Whether these are the last words of a worker, or one of several, that had no memory left to answer
+/// (process/out_of_memory.hpp, on_all_processes.hpp).
+bool had_no_memory(std::string_view line) {
+    return line.starts_with("delassus: out of memory") ||
+           (line.starts_with(own_words) && line.ends_with("out of memory"));
+}
 
 /// Cuts the output into lines of JSON.
 class Lines {
@@ -37,7 +43,8 @@ private:
 
 }  // namespace
 
-ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear) {
+ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear,
+                int processes) {
     double allowed = loading_limit;
     Lines lines([&](const Json& line) { allowed = hear(line); });
     ChildSettings child;
@@ -46,8 +53,15 @@ ChildResult ask(const WorkerSettings& worker, const Json& request, const std::fu
     child.input = json_text(request);
     // One core, one thread: the libraries behind some plugins would otherwise start threads that share that core.
     child.environment = {{"OMP_NUM_THREADS", "1"}, {"OPENBLAS_NUM_THREADS", "1"}, {"MKL_NUM_THREADS", "1"}};
-    const auto cores = allowed_cores();
-    if (!cores.empty()) child.core = cores.back();
+    if (processes > 1) {
+        // The workers choose their cores themselves.
+        child.is_launcher = true;
+        child.program = worker.launcher;
+        child.arguments = {"-n",      std::to_string(processes), "--oversubscribe", "--bind-to", "none",
+                           "--quiet", worker.command.string(),   "worker"};
+    } else if (const auto cores = allowed_cores(); !cores.empty()) {
+        child.core = cores.back();
+    }
     child.timeout = allowed;
     child.memory_limit = worker.memory_limit;
     child.resident_limit = worker.resident_limit;
@@ -60,10 +74,10 @@ ChildResult ask(const WorkerSettings& worker, const Json& request, const std::fu
 }
 
 void ask_for_facts(const WorkerSettings& worker, const Json& request, const std::string& what,
-                   const std::function<void(const std::string& event, const Json& line)>& hear) {
+                   const std::function<void(const std::string& event, const Json& line)>& hear, int processes) {
     std::string failure;
     bool done = false;
-    const auto child = ask(worker, request, [&](const Json& line) {
+    const auto listen = [&](const Json& line) {
         const std::string event = line.at("event");
         if (event == "failed") {
             failure = line.at("message");
@@ -72,7 +86,8 @@ void ask_for_facts(const WorkerSettings& worker, const Json& request, const std:
         }
         done = done || event == "done";
         return loading_limit;
-    });
+    };
+    const auto child = ask(worker, request, listen, processes);
     if (!failure.empty()) throw InputError(failure);
     if (child.cancelled) throw Error("interrupted while reading " + what);
     if (done) return;
@@ -98,9 +113,9 @@ void judge_end(std::string& status, std::string& message, const ChildResult& chi
         if (!status.empty()) return;
         ended = "cancelled";
         sentence = "interrupted" + where;
-    } else if (const auto line = last_line(child.errors); !done && child.signal == 0 && line.rfind(no_memory, 0) == 0) {
+    } else if (const auto line = last_line(child.errors); !done && child.signal == 0 && had_no_memory(line)) {
         ended = "memory";
-        sentence = line.substr(std::string_view("delassus: ").size()) + where;
+        sentence = line.substr(own_words.size()) + where;
     } else if (child.signal != 0 || !done) {
         ended = "crashed";
         sentence =
@@ -122,8 +137,12 @@ std::string status_of_failure(const std::string& kind) {
 
 std::string last_line(std::string text) {
     while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
-    const auto begin = text.find_last_of('\n');
-    std::string line = begin == std::string::npos ? text : text.substr(begin + 1);
+    // A launcher has more to say after it.
+    auto own = text.rfind("\n" + std::string(own_words));
+    if (own == std::string::npos && text.starts_with(own_words)) own = 0;
+    const auto begin = own == std::string::npos ? text.find_last_of('\n') : own;
+    std::string line = begin == std::string::npos ? text : text.substr(begin + (text[begin] == '\n' ? 1 : 0));
+    if (own != std::string::npos) line = line.substr(0, line.find('\n'));
     return line.size() > 300 ? line.substr(0, 300) : line;
 }
 

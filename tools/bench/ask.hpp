@@ -13,17 +13,20 @@ namespace delassus::bench {
 
 /// Seconds for reading a problem, and for everything else that is not a solver's run.
 inline constexpr double loading_limit = 600.0;
+/// Seconds for a launcher to start processes that do nothing.
+inline constexpr double start_limit = 60.0;
 /// Seconds for the process to end after its last word.
 inline constexpr double exit_limit = 10.0;
 
-/// Starts a worker with the request. hear: takes a line of its answer, and returns the seconds until the next one must
-/// have come. Throws Error if no process can be started.
-ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear);
+/// Starts a worker with the request, or several by the launcher, of which the first answers. hear: takes a line of its
+/// answer, and returns the seconds until the next one must have come. Throws Error if no process can be started.
+ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear,
+                int processes = 1);
 
 /// For a request that is answered by facts, without runs. what: their subject, for messages. Throws InputError with the
 /// worker's sentence, or that the process ended; Error if it was interrupted.
 void ask_for_facts(const WorkerSettings& worker, const Json& request, const std::string& what,
-                   const std::function<void(const std::string& event, const Json& line)>& hear);
+                   const std::function<void(const std::string& event, const Json& line)>& hear, int processes = 1);
 
 /// Sets the status by how the process of a run ended, if that tells more than its output did, and appends a sentence to
 /// the message. status: of its result, empty if it gave none. done: it said that it had finished. reached: how far it
@@ -34,7 +37,7 @@ void judge_end(std::string& status, std::string& message, const ChildResult& chi
 /// The status of a run whose worker said that it failed: memory, input (bad input, refused with a sentence) or error.
 [[nodiscard]] std::string status_of_failure(const std::string& kind);
 
-/// The last line of what was written to standard error: often the cause.
+/// Of what was written to standard error the last line of Delassus' own, or else the last line: often the cause.
 [[nodiscard]] std::string last_line(std::string text);
 
 /// Adds the sentence to the message, after a semicolon.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 
 #include "bench/bench_writers.hpp"
 #include "bench/csv_text.hpp"
@@ -24,13 +25,40 @@ std::string name_in(const std::vector<Json>& rows, const char* key, const Json& 
     return {};
 }
 
+/// Phases whose seconds results.csv has; the mean over the processes.
+constexpr std::array phases = {"products", "projections", "linear_systems", "exchange", "reductions", "waiting"};
+
+/// The columns on processes.
+std::string parts_csv(const Json& row) {
+    if (!row.contains("method")) return std::string(5 + phases.size(), ',');
+    std::string text = fmt::format(",{},{}", text_in(row, "method"), integer_in(row, "processes"));
+    const Json& parts = row.at("parts");
+    if (parts.is_null()) return text + std::string(3 + phases.size(), ',');
+    text += fmt::format(",{},{},{}", csv_number(number_of(parts.at("bytes_an_iteration"))), integer_in(parts, "ghosts"),
+                        csv_number(number_of(parts.at("imbalance"))));
+    const Json& processes = parts.at("by_process");
+    for (const char* phase : phases) {
+        double sum = 0.0;
+        for (const Json& one : processes) sum += number_of(one.at("seconds").at(phase));
+        text += ',' + csv_number(sum / static_cast<double>(processes.size()));
+    }
+    return text;
+}
+
 }  // namespace
 
 std::string solves_csv(const ResultSet& results) {
     std::string text = "problem,hash,n,m,law,solver,tolerance,status,cause,iterations,setup_s,solve_s,slowest_solve_s";
+    const bool parts = std::any_of(results.solves.begin(), results.solves.end(),
+                                   [](const Json& row) { return row.contains("parts") && !row.at("parts").is_null(); });
     for (const AnswerMeasure& measure : answer_measures())
         if (measure.brief) (text += ',') += measure.name;
-    text += ",peak_memory_bytes,message\r\n";
+    text += ",peak_memory_bytes,message";
+    if (parts) {
+        text += ",method,processes,bytes_an_iteration,ghosts,imbalance";
+        for (const char* phase : phases) text += fmt::format(",{}_s", phase);
+    }
+    text += "\r\n";
     for (const Json& row : results.solves) {
         std::string n, m;
         for (const Json& problem : results.problems)
@@ -53,7 +81,8 @@ std::string solves_csv(const ResultSet& results) {
             text += ',';
             if (!error.is_null()) text += csv_number(number_of(error.at(std::string(measure.name))));
         }
-        text += fmt::format(",{},{}\r\n", integer_in(row, "peak_memory"), text_in(row, "message"));
+        text += fmt::format(",{},{}", integer_in(row, "peak_memory"), text_in(row, "message"));
+        text += parts ? parts_csv(row) + "\r\n" : "\r\n";
     }
     return text;
 }

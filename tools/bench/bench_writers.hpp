@@ -21,6 +21,10 @@ namespace delassus::bench {
 /// The part of summary.md on axes: where each method breaks along each. Empty without cells.
 [[nodiscard]] std::string axes_markdown(const ResultSet& results);
 
+/// The part of summary.md on runs in parts: strong and weak scaling, what is sent, what the time goes to. Empty without
+/// such runs.
+[[nodiscard]] std::string processes_markdown(const ResultSet& results, const Json& analysis);
+
 /// report.html, whole in one file. Throws InputError if a part of the page is missing (support/html_page.hpp).
 [[nodiscard]] std::string bench_page(const ResultSet& results, const Json& analysis);
 

@@ -1,12 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace delassus::bench {
+
+/// With a unit that suits it; a dash where it is not known.
+inline std::string seconds_text(double value) {
+    if (!std::isfinite(value)) return "—";
+    if (value < 1e-3) return fmt::format("{:.3g} µs", value * 1e6);
+    if (value < 1.0) return fmt::format("{:.3g} ms", value * 1e3);
+    return fmt::format("{:.3g} s", value);
+}
 
 /// A Markdown table with columns padded, so that it is a table on a terminal too.
 class MarkdownTable {

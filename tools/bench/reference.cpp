@@ -148,7 +148,8 @@ Reference find_reference(const WorkerSettings& worker, const SuiteReferences& re
         row["message"] = "no second solver reached 1e-10, so nothing confirms it";
     }
     make_folder(cache);
-    const Solution solution = read_solution(first->solution, facts.n, facts.m);
+    const Solution solution =
+        read_solution(first->solution, static_cast<std::int32_t>(facts.n), static_cast<std::int32_t>(facts.m));
     write_solution(solution, json_text(row, 1) + "\n", folder);
     return {folder, row};
 }

@@ -21,7 +21,7 @@ inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 /// What the table's head says of a problem.
 struct ProblemFacts {
     std::string name, law, structure;
-    std::int32_t n = 0, m = 0;
+    std::int64_t n = 0, m = 0;
     std::vector<std::pair<std::string, std::int64_t>> cones;  ///< blocks of each kind that occurs
     std::string hash = {};                                    ///< of everything but names and law, 16 digits
     std::string source = {};                                  ///< where it came from, as the problem says
@@ -32,9 +32,20 @@ struct Repeat {
     double setup = 0.0, solve = 0.0;
 };
 
+/// What one of several processes had of a problem in parts, and what the fastest run cost it.
+struct ProcessFigures {
+    std::int64_t n = 0, m = 0, ghosts = 0;
+    std::int64_t peak_memory = 0;                        ///< bytes
+    std::optional<std::int64_t> bytes_sent;              ///< by the solver; empty if it does not tell
+    std::vector<std::pair<std::string, double>> phases;  ///< s, of setup, solve and the phases of the solve
+};
+
 /// One solver on one problem.
 struct Measurement {
-    std::string label;  ///< "pgs" or "pgs(omega=1.2)"
+    std::string label;   ///< "pgs", "pgs(omega=1.2)" or "apgd_petsc, 2 processes"
+    std::string method;  ///< the label without the processes
+    int processes = 1;
+    std::vector<ProcessFigures> by_process;  ///< by rank; empty where the problem was not in parts
     std::string solver, version;
     OptionTexts options;  ///< those that were chosen
     /// The name of a Status, or unsupported (message: the refusal), crashed, hung (killed), input (refused as bad

@@ -60,6 +60,42 @@ Json problem_row(const ProblemFacts& facts, const SuiteProblem& problem) {
             {"family", problem.family.empty() ? Json(nullptr) : Json(problem.family)}};
 }
 
+namespace {
+
+/// What the processes of a problem in parts had, and what it cost them; null where it was whole.
+Json parts_json(const Measurement& row) {
+    if (row.by_process.empty()) return nullptr;
+    std::int64_t ghosts = 0, most = 0, all = 0, bytes = 0;
+    bool told = true;
+    Json list = Json::array();
+    for (const ProcessFigures& one : row.by_process) {
+        ghosts += one.ghosts;
+        most = std::max(most, one.n + one.m);
+        all += one.n + one.m;
+        told = told && one.bytes_sent;
+        bytes += one.bytes_sent.value_or(0);
+        Json seconds = Json::object();
+        for (const auto& [phase, value] : one.phases) seconds[phase] = json_number(value);
+        list.push_back({{"n", one.n},
+                        {"m", one.m},
+                        {"ghosts", one.ghosts},
+                        {"peak_memory", one.peak_memory},
+                        {"bytes_sent", one.bytes_sent ? Json(*one.bytes_sent) : Json(nullptr)},
+                        {"seconds", seconds}});
+    }
+    const bool iterated = row.iterations && *row.iterations > 0;
+    return {
+        {"bytes_an_iteration",
+         told && iterated ? Json(static_cast<double>(bytes) / static_cast<double>(*row.iterations)) : Json(nullptr)},
+        {"ghosts", ghosts},
+        {"imbalance", all > 0 ? Json(static_cast<double>(most) * static_cast<double>(row.by_process.size()) /
+                                     static_cast<double>(all))
+                              : Json(nullptr)},
+        {"by_process", list}};
+}
+
+}  // namespace
+
 Json solve_row(const std::string& key, const std::string& problem, const std::string& law, double tolerance,
                const Measurement& row) {
     Json json = {{"kind", "solve"},       {"key", key}, {"problem", problem}, {"law", law}, {"tolerance", tolerance},
@@ -67,13 +103,18 @@ Json solve_row(const std::string& key, const std::string& problem, const std::st
     json.update(json_of(row));
     json["seconds"]["recorded"] = {json_number(row.recorded.setup), json_number(row.recorded.solve)};
     json["stages"] = row.stages;
+    json["method"] = row.method;
+    json["processes"] = row.processes;
+    json["parts"] = parts_json(row);
     return json;
 }
 
 Json skipped_row(const std::string& key, const std::string& problem, const std::string& law, double tolerance,
-                 const SolverConfig& solver, const RunEnd& end, double looser) {
+                 const SolverConfig& solver, int processes, const RunEnd& end, double looser) {
     Measurement row;
-    row.label = label_of(solver);
+    row.method = label_of(solver);
+    row.processes = processes;
+    row.label = label_in_parts(row.method, processes);
     row.solver = solver.name;
     row.options = solver.options;
     row.status = end.status;

@@ -32,7 +32,8 @@ inline constexpr int rows_version = 1;
                              double tolerance, const Measurement& row);
 /// The row of a run that was left out, as the same solver with the same options ended that way at a looser tolerance.
 [[nodiscard]] Json skipped_row(const std::string& key, const std::string& problem, const std::string& law,
-                               double tolerance, const SolverConfig& solver, const RunEnd& end, double looser);
+                               double tolerance, const SolverConfig& solver, int processes, const RunEnd& end,
+                               double looser);
 /// as_is, forced: of the scene as it is, and of the same with nothing left out, whose end is compared with the
 /// former's.
 [[nodiscard]] Json leaving_out_row(const std::string& key, const SuiteScene& scene, const SceneFacts& facts,

@@ -63,6 +63,7 @@ Json session_row(const RunPlan& plan, const Tasks& tasks, const std::vector<Cell
               {"memory_limit", suite.memory_limit > 0.0 ? Json(suite.memory_limit) : Json(nullptr)},
               {"max_iterations", suite.max_iterations},
               {"repeats", suite.repeats},
+              {"processes", suite.processes},
               {"skip_after_failure", suite.skip_after_failure}}},
             {"solvers", solvers},
             {"left_out", suite.left_out},
@@ -119,12 +120,14 @@ private:
         const SolveTask* before = nullptr;
         for (std::size_t k = index; k-- > 0 && !before;) {
             const SolveTask& other = tasks_.solves[k];
-            if (other.problem != task.problem || other.law != task.law || other.solver != task.solver) break;
+            if (other.problem != task.problem || other.law != task.law || other.solver != task.solver ||
+                other.processes != task.processes)
+                break;
             if (file_.has(other.key) && !file_.end_of(other.key).skipped) before = &other;
         }
         if (!before || !fails_again(file_.end_of(before->key).cause)) return false;
         file_.add(skipped_row(task.key, tasks_.problems[task.problem].facts.hash, task.law, task.tolerance, solver,
-                              file_.end_of(before->key), before->tolerance));
+                              std::max(1, task.processes), file_.end_of(before->key), before->tolerance));
         ++counts_.done;
         return true;
     }
@@ -141,13 +144,15 @@ private:
             if (!reference_->row.is_null()) file_.add(reference_->row);
         }
         const SolverConfig& solver = plan_.suite.solvers[task.solver];
-        begin(fmt::format("{}  {}  {:g}", problem.name, label_of(solver), task.tolerance));
+        begin(fmt::format("{}  {}  {:g}", problem.name, label_in_parts(label_of(solver), task.processes),
+                          task.tolerance));
         MeasureRequest request;
         request.problem = problem.source;
         request.solver = solver;
         request.settings = {task.tolerance, plan_.suite.time_limit, plan_.suite.max_iterations, plan_.suite.repeats,
                             task.law};
         request.reference = reference_->place;
+        request.processes = task.processes;
         const Measurement row = measure(plan_.worker, request, listener_.on_sample);
         if (stopped()) return;  // what was interrupted is run again
         if (libraries_.insert(solver.name).second && !row.libraries.empty())
@@ -220,6 +225,22 @@ private:
 
 }  // namespace
 
+/// By solver, whether it takes problems in parts. One that does not is said to be left out beyond one process.
+std::vector<bool> sharing_solvers(const Registry& registry, Suite& suite) {
+    if (!suite.in_parts()) return std::vector<bool>(suite.solvers.size(), false);
+    std::vector<bool> shares;
+    for (const auto& solver : suite.solvers) {
+        const std::uint64_t capabilities = is_library_path(solver.name)
+                                               ? registry.load(solver.name)->info().capabilities
+                                               : solver_info(registry, solver.name).capabilities;
+        shares.push_back((capabilities & DELASSUS_CAN_PARTITIONED) != 0);
+        if (!shares.back())
+            suite.left_out.push_back(
+                fmt::format("{} runs in one process only, as it does not take problems in parts", label_of(solver)));
+    }
+    return shares;
+}
+
 std::string code_hash(const Registry& registry, const fs::path& command) {
     std::set<fs::path> files = {command};
     const fs::path library = library_directory();
@@ -246,13 +267,16 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
     if (plan.suite.memory_limit > 0.0)
         plan.worker.resident_limit = static_cast<std::uint64_t>(plan.suite.memory_limit * 1024.0 * 1024.0);
 
+    const std::vector<bool> shares = sharing_solvers(registry, plan.suite);
+    if (plan.suite.processes.back() > 1) plan.worker.launcher = find_launcher(plan.worker, plan.suite.processes.back());
+
     std::error_code failure;
     fs::create_directories(plan.output, failure);
     if (failure)
         throw InputError(fmt::format("the folder {} cannot be made: {}", plan.output.string(), failure.message()));
     ResultsFile file(plan.output);
     add_dumped_problems(plan.worker, plan.output / "problems", plan.suite);
-    const Tasks tasks = make_tasks(plan.suite, plan.worker, code);
+    const Tasks tasks = make_tasks(plan.suite, plan.worker, code, shares);
     const std::vector<CellTask> cells = make_cells(plan.suite, code);
     if (tasks.solves.empty() && tasks.simulations.empty() && tasks.leaving_out.empty() && cells.empty())
         throw InputError(fmt::format("{} asks for no run: {}", plan.suite.file.string(),

@@ -34,6 +34,28 @@ std::vector<double> positive_list(const Source& source, const YAML::Node& node, 
     return numbers;
 }
 
+std::vector<int> process_counts(const Source& source, const YAML::Node& node) {
+    constexpr int most = 4096;
+    std::vector<int> counts;
+    const auto add = [&](const YAML::Node& item) {
+        const int count = value<int>(source, item, "processes", "a whole number");
+        if (count < 1 || count > most)
+            source.refuse(item, fmt::format("\"processes\" must lie between 1 and {}", most));
+        counts.push_back(count);
+    };
+    if (node.IsScalar()) {
+        add(node);
+    } else {
+        if (!node.IsSequence() || node.size() == 0)
+            source.refuse(node, "\"processes\" must be a whole number or a list of whole numbers");
+        for (const auto& item : node) add(item);
+    }
+    std::sort(counts.begin(), counts.end());
+    if (std::adjacent_find(counts.begin(), counts.end()) != counts.end())
+        source.refuse(node, "a number of \"processes\" is listed twice");
+    return counts;
+}
+
 void each(const Source& source, const YAML::Node& list, std::string_view key, const Handler& handler) {
     if (!list.IsSequence()) source.refuse(list, fmt::format("\"{}\" must be a list", key));
     for (const auto& item : list) handler(item);
@@ -192,6 +214,7 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
                   std::sort(tolerances.rbegin(), tolerances.rend());
                   tolerances.erase(std::unique(tolerances.begin(), tolerances.end()), tolerances.end());
               }},
+             {"processes", [&](const YAML::Node& n) { suite.processes = process_counts(source, n); }},
              {"skip_after_failure",
               [&](const YAML::Node& n) {
                   suite.skip_after_failure = value<bool>(source, n, "skip_after_failure", "true or false");

@@ -58,6 +58,8 @@ struct Suite {
     std::vector<SolverConfig> solvers;
     std::vector<std::string> laws = {""};                 ///< "" is each problem's own
     std::vector<double> tolerances = {1e-3, 1e-6, 1e-9};  ///< the loosest first
+    std::vector<int> processes = {1};  ///< of each run of a solver, ascending; {1}: no problem is in parts
+    [[nodiscard]] bool in_parts() const { return processes != std::vector<int>{1}; }
     bool skip_after_failure = true;  ///< a solver that failed on a problem is not run on it to a tighter tolerance
     std::vector<SuiteScene> scenes;
     std::vector<SuiteScene> leaving_out;           ///< run as they are, and with nothing left out

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
+#include <sstream>
 
 #include "config/sections.hpp"
 #include "delassus/generate.hpp"
+#include "delassus/generate_partitioned.hpp"
 #include "delassus/timestepper.hpp"
 
 namespace delassus::bench {
@@ -135,6 +137,24 @@ void read_problem_item(const Source& source, const YAML::Node& item, Suite& suit
               }},
              {"end", [&](const YAML::Node& n) { dump.scene.end = value<double>(source, n, "end", "a time in s"); }}});
     }
+    if (is_generated_problem(path)) {  // "pile:contacts=…", as for `delassus solve`
+        SuiteProblem problem;
+        problem.source.generator = "pile";
+        problem.name = name.empty() ? path : name;
+        problem.family = family;
+        const std::string rest = path.size() > 5 ? path.substr(5) : "";
+        std::istringstream pairs(rest);
+        for (std::string pair; std::getline(pairs, pair, ',');) {
+            const auto equals = pair.find('=');
+            if (equals == std::string::npos)
+                source.refuse(item, fmt::format("\"{}\" in \"{}\" must be KEY=VALUE", pair, path));
+            const std::string key = pair.substr(0, equals);
+            problem.source.parameters[key] = read_number(source, item, key, pair.substr(equals + 1));
+        }
+        check_generator(source, item, problem.source);
+        suite.problems.push_back(std::move(problem));
+        return;
+    }
     const int kinds = !path.empty() + !folder.empty() + !kind.empty() + !scene.empty();
     if (kinds != 1)
         source.refuse(item, "a problem of the suite has one of \"path\", \"folder\", \"generate\" and \"scene\"");
@@ -165,7 +185,7 @@ void read_problem_item(const Source& source, const YAML::Node& item, Suite& suit
     }
     if (!path.empty()) {
         if (!is_problem(file))
-            source.refuse(item, fmt::format("{} is neither a problem folder nor an FCLib file", file.string()));
+            source.refuse(item, fmt::format("{} is neither a problem folder nor an HDF5 file", file.string()));
         suite.problems.push_back({file, name, family});
         return;
     }

@@ -13,13 +13,6 @@ namespace delassus::bench {
 
 namespace {
 
-std::string seconds_text(double value) {
-    if (!std::isfinite(value)) return "—";
-    if (value < 1e-3) return fmt::format("{:.3g} µs", value * 1e6);
-    if (value < 1.0) return fmt::format("{:.3g} ms", value * 1e3);
-    return fmt::format("{:.3g} s", value);
-}
-
 std::string error_text(const Json& value) {
     return value.is_number() ? fmt::format("{:.1e}", value.get<double>()) : "—";
 }
@@ -136,7 +129,7 @@ std::string fastest_text(const ResultSet& results) {
     for (const auto& [key, any] : asked) {
         std::string rows = "—";
         for (const Json& problem : results.problems)
-            if (problem.at("problem") == any->at("problem")) rows = std::to_string(problem.at("m").get<int>());
+            if (problem.at("problem") == any->at("problem")) rows = std::to_string(problem.at("m").get<std::int64_t>());
         const std::string name = name_of_hash(results.problems, "problem", any->at("problem"));
         const Json* row = best.contains(key) ? best.at(key) : nullptr;
         if (!row) {
@@ -263,12 +256,14 @@ std::string summary_markdown(const ResultSet& results, const Json& analysis) {
         text +=
             fmt::format("The machine was busy when this began (load {:.1f}): times are longer than on a quiet one.\n",
                         machine.at("load").get<double>());
+    for (const Json& sentence : session.at("left_out"))
+        text += fmt::format("Left out: {}.\n", sentence.get<std::string>());
     text += '\n';
     text += axes_markdown(results);
     for (const Json& one : analysis.at("classes"))
         if (one.at("name") != "all") text += class_text(one) + sizes_text(one);
     text += fastest_text(results) + failures_text(analysis) + scaling_text(analysis) +
-            stepping_text(results, analysis) + leaving_out_text(results);
+            processes_markdown(results, analysis) + stepping_text(results, analysis) + leaving_out_text(results);
     if (!results.solves.empty())
         text += fmt::format(
             "Mean: shifted geometric mean of setup and solve (shift {:g} s) over the problems that any solver solved; "

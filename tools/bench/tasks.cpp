@@ -32,7 +32,7 @@ std::string unique_name(const std::string& name, const std::vector<TaskProblem>&
     return unique;
 }
 
-void add_solves(Tasks& tasks, const Suite& suite, const std::string& code) {
+void add_solves(Tasks& tasks, const Suite& suite, const std::string& code, const std::vector<bool>& shares) {
     for (std::size_t p = 0; p < tasks.problems.size(); ++p) {
         const ProblemFacts& facts = tasks.problems[p].facts;
         const bool lawful = std::any_of(facts.cones.begin(), facts.cones.end(), [](const auto& cone) {
@@ -44,11 +44,17 @@ void add_solves(Tasks& tasks, const Suite& suite, const std::string& code) {
             const std::string law = chosen.empty() || !lawful ? facts.law : chosen;
             if (!laws.insert(law).second) continue;
             for (std::size_t s = 0; s < suite.solvers.size(); ++s)
-                for (const double tolerance : suite.tolerances)
-                    tasks.solves.push_back(
-                        {key_of_run({"solve", facts.hash, law, label_of(suite.solvers[s]), digits(tolerance)}, suite,
-                                    code),
-                         p, s, law, tolerance});
+                for (const int processes : suite.processes) {
+                    if (processes > 1 && !shares[s]) continue;
+                    const bool parts = suite.in_parts() && shares[s];
+                    for (const double tolerance : suite.tolerances) {
+                        std::vector<std::string> content = {"solve", facts.hash, law, label_of(suite.solvers[s]),
+                                                            digits(tolerance)};
+                        if (parts) content.push_back(fmt::format("{} processes", processes));
+                        tasks.solves.push_back(
+                            {key_of_run(std::move(content), suite, code), p, s, law, tolerance, parts ? processes : 0});
+                    }
+                }
         }
     }
 }
@@ -92,11 +98,12 @@ void add_simulations(Tasks& tasks, const Suite& suite, const std::string& code) 
 
 }  // namespace
 
-Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::string& code) {
+Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::string& code,
+                 const std::vector<bool>& shares) {
     Tasks tasks;
     std::set<std::string> known;
     for (const auto& problem : suite.problems) {
-        ProblemFacts facts = describe(worker, problem.source, {});
+        ProblemFacts facts = describe(worker, problem.source, {}, suite.in_parts() ? suite.processes.back() : 0);
         if (!known.insert(facts.hash + facts.law).second) continue;
         const std::string name = unique_name(problem.name.empty() ? facts.name : problem.name, tasks.problems);
         tasks.problems.push_back({problem.source, name, problem.family, std::move(facts)});
@@ -107,7 +114,7 @@ Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::st
         const std::string key = key_of_run({"leaving out", facts.hash, digits(facts.end)}, suite, code);
         tasks.leaving_out.push_back({key, scene, std::move(facts)});
     }
-    add_solves(tasks, suite, code);
+    add_solves(tasks, suite, code, shares);
     add_simulations(tasks, suite, code);
     return tasks;
 }

@@ -20,6 +20,7 @@ struct SolveTask {
     std::size_t problem = 0, solver = 0;  ///< indices
     std::string law;                      ///< in force, never empty
     double tolerance = 0.0;
+    int processes = 0;  ///< as of MeasureRequest
 };
 
 struct TaskScene {
@@ -43,13 +44,15 @@ struct LeavingOutTask {
 
 struct Tasks {
     std::vector<TaskProblem> problems;  ///< each content once, whatever names it has
-    std::vector<SolveTask> solves;      ///< by problem, law, solver, tolerance
+    std::vector<SolveTask> solves;      ///< by problem, law, solver, processes, tolerance
     std::vector<TaskScene> scenes;
     std::vector<SimulationTask> simulations;  ///< by scene, timestepper, solver, step
     std::vector<LeavingOutTask> leaving_out;
 };
 
 /// Reads every problem and plans every scene in processes of their own. code: hash of the program. Throws InputError.
-[[nodiscard]] Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::string& code);
+/// shares: by solver, whether it takes problems in parts; the others run in one process only.
+[[nodiscard]] Tasks make_tasks(const Suite& suite, const WorkerSettings& worker, const std::string& code,
+                               const std::vector<bool>& shares);
 
 }  // namespace delassus::bench

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -11,9 +12,10 @@
 
 #include "bench/channel.hpp"
 #include "bench/json_text.hpp"
+#include "bench/parts_worker.hpp"
 #include "bench/scene_worker.hpp"
+#include "bench/worker_requests.hpp"
 #include "delassus/error.hpp"
-#include "delassus/generate.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/solver_config.hpp"
 #include "problem/cone_kinds.hpp"
@@ -28,14 +30,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Runs longer than this are repeated once only.
-constexpr double long_run = 5.0;
-
 PreparedProblem read(const Json& request) {
-    const Json& source = request.at("problem");
-    Problem problem = source.is_string() ? read_problem(source.get<std::string>())
-                                         : generate(source.at("generate").get<std::string>(),
-                                                    source.at("parameters").get<std::map<std::string, double>>());
+    Problem problem = read_source(request.at("problem"));
     if (const auto law = request.value("law", std::string()); !law.empty()) problem.law = law_of(law);
     return PreparedProblem(std::move(problem));
 }
@@ -69,42 +65,10 @@ void send_facts(const Channel& channel, const PreparedProblem& prepared) {
                              {"source", problem.source}});
 }
 
-SolverConfig solver_of(const Json& request) {
-    SolverConfig config;
-    config.name = request.at("solver");
-    config.options = request.at("options").get<OptionTexts>();
-    return config;
-}
-
-SolveSettings settings_of(const Json& request) {
-    SolveSettings settings;
-    settings.tolerance = request.at("tolerance");
-    settings.max_iterations = request.at("max_iterations");
-    settings.time_limit = request.at("time_limit");
-    settings.cancelled = interrupted;
-    return settings;
-}
-
-/// Whether running again would say more about the time.
-bool worth_repeating(Status status) {
-    switch (status) {
-        case Status::Solved:
-        case Status::IterationLimit:
-        case Status::Stalled:
-        case Status::Infeasible:
-        case Status::FalseClaim:
-            return true;
-        default:
-            return false;
-    }
-}
-
 void measure(const Channel& channel, const Json& request) {
     const PreparedProblem problem = read(request);
     send_facts(channel, problem);
-    std::vector<fs::path> folders;
-    for (const auto& folder : request.at("plugin_path")) folders.emplace_back(folder.get<std::string>());
-    const Registry registry(folders);
+    const Registry registry(plugin_path_of(request));
     const SolverConfig config = solver_of(request);
     SolveSettings settings = settings_of(request);
 
@@ -121,9 +85,7 @@ void measure(const Channel& channel, const Json& request) {
         // A solver that does not stop when told falls silent here, and counts as hung.
         if (past_limit) return;
         past_limit = sample.seconds >= settings.time_limit;
-        channel.send("sample", {{"iteration", sample.iteration},
-                                {"seconds", json_number(sample.seconds)},
-                                {"natural", json_number(sample.natural)}});
+        channel.send("sample", sample_json(sample));
     };
     Solution solution;
     SolveReport report;
@@ -141,34 +103,15 @@ void measure(const Channel& channel, const Json& request) {
             problem.meter().velocity(solution.x, read_solution(folder, problem.problem().n(), problem.problem().m()).x);
     double speed = 0.0;  // NaN wherever an entry is
     for (const double entry : solution.x) speed = std::isnan(entry) ? entry : std::max(speed, std::abs(entry));
-    Json stages = Json::array();
-    for (const StageReport& stage : report.stages) stages.push_back(stage.solver);
-    const CurveSample last = report.curve.empty() ? CurveSample{} : report.curve.back();
-    channel.send("recorded", {{"solver", report.solver},
-                              {"version", report.version},
-                              {"status", name_of(report.status)},
-                              {"message", report.message},
-                              {"iterations", report.iterations},
-                              {"setup", report.seconds_setup},
-                              {"solve", report.seconds_solve},
-                              {"analyses", report.analyses},
-                              {"factorizations", report.factorizations},
-                              {"error", errors_json(report.error)},
-                              {"velocity", json_number(velocity)},
-                              {"speed", json_number(speed)},
-                              {"stages", stages},
-                              {"last", {last.iteration, json_number(last.seconds), json_number(last.natural)}}});
+    channel.send("recorded", recorded_json(report, velocity, speed));
 
     settings.record_curve = false;
     settings.on_sample = {};
-    int repeats = worth_repeating(report.status) ? request.at("repeats").get<int>() : 0;
-    if (report.seconds_setup + report.seconds_solve > long_run) repeats = std::min(repeats, 1);
+    const int repeats = repeats_of(request, report);
     for (int k = 0; k < repeats && !interrupted(); ++k) {
         const SolveReport again = run(solution);
         if (again.status == Status::Cancelled) break;
-        channel.send(
-            "repeat",
-            {{"status", name_of(again.status)}, {"setup", again.seconds_setup}, {"solve", again.seconds_solve}});
+        channel.send("repeat", repeat_json(again));
     }
 }
 
@@ -202,16 +145,29 @@ std::set<std::string> mapped_libraries() {
 
 }  // namespace
 
-int run_worker(const std::string& request_text, int descriptor) {
-    const Channel channel(descriptor);
+int answer(const std::string& request_text, const Channel& channel, const std::shared_ptr<const Communicator>& run,
+           const std::function<void(const std::string& sentence)>& failed) {
     install_interrupt_handler();
     StdoutGuard guard;
-    const char* kind = "error";
-    std::string message;
+    const auto fail = [&](const char* kind, const std::string& message) {
+        failed(message);
+        channel.send("failed", {{"kind", kind}, {"message", message}});
+        failed(message);
+        return 2;
+    };
     try {
         const Json request = parse_ordered_json(request_text);
         const std::string task = request.at("do");
-        if (task == "describe") {
+        const bool parts = request.value("parts", false);
+        if (task == "measure" && parts) {
+            measure_in_parts(channel, request, run);
+        } else if (task == "describe" && parts) {
+            describe_in_parts(channel, request, run);
+        } else if (task == "ping") {
+            static_cast<void>(run->all(run->rank()));
+        } else if (run->size() > 1) {
+            throw InputError("several workers cannot do \"" + task + "\"");
+        } else if (task == "describe") {
             send_facts(channel, read(request));
         } else if (task == "measure") {
             measure(channel, request);
@@ -224,19 +180,24 @@ int run_worker(const std::string& request_text, int descriptor) {
         } else {
             throw InputError("a worker cannot do \"" + task + "\"");
         }
-        channel.send("done", {{"printed", guard.release()}, {"libraries", mapped_libraries()}});
+        std::array<std::int64_t, 1> printed = {static_cast<std::int64_t>(guard.release())};
+        run->sum(printed);
+        channel.send("done", {{"printed", printed[0]}, {"libraries", mapped_libraries()}});
         return 0;
     } catch (const InputError& error) {
-        kind = "input";
-        message = error.what();
+        return fail("input", error.what());
     } catch (const std::bad_alloc&) {
+        failed("out of memory");
         channel.send_out_of_memory();
+        failed("out of memory");
         return 2;
     } catch (const std::exception& error) {
-        message = error.what();
+        return fail("error", error.what());
     }
-    channel.send("failed", {{"kind", kind}, {"message", message}});
-    return 2;
+}
+
+int run_worker(const std::string& request, int descriptor) {
+    return answer(request, Channel(descriptor), single_process(), [](const std::string&) {});
 }
 
 }  // namespace delassus::bench

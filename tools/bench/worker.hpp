@@ -4,7 +4,8 @@
 // A problem is the path of a folder or a file, or {"generate": kind, "parameters": {…}}.
 //
 // It reads one request (a JSON object) from standard input and answers with lines of JSON on standard output, each with
-// an "event". What the solver itself prints is kept away from there. The requests:
+// an "event". What the solver itself prints is kept away from there. bench/parts_worker.hpp has the requests about
+// problems in parts; the others:
 //
 //   {"do": "describe", "problem", "law"}
 //       problem   name, law, structure, n, m, cones, hash, source
@@ -33,11 +34,21 @@
 //       done      printed: bytes that the solver wrote to standard output; libraries: files mapped into the process
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
+
+#include "bench/channel.hpp"
+#include "delassus/communicator.hpp"
 
 namespace delassus::bench {
 
 /// Does what the request asks for, writing to the file descriptor. Returns the exit code: 0, or 2 after "failed".
 int run_worker(const std::string& request, int channel);
+
+/// The same for one of several workers too. failed: called before and after the answer of a request that fails; where
+/// there are several, it waits for all (meet_in_failure). Collective.
+int answer(const std::string& request, const Channel& channel, const std::shared_ptr<const Communicator>& run,
+           const std::function<void(const std::string& sentence)>& failed);
 
 }  // namespace delassus::bench

@@ -74,11 +74,42 @@ std::vector<double> whole_of(const Communicator& run, const std::vector<double>&
 
 void print_processes(const std::vector<ProcessReport>& processes) {
     constexpr double MiB = 1048576.0;
-    for (std::size_t p = 0; p < processes.size(); ++p)
-        fmt::print("  process {}: {} columns, {} rows, {} ghosts; {:.1f} MiB at most, {:.1f} MiB sent by the core\n", p,
-                   processes[p].n, processes[p].m, processes[p].ghosts,
-                   static_cast<double>(processes[p].peak_memory) / MiB,
-                   static_cast<double>(processes[p].bytes_sent) / MiB);
+    for (std::size_t p = 0; p < processes.size(); ++p) {
+        const ProcessReport& one = processes[p];
+        fmt::print("  process {}: {} columns, {} rows, {} ghosts; {:.1f} MiB at most, {:.1f} MiB sent by the core", p,
+                   one.n, one.m, one.ghosts, static_cast<double>(one.peak_memory) / MiB,
+                   static_cast<double>(one.bytes_sent) / MiB);
+        if (one.cost.bytes_sent >= 0)
+            fmt::print(", {:.1f} MiB by the solver", static_cast<double>(one.cost.bytes_sent) / MiB);
+        fmt::print("\n");
+    }
+    // Seconds by phase, where the solver tells them: a table.
+    std::vector<delassus_phase> told;
+    for (int k = 0; k < DELASSUS_PHASE_COUNT; ++k)
+        if (std::any_of(processes.begin(), processes.end(),
+                        [k](const ProcessReport& one) { return one.cost.phases[static_cast<std::size_t>(k)] > 0.0; }))
+            told.push_back(static_cast<delassus_phase>(k));
+    if (told.empty()) return;
+    const auto heading = [](std::string name) {
+        std::replace(name.begin(), name.end(), '_', ' ');
+        fmt::print("  {:>14}", name);
+    };
+    fmt::print("  seconds  ");
+    heading("setup");
+    for (const delassus_phase phase : told) heading(std::string(name_of(phase)));
+    heading("other");
+    fmt::print("\n");
+    for (std::size_t p = 0; p < processes.size(); ++p) {
+        const SolveCost& cost = processes[p].cost;
+        double other = cost.solve;
+        fmt::print("  {:>9}  {:>14.3g}", p, cost.setup);
+        for (const delassus_phase phase : told) {
+            const double seconds = cost.phases[static_cast<std::size_t>(phase)];
+            fmt::print("  {:>14.3g}", seconds);
+            if (seconds > 0.0) other -= seconds;
+        }
+        fmt::print("  {:>14.3g}\n", std::max(0.0, other));
+    }
 }
 
 }  // namespace
@@ -126,6 +157,7 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
 
     StdoutGuard guard;
     SolveReport report;
+    SolveCost cost;
     {
         const Watchdog watchdog(
             settings.time_limit + std::max(2.0, settings.time_limit),
@@ -135,12 +167,13 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
         const std::string refusal = solver.refusal(problem, settings);
         if (!refusal.empty() && name == "auto") return std::nullopt;
         report = solver.solve(problem, own, settings);
+        cost = solver.cost();
     }
     if (const auto bytes = guard.release(); bytes > 0 && run->rank() == 0)
         fmt::print(stderr, "delassus: the solver {} wrote {} bytes to standard output; they were dropped\n", name,
                    bytes);
     if (terminal) fmt::print(stderr, "\r{:60}\r", "");
-    const auto processes = process_reports(problem);
+    const auto processes = process_reports(problem, cost);
     const std::string json = to_json(report, processes);
     if (!arguments.solution.empty()) {
         if (made_to_be_shared) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// delassus worker: the other side of `delassus compare`; not for people.
+// delassus worker: the other side of `delassus compare` and `delassus bench`; not for people.
 #include "bench/worker.hpp"
 
 #include <fcntl.h>
@@ -8,7 +8,9 @@
 #include <iostream>
 #include <iterator>
 
+#include "bench/parts_worker.hpp"
 #include "command.hpp"
+#include "delassus/distributed.hpp"
 
 namespace delassus::command {
 
@@ -17,8 +19,10 @@ void add_worker(CLI::App& program, Action& action) {
     command->group("");  // hidden from --help
     command->callback([&action] {
         action.run = [] {
+            const int channel = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 10);
+            if (process_count() > 1) return bench::run_worker_together(channel);
             const std::string request(std::istreambuf_iterator<char>(std::cin), {});
-            return bench::run_worker(request, fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 10));
+            return bench::run_worker(request, channel);
         };
     });
 }

@@ -59,6 +59,7 @@
   writeAxes();
   writeClasses();
   writeGrowth();
+  writeProcesses();
   writeScenes();
   writeLeavingOut();
   writeProblems();

@@ -128,6 +128,21 @@ double seconds_since(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
+/// The processes that this one has started, those that they have started, and so on; as far as they are still there.
+std::vector<pid_t> descendants_of(pid_t process) {
+    std::vector<pid_t> found = {process};
+    for (std::size_t k = 0; k < found.size(); ++k) {
+        std::error_code ignored;
+        const std::filesystem::path tasks = "/proc/" + std::to_string(found[k]) + "/task";
+        for (const auto& task : std::filesystem::directory_iterator(tasks, ignored)) {
+            std::ifstream children(task.path() / "children");
+            for (pid_t child = 0; children >> child;) found.push_back(child);
+        }
+    }
+    found.erase(found.begin());
+    return found;
+}
+
 /// The parent's side of a running child.
 class Watch {
 public:
@@ -197,11 +212,25 @@ private:
 
     [[nodiscard]] bool overdue() const { return seconds_since(allowed_from_) > allowed_; }
 
-    /// Bytes resident in the child now; 0 if that cannot be read.
-    [[nodiscard]] std::uint64_t resident() const {
-        std::ifstream file("/proc/" + std::to_string(pid_) + "/statm");
+    /// Bytes resident in a process now; 0 if that cannot be read.
+    [[nodiscard]] static std::uint64_t resident(pid_t process) {
+        std::ifstream file("/proc/" + std::to_string(process) + "/statm");
         std::uint64_t size = 0, pages = 0;
         return file >> size >> pages ? pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) : 0;
+    }
+
+    /// Bytes resident in the largest process that the limit holds for.
+    [[nodiscard]] std::uint64_t resident() const {
+        std::uint64_t largest = resident(pid_);
+        if (settings_.is_launcher)
+            for (const pid_t process : descendants_of(pid_)) largest = std::max(largest, resident(process));
+        return largest;
+    }
+
+    void kill_all() const {
+        const std::vector<pid_t> started = settings_.is_launcher ? descendants_of(pid_) : std::vector<pid_t>();
+        kill(-pid_, SIGKILL);
+        for (const pid_t process : started) kill(process, SIGKILL);
     }
 
     void enforce() {
@@ -216,7 +245,7 @@ private:
         result_.over_memory = too_large;
         result_.timed_out = !result_.cancelled && !too_large;
         killed_ = true;
-        kill(-pid_, SIGKILL);
+        kill_all();
     }
 
     const ChildSettings& settings_;

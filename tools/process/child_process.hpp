@@ -25,6 +25,9 @@ struct ChildSettings {
     /// Bytes resident (of it alone) beyond which it is killed; looked at about twenty times a second, and once more at
     /// the end. 0 for none.
     std::uint64_t resident_limit = 0;
+    /// It starts processes that do the work (mpirun), maybe in process groups of their own: resident_limit holds for
+    /// each of them, and they are killed with it.
+    bool is_launcher = false;
     std::optional<int> core;  ///< the only core that it may run on, as far as the system grants that
 
     /// Called with each piece of standard output. Returns the seconds that the child has from now on, in place of those
@@ -43,7 +46,7 @@ struct ChildResult {
     bool over_memory = false;      ///< killed above, or ended after it had been above, resident_limit
     bool cancelled = false;        ///< asked to stop by `cancelled`
     double seconds = 0.0;          ///< wall time
-    std::int64_t peak_memory = 0;  ///< bytes resident at most (of it alone)
+    std::int64_t peak_memory = 0;  ///< bytes resident at most (of it alone; of a launcher, of the largest process)
     std::string output;            ///< standard output, unless on_output took it
     std::string errors;            ///< the last 64 KiB of standard error
 };

@@ -2,10 +2,13 @@
 // Solving and judging a problem of which each process holds a part (docs/partitioned.md).
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delassus/communicator.hpp"
@@ -13,6 +16,7 @@
 #include "delassus/export.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/partitioned.hpp"
+#include "delassus/plugin.h"
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
 #include "delassus/solver_config.hpp"
@@ -72,6 +76,18 @@ private:
     std::unique_ptr<Implementation> implementation_;
 };
 
+/// What a solve cost one process.
+struct SolveCost {
+    double setup = 0.0, solve = 0.0;  ///< s, by the core's clock: analysis and factorisation; solving
+    /// s, by delassus_phase, as the solver says; NaN where it does not. What of `solve` is in none of them is its own
+    /// work on vectors, or unknown.
+    std::array<double, DELASSUS_PHASE_COUNT> phases = {NAN, NAN, NAN, NAN, NAN, NAN};
+    std::int64_t bytes_sent = -1;  ///< by the solver to other processes while it solved; −1 where it does not say
+};
+
+/// The phase's name in reports: "products".
+[[nodiscard]] DELASSUS_API std::string_view name_of(delassus_phase phase);
+
 /// A solver of partitioned problems, made from a plugin with DELASSUS_CAN_PARTITIONED, for its whole life. It is to a
 /// part what Solver is to a whole problem: the same refusals, limits, curve and judgement.
 class DELASSUS_API PartitionedSolver {
@@ -97,6 +113,9 @@ public:
     /// seconds, with a sentence of that process, by Communicator::abort(3).
     SolveReport solve(const PreparedPart& problem, Solution& own, const SolveSettings& settings);
 
+    /// Of this process in the latest solve; with auto, of all its stages together.
+    [[nodiscard]] const SolveCost& cost() const;
+
 private:
     struct Implementation;
     std::unique_ptr<Implementation> implementation_;
@@ -108,10 +127,12 @@ struct ProcessReport {
     std::int64_t ghosts = 0;       ///< columns of others that its rows have to do with
     std::int64_t bytes_sent = 0;   ///< by the core since the start; a solver's own library counts for itself
     std::int64_t peak_memory = 0;  ///< bytes resident at most so far
+    SolveCost cost = {};
 };
 
-/// Of all processes, by rank. Collective.
-[[nodiscard]] DELASSUS_API std::vector<ProcessReport> process_reports(const PreparedPart& problem);
+/// Of all processes, by rank. cost: what the own solve cost. Collective.
+[[nodiscard]] DELASSUS_API std::vector<ProcessReport> process_reports(const PreparedPart& problem,
+                                                                      const SolveCost& cost);
 
 /// The report as JSON text with the processes beside it (docs/report.md).
 [[nodiscard]] DELASSUS_API std::string to_json(const SolveReport& report, const std::vector<ProcessReport>& processes);

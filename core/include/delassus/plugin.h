@@ -36,7 +36,7 @@ extern "C" {
  * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
  * Major version 1 was never released; its cones had no stride. */
 #define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
-#define DELASSUS_ABI_MINOR 3
+#define DELASSUS_ABI_MINOR 4
 
 #if defined(_WIN32)
 #define DELASSUS_PLUGIN_EXPORT __declspec(dllexport)
@@ -236,6 +236,18 @@ typedef struct delassus_request {
     void* progress_context;
 } delassus_request;
 
+/* Since 2.4. What a solve spends its time on in one process. Every second belongs to one phase at most; what belongs to
+ * none is the method's own work on vectors. */
+typedef enum delassus_phase {
+    DELASSUS_PHASE_PRODUCTS = 0,       /* products with the matrices of the problem, without the two below */
+    DELASSUS_PHASE_PROJECTIONS = 1,    /* cone by cone: projections, scalings, steps to the boundary */
+    DELASSUS_PHASE_LINEAR_SYSTEMS = 2, /* making, factoring and solving linear systems, with what they communicate */
+    DELASSUS_PHASE_EXCHANGE = 3,       /* messages between neighbours, but for the waiting */
+    DELASSUS_PHASE_REDUCTIONS = 4,     /* sums and the like over all processes, but for the waiting */
+    DELASSUS_PHASE_WAITING = 5         /* for other processes, in exchanges and reductions (docs/partitioned.md) */
+} delassus_phase;
+#define DELASSUS_PHASE_COUNT 6
+
 typedef struct delassus_outcome {
     uint32_t struct_size; /* set by the host; write only fields that lie within */
     int32_t status;       /* delassus_status */
@@ -244,6 +256,11 @@ typedef struct delassus_outcome {
     int64_t factorizations; /* numerical factorisations since create */
     double residual; /* the solver's own idea of the natural error; NaN if it has none; never reported as the error */
     const char* message; /* what a person should know, or NULL; owned by the solver, valid until its next call */
+    /* Since 2.4. What this call cost this process. A solver that does not measure a figure leaves it as it is. */
+    double* phase_seconds; /* the host's, phase_count long, NaN on entry, by delassus_phase; NULL: nobody asks */
+    int32_t phase_count;   /* a later minor version may have more phases than the other side knows */
+    int32_t reserved;
+    int64_t bytes_sent; /* to other processes; −1 on entry */
 } delassus_outcome;
 
 /* ---- Threads --------------------------------------------------------------------------------------------------- */

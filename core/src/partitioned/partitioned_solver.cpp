@@ -106,6 +106,14 @@ private:
     bool given_up_ = false;
 };
 
+/// What one stage does not tell, the sum does not know.
+void add(SolveCost& total, const SolveCost& stage) {
+    total.setup += stage.setup;
+    total.solve += stage.solve;
+    for (std::size_t k = 0; k < total.phases.size(); ++k) total.phases[k] += stage.phases[k];
+    total.bytes_sent = total.bytes_sent < 0 || stage.bytes_sent < 0 ? -1 : total.bytes_sent + stage.bytes_sent;
+}
+
 std::string quoted_name(const PreparedPart& problem) {
     const std::string& name = problem.problem().name;
     return name.empty() ? "the problem" : fmt::format("\"{}\"", name);
@@ -124,6 +132,7 @@ struct PartitionedSolver::Implementation {
     std::map<std::pair<std::string, OptionTexts>, PartitionedSolver> solvers;
     bool analyzed = false;
     std::uint64_t pattern_id = 0, values_id = 0;
+    SolveCost cost = {};
 
     /// Runs a collective operation of the plugin and agrees on how it ended; a sentence of the first process on which
     /// it failed, if it did.
@@ -211,6 +220,10 @@ const PluginInfo& PartitionedSolver::info() const {
     return implementation_->instance ? implementation_->instance->info() : implementation_->info_of_auto;
 }
 
+const SolveCost& PartitionedSolver::cost() const {
+    return implementation_->cost;
+}
+
 std::string PartitionedSolver::refusal(const PreparedPart& problem, const SolveSettings& settings) const {
     std::uint64_t needs = problem.needs();
     if (const auto& self = *implementation_; self.ranking) {
@@ -239,13 +252,18 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
     setup.start();
     Ending ending = set_up(raw);
     setup.stop();
-    std::array<double, 2> seconds = {setup.seconds(), 0.0};
+    cost = {};
+    cost.setup = setup.seconds();
+    std::array<double, 2> seconds = {cost.setup, 0.0};
     communicator->max(seconds);
     report.seconds_setup = seconds[0];
 
     delassus_outcome outcome{};
     outcome.struct_size = sizeof outcome;
     outcome.residual = NAN;
+    outcome.phase_seconds = cost.phases.data();
+    outcome.phase_count = DELASSUS_PHASE_COUNT;
+    outcome.bytes_sent = -1;
     bool given_up = false;
     if (ending.status == DELASSUS_SOLVED) {
         PartListener listener(problem, settings, report, watch);
@@ -260,7 +278,8 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
         if (ending.status != DELASSUS_ERROR) report.iterations = outcome.iterations;
         given_up = listener.given_up();
     }
-    seconds[1] = watch.seconds();
+    cost.bytes_sent = outcome.bytes_sent;
+    seconds[1] = cost.solve = watch.seconds();
     communicator->max(seconds);
     report.seconds_solve = seconds[1];
     report.analyses = outcome.analyses;
@@ -289,6 +308,9 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
             stages.push_back({name, {}, {.reason = "the solvers before it did not reach the tolerance"}});
     double best = std::numeric_limits<double>::infinity(), spent = 0.0;
     bool started = settings.warm_start;
+    SolveCost total;
+    total.phases.fill(0.0);
+    total.bytes_sent = 0;
     for (const auto& ranked : stages) {
         const bool own_law = !ranked.stage.law || *ranked.stage.law == problem.problem().law;
         if (!own_law || !can(registry, ranked.solver, problem.needs())) continue;
@@ -315,6 +337,7 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
         Solution next = own;
         const SolveReport done = place->second.solve(problem, next, stage);
         spent += done.seconds_setup + done.seconds_solve;
+        add(total, place->second.cost());
         report.iterations += done.iterations;
         report.seconds_setup += done.seconds_setup;
         report.seconds_solve += done.seconds_solve;
@@ -341,6 +364,7 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
             break;
         }
     }
+    cost = total;
     std::vector<std::string> names;
     for (const auto& stage : report.stages) names.push_back(stage.solver);
     report.message = fmt::format("{}: {}", rule.name, fmt::join(names, ", then "));

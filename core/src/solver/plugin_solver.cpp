@@ -155,6 +155,7 @@ std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution
 
     delassus_outcome outcome{};
     outcome.struct_size = sizeof outcome;
+    outcome.bytes_sent = -1;
     outcome.residual = NAN;
     bool given_up = false;
     if (raw_status == DELASSUS_SOLVED) {

@@ -37,7 +37,7 @@ void sort_out(std::vector<std::int64_t>& numbers) {
 }  // namespace
 
 Exchange::Exchange(const Processes& processes, std::span<const std::int64_t> start, std::vector<std::int64_t> foreign)
-    : foreign_(std::move(foreign)) {
+    : foreign_(std::move(foreign)), meter_(processes.meter()) {
     const auto process = static_cast<std::size_t>(processes.rank());
     first_ = start[process];
     own_ = start[process + 1] - first_;
@@ -71,6 +71,7 @@ std::int32_t Exchange::local_of_foreign(std::int64_t number) const {
 
 void Exchange::bring(void* values, MPI_Datatype type, int width, std::size_t bytes) const {
     if (foreign_of_all_ == 0) return;
+    const CostMeter::Together all(*meter_, DELASSUS_PHASE_EXCHANGE);
     const Unit unit(type, width);
     const void* own =
         static_cast<const char*>(values) + static_cast<std::size_t>(below_) * bytes * static_cast<std::size_t>(width);
@@ -80,6 +81,7 @@ void Exchange::bring(void* values, MPI_Datatype type, int width, std::size_t byt
 
 void Exchange::collect(double* values, int width) const {
     if (foreign_of_all_ == 0) return;
+    const CostMeter::Together all(*meter_, DELASSUS_PHASE_EXCHANGE);
     const Unit unit(MPI_DOUBLE, width);
     double* own = values + static_cast<std::ptrdiff_t>(below_) * width;
     check(PetscSFReduceBegin(forest_.get(), unit.get(), values, own, MPI_SUM));

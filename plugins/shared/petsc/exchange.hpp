@@ -59,6 +59,7 @@ private:
     std::int32_t below_ = 0;
     std::vector<std::int64_t> foreign_;
     StarForestHandle forest_;
+    std::shared_ptr<CostMeter> meter_;
 };
 
 /// The columns of a matrix's own rows that lie outside first … end − 1; ascending, without repetition.

@@ -212,6 +212,7 @@ void PartSystem::load(const sdk::LocalProblemView& problem) {
 }
 
 void PartSystem::apply_inverse(sdk::Vector& v) const {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     if (coupled_) {
         if (inverse_.get()) solve(inverse_.get(), v);
         return;
@@ -223,6 +224,7 @@ void PartSystem::apply_inverse(sdk::Vector& v) const {
 }
 
 sdk::Vector PartSystem::apply_H(const sdk::Vector& v) const {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     check(VecPlaceArray(right_.get(), v.data()));
     check(MatMult(H_.get(), right_.get(), solution_.get()));
     check(VecResetArray(right_.get()));
@@ -234,6 +236,7 @@ sdk::Vector PartSystem::apply_H(const sdk::Vector& v) const {
 }
 
 sdk::Vector PartSystem::apply_D(const sdk::Vector& v) const {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     sdk::Vector all(columns().size());
     all.segment(columns().first_own(), columns().own()) = v;
     columns().bring(all.data());
@@ -264,6 +267,7 @@ std::vector<std::int32_t> coupled_rows(const sdk::LocalProblemView& problem) {
 }
 
 sdk::Vector PartSystem::apply_transpose(const sdk::Vector& lambda) const {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     sdk::Vector all = D_.transpose() * lambda;
     columns().collect(all.data());
     return all.segment(columns().first_own(), columns().own());
@@ -276,6 +280,7 @@ sdk::Vector PartSystem::velocity(const sdk::LocalProblemView& problem, const sdk
 }
 
 double PartSystem::natural(const sdk::Vector& lambda, const sdk::Vector& u) const {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_PROJECTIONS);
     double sum = 0.0;
     std::vector<double> trial;
     for (std::size_t c = 0; c < cone_scaling_.size(); ++c) {
@@ -378,6 +383,7 @@ void PartSystem::scale(Mat matrix, const sdk::Vector& R) const {
 }
 
 void PartSystem::solve(KSP krylov, sdk::Vector& v) const {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_LINEAR_SYSTEMS);
     check(VecPlaceArray(right_.get(), v.data()));
     check(KSPSolve(krylov, right_.get(), solution_.get()));
     check(VecResetArray(right_.get()));

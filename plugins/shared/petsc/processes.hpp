@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 
+#include "cost_meter.hpp"
 #include "delassus/sdk/partitioned_solver.hpp"
 #include "library.hpp"
 
@@ -20,11 +22,14 @@ public:
     explicit Processes(const delassus_local_problem& problem)
         : communicator_(problem.processes > 1 ? MPI_Comm_f2c(problem.communicator) : MPI_COMM_SELF),
           size_(problem.processes),
-          rank_(problem.process) {}
+          rank_(problem.process),
+          meter_(std::make_shared<CostMeter>(communicator_, size_)) {}
 
     [[nodiscard]] MPI_Comm get() const { return communicator_; }
     [[nodiscard]] int size() const { return size_; }
     [[nodiscard]] int rank() const { return rank_; }
+    /// What a solve costs this process; copies of this object share it, and so do the objects made with them.
+    [[nodiscard]] const std::shared_ptr<CostMeter>& meter() const { return meter_; }
 
     void sum(std::span<double> values) const { reduce(values, MPI_SUM); }
     [[nodiscard]] double sum(double value) const {
@@ -49,17 +54,22 @@ public:
 
 private:
     void reduce(std::span<double> values, MPI_Op operation) const {
-        if (size_ > 1)
-            MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, operation,
-                          communicator_);
+        reduce(values.data(), values.size(), sizeof(double), MPI_DOUBLE, operation);
     }
     [[nodiscard]] std::int64_t reduced(std::int64_t value, MPI_Op operation) const {
-        if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_INT64_T, operation, communicator_);
+        reduce(&value, 1, sizeof value, MPI_INT64_T, operation);
         return value;
+    }
+    void reduce(void* values, std::size_t count, std::size_t bytes, MPI_Datatype type, MPI_Op operation) const {
+        if (size_ == 1) return;
+        const CostMeter::Together all(*meter_, DELASSUS_PHASE_REDUCTIONS);
+        MPI_Allreduce(MPI_IN_PLACE, values, static_cast<int>(count), type, operation, communicator_);
+        meter_->add_bytes(count * bytes);
     }
 
     MPI_Comm communicator_ = MPI_COMM_SELF;
     int size_ = 1, rank_ = 0;
+    std::shared_ptr<CostMeter> meter_ = std::make_shared<CostMeter>(MPI_COMM_SELF, 1);
 };
 
 }  // namespace delassus::petsc

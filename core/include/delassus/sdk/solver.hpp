@@ -25,6 +25,7 @@
 
 #include "delassus/plugin.h"
 #include "delassus/sdk/blas_threads.hpp"
+#include "delassus/sdk/cost.hpp"
 #include "delassus/sdk/h_inverse.hpp"
 #include "delassus/sdk/options.hpp"
 #include "delassus/sdk/problem_view.hpp"
@@ -59,6 +60,7 @@ struct Outcome {
     std::int64_t iterations = 0;
     double residual = std::numeric_limits<double>::quiet_NaN();  ///< the solver's own natural error, if it has one
     std::string message;                                         ///< what a person should know; may be empty
+    Cost cost = {};                                              ///< of this process, as far as it is measured
 };
 
 /// The status that an answer asks for; the answer must not be DELASSUS_CONTINUE.
@@ -300,6 +302,7 @@ private:
             Outcome result = body();
             outcome.iterations = result.iterations;
             outcome.residual = result.residual;
+            result.cost.write(outcome);
             instance.message = std::move(result.message);
             if (!instance.message.empty()) outcome.message = instance.message.c_str();
             if (result.status == DELASSUS_ERROR || result.status == DELASSUS_NUMERICAL_FAILURE)
