@@ -33,9 +33,10 @@ public:
         const std::vector<double> lambda = judge.lambda_of(x);
         bool finite = true;
         for (const double entry : lambda) finite = finite && std::isfinite(entry);
-        errors_.push_back(finite ? problem.meter().measure({}, lambda).natural
-                                 : std::numeric_limits<double>::infinity());
+        add(finite ? problem.meter().measure({}, lambda).natural : std::numeric_limits<double>::infinity());
     }
+    /// The natural error of an answer.
+    void add(double error) { errors_.push_back(error); }
 
     /// A body slides with that velocity at its contacts, and feels that force from them (or impulse, or change of
     /// velocity): by how much the friction differs from μ N against the velocity, relative to μ N. All

@@ -54,6 +54,10 @@ done
 
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name delassus.pc)")
 export PKG_CONFIG_PATH
+cc -std=c99 -pedantic "$source/examples/dump/dump.c" $(pkg-config --cflags delassus) -lm -o "$scratch/dump"
+"$scratch/dump" "$scratch/two_blocks"
+"$command" compare "$scratch/two_blocks" --solvers pgs,ssn -o "$scratch/compared"
+if "$scratch/dump" "$scratch/two_blocks"; then echo "a folder was written over" >&2; exit 1; fi
 g++ -std=c++20 $flags "$scratch/embed/embed.cpp" $(pkg-config --cflags --libs delassus) -Wl,-rpath,"$(pkg-config --variable=libdir delassus)" \
     -o "$scratch/embed-pc"
 "$scratch/embed-pc"
