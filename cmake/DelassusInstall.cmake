@@ -23,7 +23,7 @@ install(DIRECTORY core/include/delassus DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} 
 install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" tools/generate/include/delassus/generate.hpp
   tools/generate/include/delassus/generate_partitioned.hpp
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus COMPONENT development)
-install(DIRECTORY examples/plugin examples/embed examples/system examples/engines DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
+install(DIRECTORY examples/plugin examples/embed examples/system examples/engines examples/dump DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         COMPONENT development)
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development

@@ -39,17 +39,25 @@ done
 for timestepper in euler_explicit rk4 trapezoidal trapezoidal_linearized; do "$scratch/system/build/system" "$timestepper" free; done
 if "$scratch/system/build/system" euler_explicit; then echo "euler_explicit took a constraint" >&2; exit 1; fi
 
-if pkg-config --exists bullet; then
-    cp -r "$source/examples/engines" "$scratch"
-    cmake -S "$scratch/engines/bullet" -B "$scratch/engines/bullet/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
-    cmake --build "$scratch/engines/bullet/build"
-    for solver in auto pgs; do "$scratch/engines/bullet/build/sliding" "$solver"; done
-else
-    echo "skipped: Bullet was not found (libbullet-dev)"
-fi
+# Solvers behind the engines that are installed.
+cp -r "$source/examples/engines" "$scratch"
+for engine in dart:dart:libdart-dev bullet:bullet-float64:libbullet-dev; do
+    IFS=: read -r folder module package <<<"$engine"
+    if ! pkg-config --exists "$module"; then
+        echo "skipped: $folder was not found ($package)"
+        continue
+    fi
+    cmake -S "$scratch/engines/$folder" -B "$scratch/engines/$folder/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
+    cmake --build "$scratch/engines/$folder/build"
+    for solver in auto ssn; do "$scratch/engines/$folder/build/scenes" "$solver"; done
+done
 
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name delassus.pc)")
 export PKG_CONFIG_PATH
+cc -std=c99 -pedantic "$source/examples/dump/dump.c" $(pkg-config --cflags delassus) -lm -o "$scratch/dump"
+"$scratch/dump" "$scratch/two_blocks"
+"$command" compare "$scratch/two_blocks" --solvers pgs,ssn -o "$scratch/compared"
+if "$scratch/dump" "$scratch/two_blocks"; then echo "a folder was written over" >&2; exit 1; fi
 g++ -std=c++20 $flags "$scratch/embed/embed.cpp" $(pkg-config --cflags --libs delassus) -Wl,-rpath,"$(pkg-config --variable=libdir delassus)" \
     -o "$scratch/embed-pc"
 "$scratch/embed-pc"
