@@ -94,7 +94,7 @@ void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& 
             held_[static_cast<std::size_t>(row)] = 1;
             held_value_[row] = lo;
         } else if (std::isfinite(lo) || std::isfinite(hi)) {
-            intervals_.push_back({row, std::isfinite(lo), std::isfinite(hi), lo, hi, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+            intervals_.push_back({row, std::isfinite(lo), std::isfinite(hi), lo, hi, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
         } else {
             free_.push_back(row);
         }
@@ -384,6 +384,38 @@ void Complementarity::target(double tau, bool second_order, sdk::Vector& t) {
         block.tv = (tau - second * block.dz0 * block.dv) / z_[block.first] - block.v;
         store_target(block, t);
     }
+}
+
+// Gondzio (1996) for the pairs of intervals. A block has two products, the eigenvalues v₀ ± ‖v₁‖ of the trial point
+// v = (W z + α W δz) ∘ (W⁻¹ s + α W⁻¹ δs), with the directions (1, ±v₁/‖v₁‖)/2; what moves them is divided by ℓ, as in
+// target(). No product is pushed down by more than high, or one that has grown far too large would outweigh all others.
+void Complementarity::correct(double step, double low, double high, sdk::Vector& t) {
+    const auto correction = [&](double product) { return std::max(std::clamp(product, low, high) - product, -high); };
+    for (Interval& row : intervals_) {
+        row.old_tl = row.tl;
+        row.old_tu = row.tu;
+        if (row.has_lower) row.tl += correction((row.p + step * row.dz) * (row.wl + step * row.dwl)) / row.p;
+        if (row.has_upper) row.tu += correction((row.q - step * row.dz) * (row.wu + step * row.dwu)) / row.q;
+        t[row.row] = row.tl - row.tu;
+    }
+    for (Block& block : blocks_) {
+        block.old_q = block.q;
+        const Triple v = jordan_product(plus(block.ell, step, block.dz), plus(block.ell, step, block.ds));
+        const double length = tangent_norm(v);
+        const double larger = correction(v[0] + length), smaller = correction(v[0] - length);
+        if (larger == 0.0 && smaller == 0.0) continue;
+        const double along = length > 0.0 ? 0.5 * (larger - smaller) / length : 0.0;
+        block.q = plus(block.q, 1.0, jordan_divide(block.ell, {0.5 * (larger + smaller), along * v[1], along * v[2]}));
+        store_target(block, t);
+    }
+}
+
+void Complementarity::undo_correction() {
+    for (Interval& row : intervals_) {
+        row.tl = row.old_tl;
+        row.tu = row.old_tu;
+    }
+    for (Block& block : blocks_) block.q = block.old_q;
 }
 
 void Complementarity::set_direction(const sdk::Vector& dz) {

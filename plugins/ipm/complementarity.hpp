@@ -113,6 +113,12 @@ public:
     /// Aiming at products of tau; with second_order, which takes the direction set last, Mehrotra's corrector.
     void target(double tau, bool second_order, sdk::Vector& t);
 
+    /// Gondzio's correction of the target t set last: the products that a step of this length along the direction would
+    /// lead to, and that lie outside low … high, are to end at these bounds instead.
+    void correct(double step, double low, double high, sdk::Vector& t);
+    /// The target before correct(); set_direction() with the direction before has to follow.
+    void undo_correction();
+
     /// Takes δz in the blocks' bases, m; δs follows from the target set last.
     void set_direction(const sdk::Vector& dz);
     /// The largest step that keeps z and s in their cones; infinite if all do.
@@ -130,7 +136,8 @@ private:
         bool has_lower, has_upper;
         double lower, upper;
         double p, wl, q, wu;
-        double tl, tu;        // targets of δw_l, δw_u
+        double tl, tu;  // targets of δw_l, δw_u
+        double old_tl, old_tu;
         double dz, dwl, dwu;  // direction
     };
     struct Block {
@@ -140,7 +147,7 @@ private:
         Triple root_theta;
         Basis eigen;                  // of W
         Basis rows_in, reactions_in;  // of the linear system
-        Triple ell, q;                // W z = W⁻¹ s; target
+        Triple ell, q, old_q;         // W z = W⁻¹ s; target, and before the latest correction
         Triple dz, ds;                // W δz, W⁻¹ δs
         double v, tv, dv, dz0;        // exact Coulomb: û₀, its target and change; δz₀
         double shift, c, d;           // ς, and φ s_t/‖s_t‖ seen from ŵ and t

@@ -10,14 +10,22 @@ namespace delassus::petsc {
 namespace {
 
 constexpr double largest_regularization = 1e-4;
+// Columns a process. A pile of ten layers of spheres has 1000 entries of the factor a column at 100 000 columns, and
+// 300 more with each threefold number: 6 GB at this limit.
+constexpr std::int64_t most_factored = 500000;
+constexpr double most_gained = 1e-10;  // factor by which conjugate gradients lower their residual at a time
+
 }  // namespace
 
 void CondensedSystem::analyze(const PartSystem& system, const sdk::LocalProblemView& problem) {
     system_ = &system;
     groups_ = coupled_rows(problem);
-    kind_ = wanted_ == "hypre"     ? LinearSolver::Hypre
-            : wanted_ == "bjacobi" ? LinearSolver::BlockJacobi
-                                   : LinearSolver::Mumps;
+    kind_ = wanted_ == "hypre"                                               ? LinearSolver::Hypre
+            : wanted_ == "bjacobi"                                           ? LinearSolver::BlockJacobi
+            : wanted_ == "schwarz"                                           ? LinearSolver::Schwarz
+            : wanted_ == "mumps"                                             ? LinearSolver::Mumps
+            : problem.raw->n_all > most_factored * system.processes().size() ? LinearSolver::Schwarz
+                                                                             : LinearSolver::Mumps;
     krylov_.reset();
     matrix_.reset();
     ++analyses_;
@@ -127,7 +135,7 @@ void CondensedSystem::factorize(const sdk::LocalProblemView& problem, const Comp
         }
         PartSystem::assemble(matrix_.get());
         system_->scale(matrix_.get(), R_);
-        if (!krylov_.get()) make_linear_solver(system_->processes(), matrix_.get(), kind_, krylov_);
+        if (!krylov_.get()) make_linear_solver(system_->processes(), matrix_.get(), kind_, krylov_, schwarz_);
         if (set_up(krylov_.get())) return;
         delta_ *= 10.0;
         if (!(delta_ <= largest_regularization))
@@ -144,7 +152,7 @@ void CondensedSystem::solve_once(const Complementarity& cones, const sdk::Vector
     cones.reactions_from_basis(dz);
     dx = f + system_->apply_transpose(scale_.cwiseProduct(dz));
     if (krylov_.get()) {
-        check(KSPSetTolerances(krylov_.get(), enough, 1e-300, 1e10, static_cast<PetscInt>(most_inner_)));
+        check(KSPSetTolerances(krylov_.get(), most_gained, enough, 1e10, static_cast<PetscInt>(most_inner_)));
         dx.array() *= R_.array();
         system_->solve(krylov_.get(), dx);
         dx.array() *= R_.array();
@@ -161,43 +169,60 @@ void CondensedSystem::solve_once(const Complementarity& cones, const sdk::Vector
 }
 
 double CondensedSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
-                              sdk::Vector& dx, sdk::Vector& dz) {
+                              Start start, sdk::Vector& dx, sdk::Vector& dz) {
     const auto norm = [this](const sdk::Vector& x, const sdk::Vector& z) {
         double square = z.size() > 0 ? z.cwiseQuotient((theta_.array() + 1.0).matrix().cwiseSqrt()).squaredNorm() : 0.0;
         square += x.cwiseProduct(R_).squaredNorm();
         return std::sqrt(system_->processes().sum(square));
     };
     const double size = norm(f, g);
-    dx.setZero(f.size());
-    dz.setZero(g.size());
+    if (start == Start::Zero || !(size > 0.0)) {
+        dx.setZero(f.size());
+        dz.setZero(g.size());
+    }
     if (!(size > 0.0)) return 0.0;
     f_rest_ = f;
     g_rest_ = g;
     double rest = size;
+    if (start == Start::Given) {
+        find_rest(cones, f, g, dx, dz);
+        rest = norm(f_rest_, g_rest_);
+        if (rest <= enough * size) return rest / size;
+        if (!(rest < size)) return solve(cones, f, g, enough, Start::Zero, dx, dz);
+    }
+    // By rounding, the residual that conjugate gradients carry along is not the system's own: they start again.
+    const bool direct = kind_ == LinearSolver::Mumps;
+    const int refinements = direct ? refinements_ : 4 * refinements_;
     for (int refinement = 0;; ++refinement) {
-        solve_once(cones, f_rest_, g_rest_, 0.1 * enough * size / rest, correction_x_, correction_z_);
+        solve_once(cones, f_rest_, g_rest_, 0.3 * enough * size, correction_x_, correction_z_);
         dx += correction_x_;
         dz += correction_z_;
-        sdk::Vector z = dz;
-        cones.reactions_from_basis(z);
-        f_rest_ = f - system_->apply_H(dx) + system_->apply_transpose(scale_.cwiseProduct(z));
-        sdk::Vector product = scale_.cwiseProduct(system_->apply_D(dx)) + apply_E(z);
-        cones.rows_to_basis(product);
-        g_rest_ = g - product - theta_.cwiseProduct(dz);
-        for (Eigen::Index i = 0; i < g.size(); ++i)
-            if (cones.is_held(i)) g_rest_[i] = 0.0;
+        find_rest(cones, f, g, dx, dz);
         const double next = norm(f_rest_, g_rest_);
         if (!(next < rest)) {
-            if (refinement > 0) {
+            if (refinement > 0 || start == Start::Given) {
                 dx -= correction_x_;
                 dz -= correction_z_;
+                return rest / size;
             }
-            return (refinement > 0 ? rest : next) / size;
+            return next / size;
         }
         const bool slow = next > 0.5 * rest;
         rest = next;
-        if (rest <= enough * size || slow || refinement >= refinements_) return rest / size;
+        if (rest <= enough * size || slow || refinement >= refinements) return rest / size;
     }
+}
+
+void CondensedSystem::find_rest(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g,
+                                const sdk::Vector& dx, const sdk::Vector& dz) {
+    sdk::Vector z = dz;
+    cones.reactions_from_basis(z);
+    f_rest_ = f - system_->apply_H(dx) + system_->apply_transpose(scale_.cwiseProduct(z));
+    sdk::Vector product = scale_.cwiseProduct(system_->apply_D(dx)) + apply_E(z);
+    cones.rows_to_basis(product);
+    g_rest_ = g - product - theta_.cwiseProduct(dz);
+    for (Eigen::Index i = 0; i < g.size(); ++i)
+        if (cones.is_held(i)) g_rest_[i] = 0.0;
 }
 
 std::string CondensedSystem::description() const {
@@ -207,7 +232,10 @@ std::string CondensedSystem::description() const {
     } else {
         std::snprintf(text, sizeof text, "%lld iterations of CG with %s, regularisation %.0e",
                       static_cast<long long>(inner_iterations_),
-                      kind_ == LinearSolver::Hypre ? "BoomerAMG" : "incomplete Cholesky on each process", delta_);
+                      kind_ == LinearSolver::Hypre     ? "BoomerAMG"
+                      : kind_ == LinearSolver::Schwarz ? "overlapping Schwarz"
+                                                       : "incomplete Cholesky on each process",
+                      delta_);
     }
     return text;
 }

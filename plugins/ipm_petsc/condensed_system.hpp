@@ -23,8 +23,10 @@ using ipm::Triple;
 class CondensedSystem {
 public:
     /// regularization: δ, relative to the diagonal of N. refinements: at most so many a solve.
-    CondensedSystem(std::string preconditioner, double regularization, int refinements, std::int64_t most_inner)
+    CondensedSystem(std::string preconditioner, Schwarz schwarz, double regularization, int refinements,
+                    std::int64_t most_inner)
         : wanted_(std::move(preconditioner)),
+          schwarz_(schwarz),
           regularization_(regularization),
           refinements_(refinements),
           most_inner_(most_inner) {}
@@ -35,10 +37,13 @@ public:
     void load(const PartSystem& system, const sdk::LocalProblemView& problem, const sdk::Vector& scale);
     /// theta: m, in the bases. Raises δ until the matrix can be factored. Throws sdk::NumericalFailure.
     void factorize(const sdk::LocalProblemView& problem, const Complementarity& cones, const sdk::Vector& theta);
+    /// Where a solve starts from: zero, or the δx and δz that are there.
+    enum class Start { Zero, Given };
     /// From f (own n) and g (own m, in the bases) δx and δz (in the bases), to a relative residual of `enough` if it
     /// can be had; the residual that was.
-    double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
+    double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough, Start start,
                  sdk::Vector& dx, sdk::Vector& dz);
+    [[nodiscard]] bool is_direct() const { return kind_ == LinearSolver::Mumps; }
 
     [[nodiscard]] const sdk::Vector& R() const { return R_; }
     [[nodiscard]] sdk::Vector apply_E(const sdk::Vector& z) const;  ///< Ê z
@@ -53,8 +58,12 @@ private:
     void apply_T(sdk::Vector& v) const;
     void solve_once(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
                     sdk::Vector& dx, sdk::Vector& dz);
+    /// f_rest_ and g_rest_ of δx and δz.
+    void find_rest(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, const sdk::Vector& dx,
+                   const sdk::Vector& dz);
 
     std::string wanted_;
+    Schwarz schwarz_;
     double regularization_;
     int refinements_;
     std::int64_t most_inner_;

@@ -31,7 +31,9 @@ private:
     bool judge(const sdk::LocalProblemView& problem, sdk::Monitor& monitor, std::int64_t iteration);
     void iterate(const sdk::LocalProblemView& problem, sdk::Monitor& monitor);
     bool step(const sdk::LocalProblemView& problem);
-    void find_direction(double enough);
+    using Start = CondensedSystem::Start;
+    void find_direction(double enough, Start start);
+    void correct(double tau, double enough);
     [[nodiscard]] bool is_stuck(double error);
     [[nodiscard]] double proven_size() const;
     // Of all processes:
@@ -43,7 +45,7 @@ private:
     CondensedSystem kkt_;
     Complementarity cones_;
     double step_fraction_;
-    std::int64_t stall_iterations_;
+    std::int64_t correctors_, stall_iterations_;
 
     ipm::ScaledSystem scales_;                      // only z_scale: ρP
     double degree_ = 0.0;                           // number of products of all processes
@@ -51,6 +53,7 @@ private:
     sdk::Vector x_;                                 // x/ρ
     sdk::Vector f_, g_;                             // what is left of the two equations
     sdk::Vector theta_, target_, right_, dx_, dz_;  // of a step
+    sdk::Vector kept_x_, kept_z_;                   // δx and δz before a corrector
     sdk::Vector true_x_, true_lambda_;              // in the problem's units
     double least_error_ = 0.0, least_rest_ = 0.0;
     std::int64_t idle_iterations_ = 0;

@@ -57,6 +57,21 @@ TEST_F(SolveInParts, TakesTheStepsOfOneProcess) {
         }
 }
 
+// A claim without a proof is found out; the answer of ipm_petsc is a proof (Proves in solvers_test.cpp).
+TEST_F(SolveInParts, AClaimThatThereIsNoSolutionNeedsAProof) {
+    SolverConfig config;
+    config.name = "parts_gradient";
+    config.options = {{"fault", "claim"}};
+    PartitionedSolver liar(registry, config, run);
+    const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
+    Solution own;
+    SolveSettings settings;
+    settings.tolerance = 1e-12;
+    const SolveReport report = liar.solve(part, own, settings);
+    EXPECT_EQ(report.status, Status::FalseClaim);
+    EXPECT_NE(report.message.find("claimed that there is no solution"), std::string::npos) << report.message;
+}
+
 TEST_F(SolveInParts, StartsFromWhatItIsGiven) {
     const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
     PartitionedSolver gradient = solver(run);

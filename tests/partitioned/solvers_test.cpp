@@ -209,6 +209,43 @@ TEST_P(PartitionedPlugins, TakeOneBodyThatTouchesAll) {
     EXPECT_EQ(compared["solved"], static_cast<int>(GetParam().laws.size()));
 }
 
+/// Bodies on a line, each between two walls of its own. The walls of the first are nearer to each other than nothing:
+/// x ≥ 1 and −x ≥ 1.
+Problem squeezed(std::int32_t bodies) {
+    Problem problem;
+    problem.H = tests::diagonal_matrix(std::vector<double>(static_cast<std::size_t>(bodies), 2.0));
+    std::vector<Triplet> triplets;
+    for (std::int32_t k = 0; k < bodies; ++k) {
+        triplets.push_back({2 * k, k, 1.0});
+        triplets.push_back({2 * k + 1, k, -1.0});
+        for (int side = 0; side < 2; ++side) {
+            problem.b.push_back(k == 0 ? -1.0 : 0.5);
+            problem.cones.push_back(Cone::nonnegative(1));
+        }
+        problem.a.push_back(0.3 * k - 1.0);
+    }
+    problem.D = SparseMatrix::from_triplets(2 * bodies, bodies, std::move(triplets));
+    return problem;
+}
+
+// The proof is spread over the processes; auto stops at it.
+TEST(PartitionedInfeasible, IpmProvesIt) {
+    const Registry registry;
+    const auto& names = registry.plugins();
+    if (std::none_of(names.begin(), names.end(), [](const auto& info) { return info.name == "ipm_petsc"; }))
+        GTEST_SKIP() << "ipm_petsc was not built";
+    const auto run = communicator_of_run();
+    const PreparedPart part(run, part_of(*run, squeezed(12)));
+    for (const char* name : {"ipm_petsc", "auto"}) {
+        SolverConfig config;
+        config.name = name;
+        PartitionedSolver solver(registry, config, run);
+        Solution own;
+        const SolveReport report = solver.solve(part, own, {});
+        EXPECT_EQ(name_of(report.status), name_of(Status::Infeasible)) << name << ": " << report.message;
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, PartitionedPlugins,
                          testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}},
                                          Case{"ipm_petsc", 1e-10, 100, 3, {Law::Associated}},

@@ -72,6 +72,7 @@ public:
 private:
     friend class PartitionedSolver;
     friend class PartMeter;
+    friend class PartProof;
     struct Implementation;
     std::unique_ptr<Implementation> implementation_;
 };

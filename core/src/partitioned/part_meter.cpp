@@ -7,18 +7,11 @@
 
 #include "delassus/error.hpp"
 #include "partitioned/bytes.hpp"
+#include "partitioned/local_entries.hpp"
 
 namespace delassus {
 
 namespace {
-
-/// Visits the entries of a row of a local matrix, as visit(column, value).
-template <class Visit>
-void for_entries(const LocalMatrix& matrix, std::int64_t row, Visit&& visit) {
-    const auto begin = static_cast<std::size_t>(matrix.row_start[static_cast<std::size_t>(row)]);
-    const auto end = static_cast<std::size_t>(matrix.row_start[static_cast<std::size_t>(row) + 1]);
-    for (auto k = begin; k < end; ++k) visit(matrix.column[k], matrix.value[k]);
-}
 
 double square(double value) {
     return value * value;
@@ -36,7 +29,7 @@ PartMeter::PartMeter(const PreparedPart::Implementation& part) : part_(part) {
     for (const auto& cone : part_.cones) largest = std::max(largest, cone.rows);
     work_.resize(3 * static_cast<std::size_t>(largest));
     if (part_.stands_in()) magnitude_ = part_.magnitude_of_diagonal();
-    set_scaling(diagonal_of_N());
+    scaling_ = part_.cone_scaling(diagonal_of_N());
     renew();
 }
 
@@ -168,25 +161,6 @@ std::vector<double> PartMeter::diagonal_of_N() const {
                 if (j == first + row) diagonal[static_cast<std::size_t>(row)] += value;
             });
     return diagonal;
-}
-
-// As sdk::block_scaling(), with the mean over the cones of all processes.
-void PartMeter::set_scaling(const std::vector<double>& diagonal) {
-    scaling_.resize(part_.cones.size());
-    std::vector<double> sums = {0.0, 0.0};
-    for (std::size_t c = 0; c < scaling_.size(); ++c) {
-        const auto& cone = part_.cones[c];
-        double trace = 0.0;
-        for (std::int32_t i = 0; i < cone.rows; ++i) trace += diagonal[static_cast<std::size_t>(cone.first_row + i)];
-        scaling_[c] = trace / cone.rows;
-        if (scaling_[c] > 0.0) {
-            sums[0] += scaling_[c];
-            sums[1] += 1.0;
-        }
-    }
-    part_.communicator->sum(sums);
-    const double fallback = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
-    for (double& s : scaling_) s = 1.0 / std::sqrt(s > 0.0 ? s : fallback);
 }
 
 void PartMeter::renew() {

@@ -29,7 +29,6 @@ private:
     [[nodiscard]] std::vector<double> diagonal_of_N() const;
     void add_squares_of_rows(std::vector<double>& diagonal) const;
     void add_squares_by_solves(std::vector<double>& diagonal) const;
-    void set_scaling(const std::vector<double>& diagonal);
     void take_x(const double* x);
     void take_lambda(const double* lambda);
     /// Own sums over the cones at the x and λ taken; leaves the own part of Dᵀλ in impulse_ if asked.

@@ -14,6 +14,7 @@
 #include "delassus/error.hpp"
 #include "partitioned/alone.hpp"
 #include "partitioned/part_meter.hpp"
+#include "partitioned/part_proof.hpp"
 #include "partitioned/prepared_part.hpp"
 #include "solver/auto_solver.hpp"
 #include "solver/finished_solver.hpp"
@@ -288,12 +289,6 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
     report.status = status_of(ending.status);
     if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
     report.message = communicator->broadcast(outcome.message ? outcome.message : "");
-    if (report.status == Status::Infeasible) {
-        report.status = Status::FalseClaim;
-        report.message =
-            fmt::format("{} claimed that there is no solution; of a partitioned problem such a claim cannot be checked",
-                        report.solver);
-    }
     if (!ending.sentence.empty()) report.message = ending.sentence;
     if (settings.record_curve)
         report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
@@ -356,7 +351,8 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
         report.status = done.status;
         const bool to_the_end = stage.tolerance <= settings.tolerance;
         if ((done.status == Status::Solved && to_the_end) || done.status == Status::Cancelled ||
-            done.status == Status::TimeLimit || (ranked.last && done.status != Status::Solved))
+            done.status == Status::Infeasible || done.status == Status::TimeLimit ||
+            (ranked.last && done.status != Status::Solved))
             break;
         if (done.status == Status::Solved) report.status = Status::Stalled;
         if (!ranked.stage.to_goal && best <= settings.needed) {
@@ -408,6 +404,8 @@ SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own,
         own.lambda.assign(m, 0.0);
     }
     report.error = problem.measure(own.x, own.lambda);
+    if (report.status == Status::Infeasible && !self.ranking)  // a stage of auto has been here
+        judge_infeasibility(report, PartProof(*problem.implementation_).size(own.x, own.lambda));
     auto& part = *problem.implementation_;
     judge(report, part.only_cones(), [&] {
         return part.structure == Structure::Reduced

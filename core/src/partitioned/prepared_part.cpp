@@ -345,6 +345,25 @@ std::vector<double> PreparedPart::Implementation::magnitude_of_diagonal() const 
     return magnitude;
 }
 
+std::vector<double> PreparedPart::Implementation::cone_scaling(const std::vector<double>& diagonal) const {
+    std::vector<double> scaling(cones.size());
+    std::array<double, 2> sums = {0.0, 0.0};
+    for (std::size_t c = 0; c < scaling.size(); ++c) {
+        double trace = 0.0;
+        for (std::int32_t i = 0; i < cones[c].rows; ++i)
+            trace += diagonal[static_cast<std::size_t>(cones[c].first_row + i)];
+        scaling[c] = trace / cones[c].rows;
+        if (scaling[c] > 0.0) {
+            sums[0] += scaling[c];
+            sums[1] += 1.0;
+        }
+    }
+    communicator->sum(sums);
+    const double fallback = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
+    for (double& s : scaling) s = 1.0 / std::sqrt(s > 0.0 ? s : fallback);
+    return scaling;
+}
+
 // With C = |diag H|^(−½), the pivots of C H C are the relative ones of H. A matrix without negative ones, of which some
 // are null, is semidefinite if it is definite after a shift by 1e-10 of the diagonal: see structure_of_singular().
 void PreparedPart::Implementation::factorize_coupled() {

@@ -49,6 +49,9 @@ struct PreparedPart::Implementation {
     void apply_inverse(std::vector<double>& v) const;
     /// |diag H| with the mean of the others for a zero, own entries; 1 where all are zero.
     [[nodiscard]] std::vector<double> magnitude_of_diagonal() const;
+    /// s of each own cone from the own rows' diagonal of N: sdk::block_scaling() with the mean over the cones of all
+    /// processes. Collective.
+    [[nodiscard]] std::vector<double> cone_scaling(const std::vector<double>& diagonal) const;
     void lay_out();
     void count_cones();
     void derive_needs();

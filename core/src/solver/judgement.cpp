@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "delassus/error.hpp"
+#include "problem/infeasibility.hpp"
 
 namespace delassus {
 
@@ -48,6 +49,15 @@ void check_settings(const SolveSettings& settings) {
         throw InputError(fmt::format("the iteration limit is {}; it must not be negative", settings.max_iterations));
     if (!(settings.time_limit > 0.0))
         throw InputError(fmt::format("the time limit is {} s; it must be positive", settings.time_limit));
+}
+
+void judge_infeasibility(SolveReport& report, double proven) {
+    if (proven >= beyond_all_sizes) return;
+    report.status = Status::FalseClaim;
+    report.message = fmt::format(
+        "{} claimed that there is no solution; its answer proves only that none is smaller than {:.1e} in units of the "
+        "data",
+        report.solver, proven);
 }
 
 void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfBalance()>& rounding_of_balance) {

@@ -18,6 +18,10 @@ struct RoundingOfBalance {
 /// Throws InputError on a setting outside its domain.
 void check_settings(const SolveSettings& settings);
 
+/// Takes back a claim that there is no solution unless the answer proves that none is smaller than beyond_all_sizes.
+/// proven: proven_size() of the answer.
+void judge_infeasibility(SolveReport& report, double proven);
+
 /// Compares the claim report.status with report.error and corrects status and message (docs/errors.md, "When a claim
 /// stands"). only_cones: every set is a cone. rounding_of_balance: called where only the balance is missed; in the
 /// same cases on all processes that have the same report.

@@ -9,6 +9,7 @@
 
 #include "delassus/error.hpp"
 #include "problem/infeasibility.hpp"
+#include "solver/judgement.hpp"
 #include "solver/plugin_instance.hpp"
 #include "solver/solver_implementation.hpp"
 
@@ -71,16 +72,6 @@ struct Listener {
 };
 
 /// Checks the claim that there is no solution, as any other claim is checked.
-void check_proof(const PreparedProblem& problem, const Solution& answer, SolveReport& report) {
-    const double size = proven_size(problem, answer.x, answer.lambda);
-    if (size >= beyond_all_sizes) return;
-    report.status = Status::FalseClaim;
-    report.message = fmt::format(
-        "{} claimed that there is no solution; its answer proves only that none is smaller than {:.1e} in units of the "
-        "data",
-        report.solver, size);
-}
-
 class PluginSolver : public Solver::Implementation {
 public:
     PluginSolver(std::shared_ptr<const Plugin> loaded, OptionTexts texts, const Registry* known)
@@ -181,7 +172,8 @@ std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution
     report.status = status_of(raw_status);
     if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
     if (outcome.message) report.message = outcome.message;
-    if (report.status == Status::Infeasible) check_proof(problem, solution, report);
+    if (report.status == Status::Infeasible)
+        judge_infeasibility(report, proven_size(problem, solution.x, solution.lambda));
     if (report.status == Status::Error || report.status == Status::NumericalFailure)
         report.message = fmt::format("{}: {}", info().name, instance.last_error());
     if (settings.record_curve)

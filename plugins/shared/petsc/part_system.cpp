@@ -393,13 +393,33 @@ void PartSystem::solve(KSP krylov, sdk::Vector& v) const {
     check(VecRestoreArrayRead(solution_.get(), &values));
 }
 
-void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kind, KrylovHandle& krylov) {
+namespace {
+
+// With PC_ASM_BASIC the preconditioner is symmetric, as conjugate gradients need it.
+void make_schwarz(PC preconditioner, Mat matrix, Schwarz settings) {
+    check(PCSetType(preconditioner, PCASM));
+    check(PCASMSetType(preconditioner, PC_ASM_BASIC));
+    check(PCASMSetOverlap(preconditioner, settings.overlap));
+    PetscInt own = 0;
+    check(MatGetLocalSize(matrix, &own, nullptr));
+    const auto count =
+        static_cast<PetscInt>(std::max<std::int64_t>(1, (own + settings.columns - 1) / settings.columns));
+    IS* domains = nullptr;
+    check(PCASMCreateSubdomains(matrix, count, &domains));
+    check(PCASMSetLocalSubdomains(preconditioner, count, domains, nullptr));
+    check(PCASMDestroySubdomains(count, domains, nullptr));
+}
+
+}  // namespace
+
+void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kind, KrylovHandle& krylov,
+                        Schwarz schwarz) {
     check(KSPCreate(processes.get(), krylov.make()));
     check(KSPSetOperators(krylov.get(), matrix, matrix));
     PC preconditioner = nullptr;
     check(KSPGetPC(krylov.get(), &preconditioner));
     check(KSPSetType(krylov.get(), kind == LinearSolver::Mumps ? KSPPREONLY : KSPCG));
-    check(KSPSetNormType(krylov.get(), kind == LinearSolver::Mumps ? KSP_NORM_NONE : KSP_NORM_PRECONDITIONED));
+    check(KSPSetNormType(krylov.get(), kind == LinearSolver::Mumps ? KSP_NORM_NONE : KSP_NORM_UNPRECONDITIONED));
     switch (kind) {
         case LinearSolver::Mumps: {
             check(PCSetType(preconditioner, PCCHOLESKY));
@@ -418,18 +438,30 @@ void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kin
         case LinearSolver::BlockJacobi:
             check(PCSetType(preconditioner, PCBJACOBI));
             break;
+        case LinearSolver::Schwarz:
+            make_schwarz(preconditioner, matrix, schwarz);
+            break;
     }
     check(KSPSetUp(krylov.get()));
-    if (kind != LinearSolver::BlockJacobi) return;
+    if (kind != LinearSolver::BlockJacobi && kind != LinearSolver::Schwarz) return;
     KSP* local = nullptr;
     PetscInt count = 0;
-    check(PCBJacobiGetSubKSP(preconditioner, &count, nullptr, &local));
+    if (kind == LinearSolver::Schwarz) {
+        check(PCASMGetSubKSP(preconditioner, &count, nullptr, &local));
+    } else {
+        check(PCBJacobiGetSubKSP(preconditioner, &count, nullptr, &local));
+    }
     for (PetscInt k = 0; k < count; ++k) {
         PC block = nullptr;
         check(KSPSetType(local[k], KSPPREONLY));
         check(KSPGetPC(local[k], &block));
-        check(PCSetType(block, PCICC));
-        check(PCFactorSetShiftType(block, MAT_SHIFT_POSITIVE_DEFINITE));
+        if (kind == LinearSolver::Schwarz) {
+            check(PCSetType(block, PCCHOLESKY));
+            check(PCFactorSetMatSolverType(block, MATSOLVERCHOLMOD));
+        } else {
+            check(PCSetType(block, PCICC));
+            check(PCFactorSetShiftType(block, MAT_SHIFT_POSITIVE_DEFINITE));
+        }
     }
 }
 

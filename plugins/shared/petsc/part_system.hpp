@@ -95,11 +95,19 @@ private:
 [[nodiscard]] std::vector<std::int32_t> coupled_rows(const sdk::LocalProblemView& problem);
 
 /// How linear systems with an n_all × n_all definite matrix are solved.
-enum class LinearSolver { Mumps, Hypre, BlockJacobi };
+enum class LinearSolver { Mumps, Hypre, BlockJacobi, Schwarz };
 
-/// Sets up krylov for matrix: a factorisation by MUMPS, or conjugate gradients with hypre's BoomerAMG or with
-/// incomplete Cholesky on each process. Collective.
-void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kind, KrylovHandle& krylov);
+/// Additive Schwarz: each process splits its columns into domains of about `columns` (PT-Scotch), each grows by
+/// `overlap` layers of the matrix's graph, beyond the process's own where it borders on them, and is factored.
+struct Schwarz {
+    std::int64_t columns = 3000;
+    int overlap = 2;
+};
+
+/// Sets up krylov for matrix: a factorisation by MUMPS, or conjugate gradients with hypre's BoomerAMG, with incomplete
+/// Cholesky on each process, or with Schwarz' method and CHOLMOD. Collective.
+void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kind, KrylovHandle& krylov,
+                        Schwarz schwarz = {});
 /// Factors or sets up the preconditioner for the matrix's new values. False if the factorisation failed. Collective.
 [[nodiscard]] bool set_up(KSP krylov);
 

@@ -21,9 +21,9 @@ namespace {
 
 using namespace delassus::sdk;
 
-constexpr const char* faults[] = {"none", "throw", "kill", "crash", "memory", "wait"};
+constexpr const char* faults[] = {"none", "throw", "kill", "crash", "memory", "wait", "claim"};
 constexpr delassus_option options[] = {
-    choice_option("fault", "none", faults, "What process 1 does after ten iterations"),
+    choice_option("fault", "none", faults, "What process 1 does after ten iterations; claim: all claim that there is no solution"),
 };
 
 class PartsGradient : public PartitionedSolver {
@@ -71,6 +71,10 @@ public:
             lambda = z.cwiseProduct(s);
             if (const auto answer = request.progress(k, nullptr, lambda.data()); answer != DELASSUS_CONTINUE) {
                 outcome.status = status_of(answer);
+                break;
+            }
+            if (k == 10 && fault_ == "claim") {
+                outcome.status = DELASSUS_INFEASIBLE;
                 break;
             }
             if (natural <= 0.9 * request.tolerance()) {
