@@ -26,13 +26,14 @@ import scipy.sparse
 from . import _delassus
 from ._delassus import Cone, Error, InputError, PluginError, Result, SolveRequest, StepFailure, StepRecord, \
     Unsupported
+from ._compare import Comparison, compare
 from ._derivative import Derivative
 from ._yaml import yaml_of
 
 __version__: str = _delassus.version
-__all__ = ["Cone", "Derivative", "Error", "InputError", "PluginError", "Problem", "Result", "Scene", "Simulation",
-           "SolveRequest", "Solver", "StepFailure", "StepRecord", "Trajectory", "Unsupported", "derivative", "plugins",
-           "read", "register", "simulate", "solve", "unbuilt"]
+__all__ = ["Comparison", "Cone", "Derivative", "Error", "InputError", "PluginError", "Problem", "Result", "Scene",
+           "Simulation", "SolveRequest", "Solver", "StepFailure", "StepRecord", "Trajectory", "Unsupported", "compare",
+           "derivative", "plugins", "read", "register", "simulate", "solve", "unbuilt"]
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
 Path = Union[str, "os.PathLike[str]"]

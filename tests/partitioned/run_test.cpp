@@ -33,8 +33,8 @@ using Json = nlohmann::json;
 // Layers of spheres that lean on one another between walls, and settle.
 constexpr const char* pile = R"(
 step: 0.0023
-end: 0.2047
-solver: {tolerance: 1.0e-10}
+end: 0.0851
+solver: {tolerance: 1.0e-9}
 materials: {stone: {friction: 0.4}}
 bodies:
   - name: box
@@ -59,7 +59,7 @@ bodies:
 // spheres: one body touches many, and links cross the cuts.
 constexpr const char* workshop = R"(
 step: 0.003
-end: 0.2
+end: 0.09
 integrator: euler_implicit_linearized
 coordinates: maximal
 solver: {tolerance: 1.0e-8}
@@ -90,7 +90,7 @@ springs:
 // One linkage, heavier than any process's share: its joints are cut.
 constexpr const char* chain = R"(
 step: 0.004
-end: 0.6
+end: 0.2
 integrator: euler_implicit_linearized
 coordinates: maximal
 bodies:
@@ -164,11 +164,11 @@ protected:
 };
 
 TEST_F(SharedRun, APileMovesAsInOneProcess) {
-    compare(pile, {2, 3}, 1e-8, 1e-6);
+    compare(pile, {3}, 1e-8, 1e-6);
 }
 
 TEST_F(SharedRun, OneBodyThatTouchesManyAndLinksAcrossTheCuts) {
-    compare(workshop, {2, 4}, 1e-8, 1e-6);
+    compare(workshop, {4}, 1e-8, 1e-6);
 }
 
 TEST_F(SharedRun, AChainIsCut) {
@@ -178,13 +178,13 @@ TEST_F(SharedRun, AChainIsCut) {
 // Two flocks fly through one another: all bodies change their domains.
 TEST_F(SharedRun, BodiesThatFlyFarChangeProcesses) {
     compare(
-        "{step: 0.0031, end: 0.5, gravity: [0, 0, -1], solver: {tolerance: 1.0e-10}, materials: {m: {friction: 0.3, "
+        "{step: 0.0031, end: 0.5, gravity: [0, 0, -1], solver: {tolerance: 1.0e-9}, materials: {m: {friction: 0.3, "
         "restitution: 0.5}}, bodies: [{name: 'a_{i}_{j}', density: 900, position: [-3, 0, 1], velocity: [9, 0, 0], "
         "angular_velocity: [0, 3, 1], shapes: [{box: {size: [0.1, 0.12, 0.11]}, material: m}], repeat: {count: [6, 5, "
         "1], spacing: [0.3, 0.3, 0]}}, {name: 'b_{i}_{j}', density: 800, position: [1.5, 0.15, 1.06], velocity: [-9, "
         "0.123, 0], shapes: [{sphere: {radius: 0.06}, material: m}], repeat: {count: [6, 5, 1], spacing: [0.3, 0.3, "
         "0]}}]}",
-        {2, 3}, 1e-8, 1e-6, 3);
+        {2}, 1e-8, 1e-6, 3);
 }
 
 TEST_F(SharedRun, MoreProcessesThanBodies) {
@@ -198,8 +198,8 @@ TEST_F(SharedRun, MoreProcessesThanBodies) {
 TEST_F(SharedRun, ResumesOnAnotherNumberOfProcesses) {
     const std::string file = scene(pile), run = (folder / "run").string();
     ASSERT_EQ(run_command("run " + file + " -o " + (folder / "one").string()).exit_code, 0);
-    ASSERT_EQ(mpirun(2, "run " + file + " --end 0.0713 -o " + run).exit_code, 0);
-    ASSERT_EQ(mpirun(3, "run " + file + " --end 0.1403 --resume " + run).exit_code, 0);
+    ASSERT_EQ(mpirun(2, "run " + file + " --end 0.0391 -o " + run).exit_code, 0);
+    ASSERT_EQ(mpirun(3, "run " + file + " --end 0.0621 --resume " + run).exit_code, 0);
     ASSERT_EQ(run_command("run " + file + " --resume " + run).exit_code, 0);
     const auto [x, v] = differences(report("one"), report("run"));
     EXPECT_LE(x, 1e-8);
