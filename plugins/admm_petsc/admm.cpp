@@ -65,7 +65,7 @@ sdk::Outcome PartitionedAdmm::solve(const sdk::LocalProblemView& problem, const 
                                     sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
     CostMeter& meter = *system_.processes().meter();
-    meter.begin(problem.raw->m_all);
+    meter.begin(problem.raw->m_all, 300);
     // Not the penalty that the last solve ended with: a run that goes on from a checkpoint has to take the same path.
     resolvent_.set_penalty(problem, initial_penalty_);
     system_.load(problem);

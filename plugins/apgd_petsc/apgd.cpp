@@ -69,7 +69,7 @@ sdk::Outcome PartitionedGradient::solve(const sdk::LocalProblemView& problem, co
                                         sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
     CostMeter& meter = *scaled_.processes().meter();
-    meter.begin(problem.raw->m_all);
+    meter.begin(problem.raw->m_all, 4000);
     scaled_.load(problem);
     Run run{problem, scaled_, request, sdk::Monitor(request, stall_iterations_)};
     lambda_.setZero(problem.m);

@@ -85,7 +85,7 @@ sdk::Outcome PartitionedInteriorPoint::solve(const sdk::LocalProblemView& proble
                                              sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
     CostMeter& meter = *processes().meter();
-    meter.begin(problem.raw->m_all);
+    meter.begin(problem.raw->m_all, 0);
     system_.load(problem);
     p_.setOnes(problem.m);
     kkt_.load(system_, problem, p_);  // R

