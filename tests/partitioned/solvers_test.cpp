@@ -246,6 +246,30 @@ TEST(PartitionedInfeasible, IpmProvesIt) {
     }
 }
 
+// Domains of a hundred bodies, and more processes than bodies.
+TEST(PartitionedSchwarz, SolvesPiles) {
+    const Registry registry;
+    const auto& names = registry.plugins();
+    if (std::none_of(names.begin(), names.end(), [](const auto& info) { return info.name == "ipm_petsc"; }))
+        GTEST_SKIP() << "ipm_petsc was not built";
+    const auto run = communicator_of_run();
+    SolverConfig config;
+    config.name = "ipm_petsc";
+    config.options = {{"preconditioner", "schwarz"}, {"subdomain", "600"}};
+    PartitionedSolver solver(registry, config, run);
+    SolveSettings settings;
+    settings.tolerance = 1e-2;
+    settings.max_iterations = 40;
+    for (const Problem& problem :
+         {generate("sphere_pile", {}), tests::point_on_plane(1.0, 1.0, 0.3, 0.5, Law::Associated)}) {
+        const PreparedPart part(run, part_of(*run, problem));
+        Solution own;
+        const SolveReport report = solver.solve(part, own, settings);
+        EXPECT_EQ(name_of(report.status), name_of(Status::Solved)) << report.message;
+        EXPECT_NE(report.message.find("overlapping Schwarz"), std::string::npos) << report.message;
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, PartitionedPlugins,
                          testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}},
                                          Case{"ipm_petsc", 1e-10, 100, 3, {Law::Associated}},

@@ -23,7 +23,8 @@ using namespace delassus::sdk;
 
 constexpr const char* faults[] = {"none", "throw", "kill", "crash", "memory", "wait", "claim"};
 constexpr delassus_option options[] = {
-    choice_option("fault", "none", faults, "What process 1 does after ten iterations; claim: all claim that there is no solution"),
+    choice_option("fault", "none", faults,
+                  "What process 1 does after ten iterations; claim: all claim that there is no solution"),
 };
 
 class PartsGradient : public PartitionedSolver {
