@@ -123,6 +123,7 @@ struct PartitionedSolver::Implementation {
     std::map<std::pair<std::string, OptionTexts>, PartitionedSolver> solvers;
     bool analyzed = false;
     std::uint64_t pattern_id = 0, values_id = 0;
+    bool simulation = false;  // of auto: steps of one
 
     /// Runs a collective operation of the plugin and agrees on how it ended; a sentence of the first process on which
     /// it failed, if it did.
@@ -180,7 +181,7 @@ struct PartitionedSolver::Implementation {
                          SolveReport& report);
     [[nodiscard]] const RankingRule& rule_of(const PreparedPart& problem, double tolerance) const {
         const auto rows = std::min<std::int64_t>(problem.raw().m_all, std::numeric_limits<std::int32_t>::max());
-        return ranking->rule({problem.needs(), tolerance, false}, static_cast<std::int32_t>(rows));
+        return ranking->rule({problem.needs(), tolerance, simulation}, static_cast<std::int32_t>(rows));
     }
 };
 
@@ -194,6 +195,7 @@ PartitionedSolver::PartitionedSolver(const Registry& registry, SolverConfig conf
             throw InputError("a partitioned problem is solved by one solver; leave out the option \"finish\"");
         if (self.config.name == auto_name) {
             self.ranking = std::make_unique<Ranking>(ranking_of(registry, options));
+            self.simulation = is_for_simulation(registry, options);
             self.info_of_auto = auto_info(registry);
             return;
         }

@@ -136,6 +136,10 @@ Ranking ranking_of(const Registry& registry, const OptionTexts& options) {
     return read_options(registry, options).ranking;
 }
 
+bool is_for_simulation(const Registry& registry, const OptionTexts& options) {
+    return read_options(registry, options).simulation;
+}
+
 PluginInfo auto_info(const Registry& registry) {
     PluginInfo info;
     info.name = auto_name;

@@ -33,6 +33,8 @@ struct AutoChoice {
 /// What `auto` of partitioned problems needs of the above.
 class Ranking;
 [[nodiscard]] Ranking ranking_of(const Registry& registry, const OptionTexts& options);
+/// The option `simulation`.
+[[nodiscard]] bool is_for_simulation(const Registry& registry, const OptionTexts& options);
 /// Whether this plugin is installed and has all these capabilities.
 [[nodiscard]] bool can(const Registry& registry, const std::string& name, std::uint64_t needs);
 /// The plugins, by ascending name, that can take problems with these needs and work without being named by the user.
