@@ -241,8 +241,9 @@ public:
 
     /// Where v̂'s entry of a column stands in a state; on velocities.
     [[nodiscard]] std::size_t place_of_column(std::size_t column) const {
-        if (order_.range.empty()) return column;
+        // The ranges end with the last column that a block touches; what is behind stays where it is.
         const auto width = static_cast<std::size_t>(rows_.width());
+        if (column / width >= order_.range.size()) return column;
         return static_cast<std::size_t>(order_.range[column / width]) * width + column % width;
     }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "split_part.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -18,10 +19,9 @@ void SplitPart::analyze(const Processes& processes, const sdk::LocalProblemView&
     bodies_.analyze(processes, problem);
     processes.together([&] {
         check_compliance(problem);
-        LocalRows local;
-        const sdk::SparseRowsView D = local.view(problem.D, columns(), 0, problem.m);
-        D_start_.assign(D.outerIndexPtr(), D.outerIndexPtr() + problem.m + 1);
-        D_column_.assign(D.innerIndexPtr(), D.innerIndexPtr() + D.nonZeros());
+        const sdk::SparseRowsView D = rows_.view(problem.D, columns(), 0, problem.m);
+        D_start_ = {D.outerIndexPtr(), at(problem.m) + 1};
+        D_column_ = {D.innerIndexPtr(), at(D.nonZeros())};
         E_start_.assign(1, 0);
         E_column_.clear();
         for (std::int32_t i = 0; i < static_cast<std::int32_t>(problem.m); ++i) {
@@ -35,7 +35,7 @@ void SplitPart::analyze(const Processes& processes, const sdk::LocalProblemView&
         block_start_ = {0, 1};  // an own velocity that nothing touches: no part has none
         block_index_ = {0};
     });
-    find_shares(problem);
+    find_shares();
     H_.start.assign(block_index_.size() + 1, 0);
     H_.column.clear();
     H_.value.clear();
@@ -57,33 +57,40 @@ void SplitPart::check_compliance(const sdk::LocalProblemView& problem) const {
 }
 
 // A block of H is touched as a whole. Foreign ones are there because own rows touch them.
-void SplitPart::find_shares(const sdk::LocalProblemView& problem) {
+void SplitPart::find_shares() {
     const Eigen::Index size = columns().size();
+    share_.setOnes(std::max<Eigen::Index>(size, 1));
+    shared_.clear();
+    elsewhere_.clear();
+    shared_rows_.clear();
+    if (!exist()) return;
     std::vector<std::int32_t> block_of(at(size));
     for (std::size_t k = 0; k + 1 < block_start_.size() && size > 0; ++k)
         for (auto i = block_start_[k]; i < block_start_[k + 1]; ++i)
             block_of[at(block_index_[at(i)])] = static_cast<std::int32_t>(k);
-    std::vector<char> touched(block_start_.size(), 0);
+    std::vector<char> touched(block_start_.size(), 0), is_shared(at(size), 0);
     for (const std::int32_t column : D_column_) touched[at(block_of[at(column)])] = 1;
     sdk::Vector count(size);
     for (Eigen::Index j = 0; j < size; ++j) count[j] = touched[at(block_of[at(j)])] != 0 ? 1.0 : 0.0;
     columns().collect(count.data());
     columns().bring(count.data());
-    share_.setOnes(std::max<Eigen::Index>(size, 1));
-    shared_.clear();
-    elsewhere_.clear();
     for (Eigen::Index j = 0; j < size; ++j) {
         const bool here = touched[at(block_of[at(j)])] != 0;
         if (count[j] > 1.0) share_[j] = 1.0 / count[j];
-        if (here && count[j] > 1.0) shared_.push_back({static_cast<std::int32_t>(j), share_[j]});
+        if (here && count[j] > 1.0) {
+            shared_.push_back({static_cast<std::int32_t>(j), share_[j]});
+            is_shared[at(j)] = 1;
+        }
         if (!here && count[j] > 0.0) elsewhere_.push_back(static_cast<std::int32_t>(j));
     }
-    shared_rows_.clear();
-    for (std::int32_t i = 0; i < static_cast<std::int32_t>(problem.m) && !shared_.empty(); ++i)
-        if (std::any_of(D_column_.begin() + D_start_[at(i)], D_column_.begin() + D_start_[at(i) + 1],
-                        [&](std::int32_t j) { return share_[j] != 1.0; }))
-            shared_rows_.push_back(i);
     scratch_.setZero(size);
+    if (shared_.empty()) return;
+    for (std::size_t i = 0; i + 1 < D_start_.size(); ++i)
+        for (auto e = at(D_start_[i]); e < at(D_start_[i + 1]); ++e)
+            if (is_shared[at(D_column_[e])] != 0) {
+                shared_rows_.push_back(static_cast<std::int32_t>(i));
+                break;
+            }
 }
 
 void SplitPart::factorize(const sdk::LocalProblemView& problem) {

@@ -25,6 +25,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "model.hpp"
@@ -74,7 +75,7 @@ private:
 
     [[nodiscard]] const Exchange& columns() const { return bodies_.columns(); }
     void check_compliance(const sdk::LocalProblemView& problem) const;
-    void find_shares(const sdk::LocalProblemView& problem);
+    void find_shares();
     void make_view(const sdk::LocalProblemView& problem);
 
     Bodies bodies_;
@@ -85,7 +86,9 @@ private:
     std::vector<std::size_t> place_;         // of shared_, in a state
     mutable sdk::Vector scratch_;            // columns
 
-    std::vector<std::int32_t> D_start_, D_column_, E_start_, E_column_, block_start_, block_index_;
+    LocalRows rows_;
+    std::span<const std::int32_t> D_start_, D_column_;  // in rows_
+    std::vector<std::int32_t> E_start_, E_column_, block_start_, block_index_;
     std::vector<double> E_value_;
     sdk::CompressedRows H_;
     sdk::Vector a_;

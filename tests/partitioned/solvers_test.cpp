@@ -274,7 +274,7 @@ INSTANTIATE_TEST_SUITE_P(All, PartitionedPlugins,
                          testing::Values(Case{"apgd_petsc", 1e-12, 5000, 10, {Law::Associated}},
                                          Case{"ipm_petsc", 1e-10, 100, 3, {Law::Associated}},
                                          Case{"admm_petsc", 1e-11, 300, 5, {Law::Associated, Law::Coulomb}},
-                                         Case{"pgs_petsc", 1e-12, 2000, 0, {Law::Associated, Law::Coulomb}}),
+                                         Case{"pgs_petsc", 1e-12, 1500, 0, {Law::Associated, Law::Coulomb}}),
                          [](const auto& each) { return std::string(each.param.plugin); });
 
 }  // namespace

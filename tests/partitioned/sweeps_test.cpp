@@ -61,6 +61,7 @@ protected:
 
 // One process takes the sweeps of pgs.
 TEST_F(PartitionedSweeps, OfOneProcessAreThoseOfPgs) {
+    if (run->size() > 1) GTEST_SKIP() << "pgs takes no part in a run of several processes";
     for (const Law law : {Law::Associated, Law::Coulomb}) {
         PileParameters parameters;
         parameters.contacts = 2000;
@@ -82,7 +83,7 @@ TEST_F(PartitionedSweeps, OfOneProcessAreThoseOfPgs) {
 
 // Whatever the processes do at the same time, together they lower the objective in every sweep, as on one.
 TEST_F(PartitionedSweeps, LowerTheObjective) {
-    const PreparedPart part(run, pile(*run, 700, Law::Associated));
+    const PreparedPart part(run, pile(*run, 300, Law::Associated));
     for (const char* local : {"diagonal", "exact"}) {
         PartitionedSolver sweeps = solver(run, {{"acceleration", "none"}, {"local_solver", local}});
         Solution own;
@@ -92,7 +93,7 @@ TEST_F(PartitionedSweeps, LowerTheObjective) {
         settings.tolerance = 1e-17;  // all iterations, and the last iterate
         settings.warm_start = true;
         double latest = std::numeric_limits<double>::infinity();
-        for (int k = 1; k <= 30; ++k) {
+        for (int k = 1; k <= 10; ++k) {
             settings.max_iterations = 1;
             sweeps.solve(part, own, settings);
             const double now = objective(part.problem(), own);
@@ -108,7 +109,7 @@ TEST_F(PartitionedSweeps, OfManyProcessesAreHardlyMoreThanOfOne) {
     for (const Law law : {Law::Associated, Law::Coulomb}) {
         std::int64_t one = 0, all = 0;
         PartitionedSolver of_run = solver(run), of_one = solver(alone);
-        for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+        for (std::uint64_t seed = 1; seed <= 2; ++seed) {
             SolveSettings settings;
             settings.tolerance = 1e-3;
             Solution own, expected;
@@ -131,18 +132,18 @@ TEST_F(PartitionedSweeps, OfManyProcessesAreHardlyMoreThanOfOne) {
 // The steps of a simulation: another pattern each time, with one solver, from what was found before.
 TEST_F(PartitionedSweeps, TakeNewPatternsOneAfterAnother) {
     PartitionedSolver sweeps = solver(run);
-    for (int step = 0; step < 6; ++step) {
+    for (int step = 0; step < 4; ++step) {
         const PreparedPart part(run, pile(*run, 300 + 40 * static_cast<std::uint64_t>((7 * step) % 5), Law::Coulomb,
                                           step % 2 == 0 ? 1 : 2));
         SolveSettings settings;
-        settings.tolerance = 1e-6;
+        settings.tolerance = 1e-4;
         Solution own;
         ASSERT_EQ(sweeps.solve(part, own, settings).status, Status::Solved) << step;
         settings.warm_start = true;
         const SolveReport again = sweeps.solve(part, own, settings);
         EXPECT_EQ(again.status, Status::Solved);
         EXPECT_EQ(again.iterations, 0) << step;
-        EXPECT_LE(part.measure(own.x, own.lambda).natural, 1e-6);
+        EXPECT_LE(part.measure(own.x, own.lambda).natural, 1e-4);
     }
 }
 
@@ -200,6 +201,24 @@ TEST_F(PartitionedSweeps, ShareBodiesUnderAllKindsOfRows) {
         for (std::size_t i = 0; i < own.lambda.size(); ++i)  // E makes it unique
             EXPECT_NEAR(own.lambda[i], expected.lambda[first_row + i], 1e-8) << variant;
     }
+}
+
+TEST_F(PartitionedSweeps, ComeFirstInStepsOfASimulation) {
+    for (const Law law : {Law::Associated, Law::Coulomb})
+        for (const bool simulation : {true, false}) {
+            SolverConfig config;
+            config.name = "auto";
+            if (simulation) config.options["simulation"] = "true";
+            const PreparedPart part(run, pile(*run, 200, law));
+            SolveSettings settings;
+            settings.tolerance = 1e-2;
+            Solution own;
+            const SolveReport report = PartitionedSolver(registry, config, run).solve(part, own, settings);
+            ASSERT_EQ(report.status, Status::Solved) << report.message;
+            ASSERT_EQ(report.stages.size(), 1U) << report.message;
+            const bool sweeps = simulation || law == Law::Coulomb;
+            EXPECT_EQ(report.stages.front().solver, sweeps ? "pgs_petsc" : "apgd_petsc");
+        }
 }
 
 TEST_F(PartitionedSweeps, RefuseComplianceBetweenRows) {
