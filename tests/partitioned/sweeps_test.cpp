@@ -125,7 +125,8 @@ TEST_F(PartitionedSweeps, OfManyProcessesAreHardlyMoreThanOfOne) {
         }
         RecordProperty(law == Law::Coulomb ? "coulomb" : "associated",
                        std::to_string(all) + " sweeps against " + std::to_string(one));
-        EXPECT_LE(static_cast<double>(all), 1.3 * static_cast<double>(one));
+        const double bound = run->size() <= 3 ? 1.3 : 1.5;  // on eight, half of the bodies are shared
+        EXPECT_LE(static_cast<double>(all), bound * static_cast<double>(one));
     }
 }
 
@@ -201,6 +202,37 @@ TEST_F(PartitionedSweeps, ShareBodiesUnderAllKindsOfRows) {
         for (std::size_t i = 0; i < own.lambda.size(); ++i)  // E makes it unique
             EXPECT_NEAR(own.lambda[i], expected.lambda[first_row + i], 1e-8) << variant;
     }
+}
+
+// Blocks of four velocities, of which rows touch the first alone: the others of the last block of a part lie behind all
+// that its sweeps touch.
+TEST_F(PartitionedSweeps, ShareVelocitiesThatNoRowTouches) {
+    const std::int32_t bodies = 1201 * run->size();
+    Problem whole;
+    std::vector<Triplet> H, D;
+    std::vector<double> compliance;
+    for (std::int32_t k = 0; k < bodies; ++k)
+        for (std::int32_t i = 0; i < 4; ++i)
+            for (std::int32_t j = 0; j < 4; ++j) H.push_back({4 * k + i, 4 * k + j, i == j ? 2.0 + 0.1 * i : 0.3});
+    whole.H = SparseMatrix::from_triplets(4 * bodies, 4 * bodies, std::move(H));
+    for (std::int32_t k = 0; k + 1 < bodies; ++k) {
+        D.push_back({k, 4 * k, 1.0});
+        D.push_back({k, 4 * k + 4, -1.0});
+        whole.cones.push_back(Cone::nonnegative(1));
+        compliance.push_back(0.5);
+        whole.b.push_back(std::sin(1.3 * k));
+    }
+    whole.D = SparseMatrix::from_triplets(bodies - 1, 4 * bodies, std::move(D));
+    whole.E = tests::diagonal_matrix(compliance);
+    for (std::int32_t i = 0; i < 4 * bodies; ++i) whole.a.push_back(std::cos(0.7 * i));
+    SolveSettings settings;
+    settings.tolerance = 1e-11;
+    const PreparedPart part(run, part_of(*run, whole)), at_once(alone, part_of(*alone, whole));
+    Solution own, expected;
+    ASSERT_EQ(solver(run).solve(part, own, settings).status, Status::Solved);
+    ASSERT_EQ(solver(alone).solve(at_once, expected, settings).status, Status::Solved);
+    const auto first = static_cast<std::size_t>(part.problem().column_start[static_cast<std::size_t>(run->rank())]);
+    for (std::size_t i = 0; i < own.x.size(); ++i) ASSERT_NEAR(own.x[i], expected.x[first + i], 1e-8) << i;
 }
 
 TEST_F(PartitionedSweeps, ComeFirstInStepsOfASimulation) {
