@@ -455,7 +455,13 @@ void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kin
         PC block = nullptr;
         check(KSPSetType(local[k], KSPPREONLY));
         check(KSPGetPC(local[k], &block));
-        if (kind == LinearSolver::Schwarz) {
+        Mat domain = nullptr;
+        PetscInt size = 0;
+        check(KSPGetOperators(local[k], &domain, nullptr));
+        check(MatGetSize(domain, &size, nullptr));
+        if (size == 0) {  // CHOLMOD takes no empty matrix
+            check(PCSetType(block, PCNONE));
+        } else if (kind == LinearSolver::Schwarz) {
             check(PCSetType(block, PCCHOLESKY));
             check(PCFactorSetMatSolverType(block, MATSOLVERCHOLMOD));
         } else {
