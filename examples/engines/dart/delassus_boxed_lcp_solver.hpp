@@ -4,7 +4,8 @@
 //     world->setConstraintSolver(std::make_unique<dart::constraint::BoxedLcpConstraintSolver>(
 //         std::make_shared<DelassusBoxedLcpSolver>("auto"), std::make_shared<dart::constraint::PgsBoxedLcpSolver>()));
 //
-// Compile with NDEBUG as DART was: it has a virtual function more without it. Debian's DART was compiled without it.
+// Define NDEBUG if DART was compiled with it, and only then: without it DART's class has a virtual function more.
+// Debian's DART was compiled without it.
 #pragma once
 
 #include <dart/constraint/BoxedLcpSolver.hpp>
