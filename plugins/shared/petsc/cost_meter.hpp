@@ -21,8 +21,8 @@ class CostMeter {
 public:
     explicit CostMeter(MPI_Comm communicator, int processes) : communicator_(communicator), processes_(processes) {}
 
-    /// A solve begins. rows: of all processes together. Where a process has less than `few` of them, one iteration in 32
-    /// is timed and stands for the others: reading the clock must not count.
+    /// A solve begins. rows: of all processes together. Where a process has less than `few` of them, one iteration in
+    /// 32 is timed and stands for the others: reading the clock must not count.
     void begin(std::int64_t rows, std::int64_t few);
     /// What it has cost this process since begin(). Collective.
     [[nodiscard]] sdk::Cost end();
