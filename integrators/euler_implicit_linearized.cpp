@@ -98,7 +98,7 @@ public:
         memory.impulses = kept_;
         return memory;
     }
-    void set_memory(StepMemory memory) override {
+    void set_memory(StepMemory&& memory) override {
         restart();
         last_h_ = memory.numbers.at(0);
         std::array<std::vector<double>, StepError::kept> errors;

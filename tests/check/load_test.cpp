@@ -33,8 +33,8 @@ std::string refusal_of(const std::string& name) {
 
 TEST(Load, RefusesBrokenHandshakesWithASentence) {
     const std::pair<const char*, std::vector<const char*>> cases[] = {
-        {"wrong_abi", {"99.3", "this is version 2.3"}},
-        {"before_release", {"built for version 1.0", "this is version 2.3"}},
+        {"wrong_abi", {"99.4", "this is version 2.4"}},
+        {"before_release", {"built for version 1.0", "this is version 2.4"}},
         {"wrong_magic", {"magic number"}},
         {"small_descriptor", {"24 bytes"}},
         {"bad_name", {"../Bad Name", "not a word"}},

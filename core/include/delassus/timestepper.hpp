@@ -117,7 +117,7 @@ public:
     /// The memory of the method by what it belongs to, where TimestepperInfo::shared (dynamics/step_memory.hpp).
     /// Throws Unsupported elsewhere.
     [[nodiscard]] virtual StepMemory memory() const;
-    virtual void set_memory(StepMemory memory);
+    virtual void set_memory(StepMemory&& memory);
 
     /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
     [[nodiscard]] virtual std::vector<double> save() const;

@@ -72,7 +72,7 @@ void Timestepper::step(State& state, double h, StepSolver& solver, StepReport& r
 StepMemory Timestepper::memory() const {
     throw Unsupported("this method does not say what its memory belongs to");
 }
-void Timestepper::set_memory(StepMemory /*memory*/) {
+void Timestepper::set_memory(StepMemory&& /*memory*/) {
     throw Unsupported("this method does not say what its memory belongs to");
 }
 
