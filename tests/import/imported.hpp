@@ -108,8 +108,9 @@ public:
             const Quaterniond turn = orientation(there);
             centre_.back() = turn.conjugate() * (Vector3d(own.pose.position.data()) - Vector3d(d_->xpos + 3 * there));
             compare_pose(own.name, own.pose, there, body);
-            if (own.mass == m.body_mass[there])
+            if (own.mass == m.body_mass[there]) {
                 EXPECT_LE((centre_.back() - Vector3d(m.body_ipos + 3 * there)).norm(), 1e-12) << own.name;
+            }
         }
     }
 
@@ -119,8 +120,8 @@ public:
         for (int j = 0; j < m_.njnt; ++j) {
             const int at = m_.jnt_qposadr[j];
             if (is_scalar(j)) {
-                d_->qpos[at] = reference_[static_cast<std::size_t>(j)] +
-                               (m_.jnt_type[j] == mjJNT_HINGE ? 1.2 : 0.3) * by(random);
+                d_->qpos[at] =
+                    reference_[static_cast<std::size_t>(j)] + (m_.jnt_type[j] == mjJNT_HINGE ? 1.2 : 0.3) * by(random);
                 continue;
             }
             const bool free = m_.jnt_type[j] == mjJNT_FREE;
@@ -201,9 +202,7 @@ public:
     double worst_mass = 0.0, worst_pose = 0.0, worst_acceleration = 0.0;
 
 private:
-    [[nodiscard]] bool is_scalar(int j) const {
-        return m_.jnt_type[j] == mjJNT_HINGE || m_.jnt_type[j] == mjJNT_SLIDE;
-    }
+    [[nodiscard]] bool is_scalar(int j) const { return m_.jnt_type[j] == mjJNT_HINGE || m_.jnt_type[j] == mjJNT_SLIDE; }
     [[nodiscard]] Quaterniond orientation(int body) const {
         const mjtNum* q = d_->xquat + 4 * body;
         return Quaterniond(q[0], q[1], q[2], q[3]).normalized();

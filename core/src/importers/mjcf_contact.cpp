@@ -76,6 +76,7 @@ void MjcfReader::read_materials() {
 
 // Whether MuJoCo looks for contacts of two geoms.
 bool MjcfReader::touches(int a, int b) const {
+    if (disabled(mjDSBL_CONTACT) || disabled(mjDSBL_CONSTRAINT)) return false;
     const int collision = m_.opt.collision;
     if (collision != mjCOL_DYNAMIC)
         for (int k = 0; k < m_.npair; ++k)
@@ -95,17 +96,26 @@ bool MjcfReader::touches(int a, int b) const {
            m_.exclude_signature + m_.nexclude;
 }
 
+// A geom that touches nothing is looked at only. It is a shape where its body has none that touches, so that the body
+// can be seen; read_touching() keeps such bodies apart from all others.
 void MjcfReader::read_shapes() {
-    std::vector<std::string> seen_only;
-    const bool none = disabled(mjDSBL_CONTACT) || disabled(mjDSBL_CONSTRAINT);
+    const auto owner = [&](int g) {
+        const int body = m_.geom_bodyid[g];
+        return static_cast<std::size_t>(moves(body) ? m_.body_weldid[body] : body);
+    };
+    std::vector<char> meets(static_cast<std::size_t>(m_.ngeom), 0), body_meets(static_cast<std::size_t>(m_.nbody), 0);
     for (int g = 0; g < m_.ngeom; ++g) {
-        bool meets = false;
-        for (int other = 0; other < m_.ngeom && !meets && !none; ++other) meets = other != g && touches(g, other);
-        if (meets) {
-            read_shape(g);
-        } else {
-            seen_only.push_back(name_of(mjOBJ_GEOM, g));
-        }
+        for (int other = 0; other < m_.ngeom && meets[static_cast<std::size_t>(g)] == 0; ++other)
+            if (other != g && touches(g, other)) meets[static_cast<std::size_t>(g)] = body_meets[owner(g)] = 1;
+    }
+    std::vector<std::string> seen_only;
+    for (int g = 0; g < m_.ngeom; ++g) {
+        const bool acts = meets[static_cast<std::size_t>(g)] != 0;
+        if (!acts) seen_only.push_back(name_of(mjOBJ_GEOM, g));
+        if (!acts && body_meets[owner(g)] != 0) continue;
+        const std::size_t losses = model_.lost.size();
+        read_shape(g);
+        if (!acts) model_.lost.resize(losses);
     }
     if (!seen_only.empty())
         model_.without_effect.push_back({"geoms that touch nothing", fmt::format("{}", fmt::join(seen_only, ", "))});

@@ -58,5 +58,5 @@ extern "C" DELASSUS_API void delassus_import_mjcf_read(const std::filesystem::pa
     model.title = compiled->names;  // the model's own name comes first
     if (!said.empty()) model.without_effect.push_back({"warning of libmujoco", said});
     delassus::importers::MjcfReader(*compiled, settings.keyframe, model).read();
-    if (!warnings.empty()) model.without_effect.push_back({"warning of libmujoco", warnings});
+    if (!warnings.empty() && warnings != said) model.without_effect.push_back({"warning of libmujoco", warnings});
 }

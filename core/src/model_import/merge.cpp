@@ -81,29 +81,24 @@ void renumber(Model& model, const std::vector<std::int32_t>& body, const std::ve
     const auto to = [&](std::int32_t old) { return old < 0 ? old : body[static_cast<std::size_t>(old)]; };
     std::vector<std::int32_t> joint(model.joints.size(), -1);
     std::vector<ModelJoint> joints;
-    for (std::size_t k = 0; k < model.joints.size(); ++k) {
-        if (keep_joint[k] == 0) continue;
-        joint[k] = static_cast<std::int32_t>(joints.size());
-        JointParameters& own = model.joints[k].parameters;
-        own.first = to(own.first);
-        own.second = to(own.second);
-        joints.push_back(model.joints[k]);
-    }
+    for (const bool gears : {false, true})  // gears name others, and nothing names them: they come last
+        for (std::size_t k = 0; k < model.joints.size(); ++k) {
+            JointParameters& own = model.joints[k].parameters;
+            if (keep_joint[k] == 0 || (own.kind == JointKind::Gear) != gears) continue;
+            joint[k] = static_cast<std::int32_t>(joints.size());
+            own.first = to(own.first);
+            own.second = to(own.second);
+            joints.push_back(model.joints[k]);
+        }
     const auto joint_of = [&](std::int32_t old) { return old < 0 ? old : joint[static_cast<std::size_t>(old)]; };
-    std::vector<char> gone(joints.size(), 0);
-    for (std::size_t k = 0; k < joints.size(); ++k) {
-        JointParameters& own = joints[k].parameters;
-        if (own.kind != JointKind::Gear) continue;
-        own.gear_first = joint_of(own.gear_first);
-        own.gear_second = joint_of(own.gear_second);
-        gone[k] = own.gear_first < 0 || own.gear_second < 0 ? 1 : 0;
+    const auto is_gear = [](const ModelJoint& one) { return one.parameters.kind == JointKind::Gear; };
+    for (ModelJoint& one : joints) {
+        if (!is_gear(one)) continue;
+        one.parameters.gear_first = joint_of(one.parameters.gear_first);
+        one.parameters.gear_second = joint_of(one.parameters.gear_second);
     }
-    // Gears are named by nothing, and come last.
-    std::stable_partition(joints.begin(), joints.end(),
-                          [](const ModelJoint& one) { return one.parameters.kind != JointKind::Gear; });
     std::erase_if(joints, [&](const ModelJoint& one) {
-        return one.parameters.kind == JointKind::Gear &&
-               (one.parameters.gear_first < 0 || one.parameters.gear_second < 0);
+        return is_gear(one) && (one.parameters.gear_first < 0 || one.parameters.gear_second < 0);
     });
     model.joints = std::move(joints);
     const auto keep = [&](auto& items) {

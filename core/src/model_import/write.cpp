@@ -38,6 +38,16 @@ std::string list(const Vector3d& v) {
     return fmt::format("[{}, {}, {}]", number(v.x()), number(v.y()), number(v.z()));
 }
 
+/// Without what rounding leaves of sums of this size.
+double cleaned(double x, double size) {
+    return std::abs(x) <= 2e-15 * size ? 0.0 : x;
+}
+
+Quaterniond cleaned(Quaterniond q) {
+    for (double& x : q.coeffs()) x = cleaned(x, 1.0);
+    return q;
+}
+
 std::string list(const Quaterniond& given) {
     Quaterniond q = given.normalized();
     if (q.w() < 0.0) q.coeffs() *= -1.0;
@@ -159,8 +169,9 @@ private:
             const Matrix3d& J = body.inertia;
             put(out_, "    mass: {}\n    inertia: {{xx: {}, yy: {}, zz: {}", number(body.mass), number(J(0, 0)),
                 number(J(1, 1)), number(J(2, 2)));
-            const auto beside = [&](const char* key, double value) {
-                if (value != 0.0) put(out_, ", {}: {}", key, number(value));
+            const auto beside = [&](const char* key, double given) {
+                if (const double value = cleaned(given, J.trace()); value != 0.0)
+                    put(out_, ", {}: {}", key, number(value));
             };
             beside("xy", 0.5 * (J(0, 1) + J(1, 0)));
             beside("xz", 0.5 * (J(0, 2) + J(2, 0)));
@@ -176,9 +187,11 @@ private:
         for (const ModelShape& shape : body.shapes) {
             put(out_, "      - {{{}", form(shape));
             const Quaterniond to_body = body.orientation.conjugate();
-            const Vector3d place = to_body * (shape.position - body.position);
+            const double size = 1.0 + shape.position.norm();
+            const Vector3d place =
+                (to_body * (shape.position - body.position)).unaryExpr([&](double x) { return cleaned(x, size); });
             if (!place.isZero(0.0)) put(out_, ", position: {}", list(place));
-            if (const Quaterniond turned = to_body * shape.orientation; is_turned(turned))
+            if (const Quaterniond turned = cleaned(to_body * shape.orientation); is_turned(turned))
                 put(out_, ", orientation: {}", list(turned));
             if (shape.material >= 0)
                 put(out_, ", material: {}", quoted(model_.materials[static_cast<std::size_t>(shape.material)].name));
@@ -294,6 +307,8 @@ private:
                 list(Eigen::Map<const Vector3d>(own.point.data())));
             if (own.kind != JointKind::Spherical && own.kind != JointKind::Fixed)
                 put(out_, ", axis: {}", list(Eigen::Map<const Vector3d>(own.axis.data())));
+            if (own.kind == JointKind::Universal)
+                put(out_, ", second_axis: {}", list(Eigen::Map<const Vector3d>(own.second_axis.data())));
             if (std::isfinite(own.lower)) put(out_, ", lower: {}", number(own.lower));
             if (std::isfinite(own.upper)) put(out_, ", upper: {}", number(own.upper));
             put_coordinate(own.kind == JointKind::Prismatic ? own.slide : own.turn);
