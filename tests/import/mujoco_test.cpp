@@ -90,9 +90,9 @@ const Case mjcf[] = {
     {"ball_chain.xml", {}},
     {"losses.xml",
      {"option density, viscosity", "body \"hand\"", "joint \"many_turns\"", "joint \"many_turns\"", "joint \"ball\"",
-      "joint \"ball\"", "joint \"ball\"", "joint \"drone\"", "joint \"drone\"", "geom \"arm\"", "equality \"winch\"",
-      "equality \"tied\"", "actuator \"torque\"", "actuator \"on_rope\"", "actuator \"on_site\"",
-      "actuator \"on_ball\"", "actuator \"muscle\"", "actuator \"filtered\"", "tendon \"rope\""},
+      "joint \"ball\"", "joint \"ball\"", "joint \"drone\"", "geom \"arm\"", "equality \"winch\"", "equality \"tied\"",
+      "actuator \"torque\"", "actuator \"on_rope\"", "actuator \"on_site\"", "actuator \"on_ball\"",
+      "actuator \"muscle\"", "actuator \"filtered\"", "tendon \"rope\""},
      false}};
 INSTANTIATE_TEST_SUITE_P(Mjcf, ModelBesideMujoco, testing::ValuesIn(mjcf));
 

@@ -2,6 +2,8 @@
 // What is refused, and details of what is written.
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Geometry>
+
 #include "delassus/error.hpp"
 #include "import/imported.hpp"
 
@@ -83,6 +85,28 @@ TEST(ImportUrdf, TakesMeshesByPackagesAndListsWhatTheyLose) {
     EXPECT_EQ(scene["keep_apart"].size(), 1U);
 }
 
+// The axes of an inertia are those of its origin, and the scene has the link's: R J Rᵀ.
+TEST(ImportUrdf, TurnsInertias) {
+    const ScratchFolder folder;
+    std::ofstream(folder / "a.urdf") << urdf_of(
+        link_of("a") +
+        "<link name='b'><inertial><origin xyz='1 2 3' rpy='0.3 -0.2 0.7'/><mass value='2'/><inertia ixx='1' ixy='0.1' "
+        "ixz='-0.2' iyy='1.5' iyz='0.05' izz='2'/></inertial></link>" +
+        hinge_of("a", "b"));
+    const auto body = YAML::Load(import_model(folder / "a.urdf", folder / "s.yaml").yaml)["bodies"][0];
+    const Eigen::Matrix3d R =
+        (Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
+    Eigen::Matrix3d J, written;
+    J << 1.0, 0.1, -0.2, 0.1, 1.5, 0.05, -0.2, 0.05, 2.0;
+    const auto entry = [&](const char* key) { return body["inertia"][key].as<double>(); };
+    written << entry("xx"), entry("xy"), entry("xz"), entry("xy"), entry("yy"), entry("yz"), entry("xz"), entry("yz"),
+        entry("zz");
+    EXPECT_LE((R * J * R.transpose() - written).norm(), 1e-14);
+    EXPECT_EQ(body["position"][2].as<double>(), 3.0);
+}
+
 TEST(ImportUrdf, LetsTheRootFloatIfAsked) {
     const ScratchFolder folder;
     std::ofstream(folder / "a.urdf") << urdf_of(link_of("a") + link_of("b") + hinge_of("a", "b"));
@@ -98,7 +122,9 @@ TEST(ImportUrdf, LetsTheRootFloatIfAsked) {
 
 #ifdef DELASSUS_HAS_SDF
 TEST(ImportSdf, RefusesWithOneSentence) {
-    EXPECT_NE(refusal("a.sdf", "<sdf version='1.9'/>").find("libsdformat refuses the model"), std::string::npos);
+    EXPECT_EQ(refusal("a.sdf", "<sdf version='1.9'/>"), "a.sdf: it has neither a world nor a model");
+    EXPECT_NE(refusal("a.sdf", "<sdf version='1.9'><model/></sdf>").find("libsdformat refuses the model"),
+              std::string::npos);
     EXPECT_NE(refusal("a.sdf", "<sdf version='1.9'><world name='w'/></sdf>").find("nothing in the model moves"),
               std::string::npos);
     EXPECT_NE(refusal("a.sdf",
@@ -150,6 +176,15 @@ TEST(ImportMjcf, RefusesWithOneSentence) {
     EXPECT_NE(
         refusal("a.xml", mjcf_of("<body><joint/>" + bob + "</body>"), settings).find("only the root of a URDF model"),
         std::string::npos);
+}
+
+TEST(ImportMjcf, ListsWhatAFreeJointHas) {
+    const ScratchFolder folder;
+    std::ofstream(folder / "a.xml") << mjcf_of(
+        "<body><joint name='f' type='free' armature='1' damping='1' stiffness='1' frictionloss='1'/>" + bob +
+        "</body>");
+    EXPECT_EQ(items(import_model(folder / "a.xml", folder / "s.yaml").lost),
+              (std::vector<std::string>(4, "joint \"f\"")));
 }
 
 TEST(ImportMjcf, MakesAChainOfABodyWithSeveralJoints) {
@@ -211,7 +246,7 @@ TEST(ImportMjcf, KeepsNothingOfAModelThatIsRefused) {
     const auto scene = folder / "scene.yaml";
     const auto result = run_command("import " + model_file("losses.xml").string() + " --strict -o " + scene.string());
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_NE(result.err.find("19 items of the model have no counterpart in a scene; --strict writes nothing then"),
+    EXPECT_NE(result.err.find("18 items of the model have no counterpart in a scene; --strict writes nothing then"),
               std::string::npos)
         << result.err;
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
