@@ -45,7 +45,7 @@ void add_rotors(MultibodySystem& system, double a) {
     const auto wheel = system.add_body(tumbler("wheel", {3.2, 0.4, 0.0}));
     system.add_joint(joint_of(JointKind::Prismatic, "rail", world_body, slider, {1.0, 0.2, 0.0}, 0.7 * a));
     system.add_joint(joint_of(JointKind::Revolute, "elbow", slider, arm, {0.0, 1.0, 0.3}, 0.4 * a));
-    system.add_joint(joint_of(JointKind::Spherical, "wrist", arm, hand, {}, 0.2 * a));
+    system.add_joint(joint_of(JointKind::Spherical, "wrist", arm, hand, {0.0, 0.0, 1.0}, 0.2 * a));
     system.add_joint(joint_of(JointKind::Revolute, "axle", wheel, ship, {0.0, 1.0, 0.0}, 0.3 * a));
     system.finish();
     system.assemble();

@@ -50,10 +50,12 @@ TEST(ImportedMotion, ConvergesToThatOfMujocoWithTheOrderOfTheMethod) {
     for (const Row& row :
          {Row{"pendulum.xml", "rk4", 50, 4.0, 1e-7}, Row{"pendulum.xml", "trapezoidal", 200, 2.0, 2e-4},
           Row{"double_pendulum.xml", "rk4", 100, 4.0, 1e-7}, Row{"double_pendulum.xml", "trapezoidal", 400, 2.0, 1e-4},
-          Row{"ball_chain.xml", "rk4", 400, 4.0, 1e-6}}) {
+          Row{"ball_chain.xml", "rk4", 50, 4.0, 1e-5}}) {
         const double coarse = distance(row.file, row.method, row.steps),
                      fine = distance(row.file, row.method, 2 * row.steps);
-        EXPECT_NEAR(std::log2(coarse / fine), row.order, 0.25) << row.file << " " << row.method << " " << coarse;
+        const double order = std::log2(coarse / fine);
+        EXPECT_GT(order, row.order - 0.2) << row.file << " " << row.method << " " << coarse;
+        EXPECT_LT(order, row.order + 0.5) << row.file << " " << row.method << " " << coarse;
         EXPECT_LE(fine, row.error) << row.file << " " << row.method;
     }
 }
