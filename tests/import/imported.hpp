@@ -62,6 +62,7 @@ using MjModel = std::unique_ptr<mjModel, void (*)(mjModel*)>;
 using MjData = std::unique_ptr<mjData, void (*)(mjData*)>;
 
 inline MjModel mujoco_model(const std::filesystem::path& file) {
+    mju_user_warning = [](const char*) {};  // or they go to a file
     char error[1000] = "";
     MjModel model(mj_loadXML(file.c_str(), nullptr, error, sizeof error), mj_deleteModel);
     EXPECT_TRUE(model) << error;

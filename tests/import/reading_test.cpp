@@ -45,6 +45,18 @@ TEST(Import, RefusesWhatIsNoModel) {
     EXPECT_NE(refusal("a.xml", "<mujoco/>", settings).find("must be positive"), std::string::npos);
 }
 
+TEST(Import, DoesNotWriteOverTheModel) {
+    const ScratchFolder folder;
+    const auto model = (folder / "model.urdf").string();
+    std::ofstream(model) << urdf_of(link_of("a"));
+    const auto result = run_command("import " + model + " -o " + model);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("the scene would replace the model"), std::string::npos) << result.err;
+    EXPECT_EQ(text_of(model), urdf_of(link_of("a")));
+    EXPECT_EQ(run_command("import " + model).exit_code, 2);  // no -o
+    EXPECT_NE(run_command("import --help").out.find("--strict"), std::string::npos);
+}
+
 #ifdef DELASSUS_HAS_URDF
 TEST(ImportUrdf, RefusesWithOneSentence) {
     ImportSettings settings;

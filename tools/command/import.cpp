@@ -58,6 +58,10 @@ private:
 };
 
 int import_scene(const ImportArguments& arguments) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(arguments.model, arguments.output, ignored))
+        throw InputError(
+            fmt::format("{}: the scene would replace the model; give another file to -o", arguments.output.string()));
     const ImportedScene imported = import_model(arguments.model, arguments.output, arguments.settings);
     const auto report = [&] {
         print_items("Not carried over", imported.lost);
