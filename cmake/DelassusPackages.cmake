@@ -1,6 +1,7 @@
 # Debian packages: `cpack` in the build folder makes one for each component of DelassusInstall.cmake.
 #   libdelassus       the libraries, with the modules that they load at need
 #   delassus-plugins  the solvers
+#   delassus-importers  readers of models in MJCF, URDF and SDF, where one is built
 #   delassus          the command, with the pages and the suites
 #   python3-delassus  the Python package, where it is built
 #   libdelassus-dev   headers, SDK, CMake package, pkg-config, documentation, examples
@@ -13,6 +14,9 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_COMPONENTS_ALL library plugins command development)
 if(TARGET delassus_python)
   list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
+if(TARGET delassus_import_mjcf OR TARGET delassus_import_urdf OR TARGET delassus_import_sdf)
+  list(APPEND CPACK_COMPONENTS_ALL importers)
 endif()
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
@@ -43,10 +47,17 @@ set(CPACK_DEBIAN_PLUGINS_PACKAGE_DEPENDS "libdelassus ${same_version}")
 set(CPACK_COMPONENT_PLUGINS_DESCRIPTION "Saddle-point and cone-complementarity problems: the solvers
 First-order, interior-point, semismooth Newton, Krylov and direct solvers for Delassus.")
 
+set(CPACK_DEBIAN_IMPORTERS_PACKAGE_NAME delassus-importers)
+set(CPACK_DEBIAN_IMPORTERS_PACKAGE_SECTION math)
+set(CPACK_DEBIAN_IMPORTERS_PACKAGE_DEPENDS "libdelassus ${same_version}")
+set(CPACK_COMPONENT_IMPORTERS_DESCRIPTION "Saddle-point and cone-complementarity problems: models of other programs
+Reads models of robots in MJCF, URDF and SDF, of which Delassus makes scenes.")
+
 set(CPACK_DEBIAN_COMMAND_PACKAGE_NAME delassus)
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SECTION math)
 set(CPACK_DEBIAN_COMMAND_PACKAGE_DEPENDS "libdelassus ${same_version}")
 set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS delassus-plugins)
+set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS delassus-importers)
 set(CPACK_COMPONENT_COMMAND_DESCRIPTION "Saddle-point and cone-complementarity problems: the command
 Solves problems, compares and benchmarks solvers and timesteppers, and simulates scenes.")
 

@@ -20,6 +20,7 @@ cpack --config "$build/CPackConfig.cmake" -B "$scratch/packages" >"$scratch/log"
 echo "== the packages"
 names=(libdelassus delassus-plugins delassus libdelassus-dev)
 if grep -q '^set(CPACK_COMPONENTS_ALL .*python' "$build/CPackConfig.cmake"; then names+=(python3-delassus); fi
+if grep -q '^set(CPACK_COMPONENTS_ALL .*importers' "$build/CPackConfig.cmake"; then names+=(delassus-importers); fi
 files=()
 for name in "${names[@]}"; do
     file=$(echo "$scratch/packages/${name}"_*_"$(dpkg --print-architecture)".deb)

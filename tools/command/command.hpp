@@ -29,6 +29,7 @@ void add_compare(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_plugins(CLI::App& program, Action& action);
 void add_convert(CLI::App& program, Action& action);
+void add_import(CLI::App& program, Action& action);
 void add_inspect(CLI::App& program, Action& action);
 void add_generate(CLI::App& program, Action& action);
 void add_documents(CLI::App& program, Action& action);

@@ -70,6 +70,7 @@ int parse_and_run(int argc, char** argv) {
     add_plugins(program, action);
     add_inspect(program, action);
     add_convert(program, action);
+    add_import(program, action);
     add_generate(program, action);
     add_documents(program, action);
     add_worker(program, action);

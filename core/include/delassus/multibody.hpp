@@ -86,6 +86,9 @@ struct BodyParameters {
     Vector3 velocity{};          ///< of the mass centre, world frame
     Vector3 angular_velocity{};  ///< body frame
     bool fixed = false;
+    /// Neither mass nor inertia, which do not count then: a piece between two joints. Joint coordinates alone take it
+    /// (needs_joint_coordinates()): a joint of a tree must hold it, and what it carries must have mass.
+    bool massless = false;
     /// The body is kinematic: it takes part in contacts and joints, and nothing that they do moves it. Mass, inertia
     /// and velocities do not count then. MultibodySystem::body() has the pose at t = 0.
     std::optional<BodyMotion> motion;
@@ -111,7 +114,7 @@ enum class JointKind {
     PointOnPlane,  ///< 1 row: the point of the second body stays in the plane through the point, normal to the axis, of
                    ///< the first
     Distance,      ///< 1 row: the points keep their initial distance
-    Gear           ///< 1 row: the relative rotations of two revolute joints keep a ratio
+    Gear           ///< 1 row: the coordinates of two revolute joints, or of two prismatic ones, keep a ratio
 };
 
 /// A coordinate of a joint, 0 where the bodies are given: what acts in it beside reactions (a linear spring and damper,
@@ -122,6 +125,9 @@ struct JointCoordinate {
     double stiffness = 0.0;  ///< N/m or N m/rad
     double rest = 0.0;       ///< the coordinate at which the spring is at rest, m or rad; turns are counted
     double friction = 0.0;   ///< N or N m
+    /// The inertia of a rotor behind a gear, which turns with the coordinate and adds ½ armature ċ² to the kinetic
+    /// energy: kg or kg m². Joint coordinates alone take it (needs_joint_coordinates()).
+    double armature = 0.0;
     /// Where MultibodySystem::assemble() puts it and how fast it moves then: m and m/s, or rad in [−π, π] and rad/s.
     /// Without a value it is as the bodies are given.
     std::optional<double> start = std::nullopt, start_rate = std::nullopt;
@@ -136,13 +142,14 @@ struct JointParameters {
     Vector3 second_point{};                          ///< of the second body, Distance only
     Vector3 axis{0.0, 0.0, 1.0};                     ///< need not be a unit vector
     Vector3 second_axis{1.0, 0.0, 0.0};              ///< Universal only
-    std::int32_t gear_first = -1, gear_second = -1;  ///< indices of two revolute joints; Gear only
-    double gear_ratio = 1.0;  ///< angle of the second = ratio · angle of the first; a fraction with terms below 1000
+    std::int32_t gear_first = -1, gear_second = -1;  ///< indices of two revolute or two prismatic joints; Gear only
+    /// Coordinate of the second = ratio · coordinate of the first; of angles a fraction with terms below 1000.
+    double gear_ratio = 1.0;
     /// Limits of the coordinate of a revolute (rad, in (−π, π)) or prismatic (m) joint; not a number: none.
     double lower, upper;
     JointCoordinate slide;  ///< along the axis; Prismatic and Cylindrical
     JointCoordinate turn;   ///< about the axis; Revolute and Cylindrical; Spherical and Universal: damping alone, of
-                            ///< the relative angular velocity
+                            ///< the relative angular velocity; Spherical also armature, against any turning
     DELASSUS_API JointParameters();
 };
 
@@ -417,6 +424,12 @@ public:
     BodyIndex add_elastic_beam(const ElasticBeamParameters& beam);
     /// Whether a beam has a consistent mass: M is not diagonal by bodies then.
     [[nodiscard]] bool has_consistent_mass() const;
+    /// What only joint coordinates take, as the beginning of a sentence: a massless body or an armature; empty:
+    /// nothing.
+    [[nodiscard]] std::string needs_joint_coordinates() const;
+    /// M += factor · a mass matrix in which massless bodies have the mass of what they carry: for estimates and for
+    /// searches in which the mass is a metric and no more.
+    void add_metric(double factor, MatrixAssembler& M) const;
     /// shape.body names the body; material indexes what add_material() returned.
     void add_shape(const Shape& shape, std::int32_t material);
     /// A node touches shapes of bodies as a small sphere. radius: m, > 0. The outer sides of tetrahedra whose nodes all

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Forward dynamics of trees by articulated bodies.
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "delassus/timestepper.hpp"
 #include "mechanics/kinematic_tree.hpp"
 
 namespace delassus::mechanics {
@@ -15,7 +18,21 @@ namespace delassus::mechanics {
 //     a = a′ + S u̇,  a′ = (what the parent's acceleration makes) + c,   Sᵀ(I a + p) = 0:   u̇ = D⁻¹ (y − Uᵀ a′)
 //     on the parent:  I − U D⁻¹ Uᵀ   and   p + (I − U D⁻¹ Uᵀ) c + U D⁻¹ y
 //
-// taken about the mass centre of the parent: with X = [1 0; −[d]× 1], Xᵀ I X and Xᵀ p.
+// taken about the mass centre of the parent: with X = [1 0; −[d]× 1], Xᵀ I X and Xᵀ p. An armature a of the joint,
+// whose rotor turns with the coordinate, adds a u̇ to Sᵀ(I a + p): D = Sᵀ U + a.
+
+// Of a massless body with one freedom, D is what is left of the inertia that it carries after the joints beyond it have
+// given way. Where one of those has the same axis, that is rounding.
+void KinematicTree::require_resistance(std::size_t k, double least) const {
+    constexpr double rounding = 1e-13;
+    const Link& link = links_[k];
+    const bool slides = link.kind == LinkJoint::Prismatic || link.kind == LinkJoint::Cylindrical;
+    if (least > rounding * (slides ? link.carried_mass : link.carried_inertia)) return;
+    throw StepFailure(
+        fmt::format("the body \"{}\" has no mass, and nothing that it carries resists its joint here: another axis is "
+                    "parallel to it",
+                    link.name));
+}
 
 template <int freedoms>
 void KinematicTree::eliminate(std::size_t k) {
@@ -28,8 +45,10 @@ void KinematicTree::eliminate(std::size_t k) {
         const auto linear = own.linear.leftCols<freedoms>();
         U.template topRows<3>().noalias() = body.turning * angular + body.mixed * linear;
         U.template bottomRows<3>().noalias() = body.mixed.transpose() * angular + body.moving * linear;
-        const Eigen::Matrix<double, freedoms, freedoms> D =
+        Eigen::Matrix<double, freedoms, freedoms> D =
             angular.transpose() * U.template topRows<3>() + linear.transpose() * U.template bottomRows<3>();
+        D.diagonal() += link.armature.head<freedoms>();
+        if (link.mass == 0.0) require_resistance(k, D.diagonal().minCoeff());
         body.force.head<freedoms>() =
             -(angular.transpose() * body.bias.angular + linear.transpose() * body.bias.linear);
         if constexpr (freedoms <= 3) {

@@ -179,6 +179,29 @@ struct JointCoordinates::Implementation {
         return force;
     }
 
+    /// wanting −= what rotors push bodies with at these accelerations; after place().
+    void add_rotors(const double* u_dot, double* wanting) const {
+        for (std::size_t k = 1; k < tree.links().size(); ++k) {
+            const Link& link = tree.links()[k];
+            const LinkMotion& own = tree.motion(k);
+            const Vector3d arm = own.A * link.arm;
+            for (int j = 0; j < link.freedoms; ++j) {
+                const double size = link.armature[j] * u_dot[link.column + j];
+                if (size == 0.0) continue;
+                const bool about = own.angular.col(j).squaredNorm() > 0.0;
+                const Vector3d push = about ? Vector3d(Vector3d::Zero()) : Vector3d(size * own.linear.col(j));
+                const Vector3d moment = about ? Vector3d(size * own.angular.col(j)) : Vector3d(arm.cross(push));
+                Eigen::Map<Vector3d>(wanting + link.body_column) += push;
+                Eigen::Map<Vector3d>(wanting + link.body_column + 3) += own.A.transpose() * moment;
+                if (link.parent == 0) continue;
+                const Link& base = tree.links()[static_cast<std::size_t>(link.parent)];
+                const Matrix3d& A = tree.motion(static_cast<std::size_t>(link.parent)).A;
+                Eigen::Map<Vector3d>(wanting + base.body_column) -= push;
+                Eigen::Map<Vector3d>(wanting + base.body_column + 3) -= A.transpose() * (moment + own.d.cross(push));
+            }
+        }
+    }
+
     [[nodiscard]] auto adder(double factor, MatrixAssembler& H) const {
         return
             [factor, &H](std::int32_t row, std::int32_t column, double value) { H.add(row, column, factor * value); };
@@ -553,7 +576,9 @@ void JointCoordinates::collect_unilateral(const State& state, double h, Unilater
 //
 //     C_{k,k}ᵀ λ_k = w_k,      w_p ← w_p − C_{k,p}ᵀ λ_k
 //
-// The rows of a joint are independent, and what w_k has along its freedoms is zero by the equations of motion.
+// The rows of a joint are independent, and what w_k has along its freedoms is zero by the equations of motion. The
+// rotor of an armature a pushes its link by −a u̇ along the axis, and the parent by the opposite: a force on the line
+// through the joint's point, or a torque.
 std::vector<double> JointCoordinates::tree_reactions(const State& state, const std::vector<double>& f) const {
     using Eigen::Matrix;
     auto& self = *implementation_;
@@ -569,6 +594,7 @@ std::vector<double> JointCoordinates::tree_reactions(const State& state, const s
     self.place(state);
     self.bodies.multiply_mass(self.state, 1.0, accelerated.v.data(), wanting.data());
     for (std::size_t i = 0; i < f.size(); ++i) wanting[i] -= f[i];
+    self.add_rotors(moving.v.data(), wanting.data());
 
     self.rows.begin(self.bodies.constraint_rows(), bodies);
     self.bodies.add_joint_jacobian(self.state, self.rows);

@@ -47,7 +47,7 @@ namespace {
 
 bool given(const JointCoordinate& forces) {
     return forces.damping != 0.0 || forces.stiffness != 0.0 || forces.rest != 0.0 || forces.friction != 0.0 ||
-           forces.start || forces.start_rate;
+           forces.armature != 0.0 || forces.start || forces.start_rate;
 }
 
 }  // namespace
@@ -55,9 +55,10 @@ bool given(const JointCoordinate& forces) {
 void mechanics::check_joint_forces(const JointParameters& joint) {
     const auto kind = joint.kind;
     for (const auto* forces : {&joint.slide, &joint.turn})
-        refuse_unless(finite_and_not_negative({forces->damping, forces->stiffness, forces->friction}) &&
-                          std::isfinite(forces->rest),
-                      "damping, stiffness and friction of the joint", joint.name, "must be finite and not negative");
+        refuse_unless(
+            finite_and_not_negative({forces->damping, forces->stiffness, forces->friction, forces->armature}) &&
+                std::isfinite(forces->rest),
+            "damping, stiffness, friction and armature of the joint", joint.name, "must be finite and not negative");
     for (const auto* coordinate : {&joint.slide, &joint.turn})
         refuse_unless(
             std::isfinite(coordinate->start.value_or(0.0)) && std::isfinite(coordinate->start_rate.value_or(0.0)),
@@ -71,10 +72,13 @@ void mechanics::check_joint_forces(const JointParameters& joint) {
     const bool turns = kind == JointKind::Revolute || kind == JointKind::Cylindrical;
     const bool turns_freely = kind == JointKind::Spherical || kind == JointKind::Universal;
     refuse_unless(slides || !given(joint.slide), "the joint", joint.name,
-                  "has no slide for a spring, damping, friction or start: prismatic and cylindrical joints have");
+                  "has no slide for a spring, damping, friction, armature or start: prismatic and cylindrical joints "
+                  "have");
     refuse_unless(turns || turns_freely || !given(joint.turn), "the joint", joint.name,
-                  "has no angle for a spring, damping, friction or start: revolute and cylindrical joints have, and "
-                  "spherical and universal ones take damping");
+                  "has no angle for a spring, damping, friction, armature or start: revolute and cylindrical joints "
+                  "have, and spherical and universal ones take damping");
+    refuse_unless(kind != JointKind::Universal || joint.turn.armature == 0.0, "the joint", joint.name,
+                  "is universal and has an armature; revolute, prismatic, cylindrical and spherical joints take one");
     refuse_unless(
         turns || (joint.turn.stiffness == 0.0 && joint.turn.rest == 0.0 && joint.turn.friction == 0.0 &&
                   !joint.turn.start && !joint.turn.start_rate),
@@ -106,6 +110,7 @@ void MultibodySystem::Implementation::add_coordinate_spring(std::int32_t index, 
 
 void MultibodySystem::Implementation::add_joint_forces(std::int32_t index) {
     const JointParameters& joint = joints[static_cast<std::size_t>(index)].parameters;
+    has_armature = has_armature || joint.slide.armature > 0.0 || joint.turn.armature > 0.0;
     if (joint.kind == JointKind::Spherical || joint.kind == JointKind::Universal) {
         if (joint.turn.damping > 0.0) turn_dampers.push_back({joint.first, joint.second, joint.turn.damping});
         return;

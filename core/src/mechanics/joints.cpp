@@ -62,11 +62,33 @@ void fraction_of(double ratio, const std::string& name, double& numerator, doubl
         fmt::format("the ratio {} of the gear \"{}\" is not a fraction of whole numbers below 1000", ratio, name));
 }
 
-const Joint& revolute(const std::vector<Joint>& joints, std::int32_t index, const std::string& name) {
-    if (index < 0 || index >= static_cast<std::int32_t>(joints.size()) ||
-        joints[static_cast<std::size_t>(index)].parameters.kind != JointKind::Revolute)
-        throw InputError(fmt::format("the gear \"{}\" must join two revolute joints", name));
-    return joints[static_cast<std::size_t>(index)];
+std::unique_ptr<Gear> make_gear(const JointParameters& parameters, const Placements& at,
+                                const std::vector<Joint>& joints) {
+    const auto geared = [&](std::int32_t index) -> const Joint* {
+        const bool there = index >= 0 && index < static_cast<std::int32_t>(joints.size());
+        return there ? &joints[static_cast<std::size_t>(index)] : nullptr;
+    };
+    const Joint *first = geared(parameters.gear_first), *second = geared(parameters.gear_second);
+    const auto both = [&](JointKind kind) {
+        return first && second && first->parameters.kind == kind && second->parameters.kind == kind;
+    };
+    auto gear = std::make_unique<Gear>();
+    if (both(JointKind::Prismatic)) {
+        gear->slides = {first->slide, second->slide};
+        // Its bodies are those of the angles.
+        gear->first = first->angle;
+        gear->second = second->angle;
+        gear->numerator = parameters.gear_ratio;
+        return gear;
+    }
+    if (!both(JointKind::Revolute))
+        throw InputError(
+            fmt::format("the gear \"{}\" must join two revolute joints, or two prismatic ones", parameters.name));
+    gear->first = first->angle;
+    gear->second = second->angle;
+    fraction_of(parameters.gear_ratio, parameters.name, gear->numerator, gear->denominator);
+    gear->offset = gear->denominator * gear->second.value(at) - gear->numerator * gear->first.value(at);
+    return gear;
 }
 
 }  // namespace
@@ -83,12 +105,7 @@ Joint make_joint(const JointParameters& parameters, const Placements& at, const 
     const std::string& name = parameters.name;
     const Vector3d point = vector(parameters.point);
     if (parameters.kind == JointKind::Gear) {
-        joint.gear = std::make_unique<Gear>();
-        auto& gear = *joint.gear;
-        gear.first = revolute(others, parameters.gear_first, name).angle;
-        gear.second = revolute(others, parameters.gear_second, name).angle;
-        fraction_of(parameters.gear_ratio, name, gear.numerator, gear.denominator);
-        gear.offset = gear.denominator * gear.second.value(at) - gear.numerator * gear.first.value(at);
+        joint.gear = make_gear(parameters, at, others);
         return joint;
     }
     if (parameters.kind == JointKind::Distance) {

@@ -2,6 +2,8 @@
 // Trees of links: how joints are chosen, kinematics, projections, the mass matrix.
 #include "mechanics/kinematic_tree.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <queue>
@@ -73,6 +75,7 @@ KinematicTree::KinematicTree(const MultibodySystem& system) {
     links_[0].freedoms = links_[0].coordinates = 0;
     links_[0].kind = LinkJoint::Fixed;
     choose_joints(system);
+    look_at_massless(system);
     motions_.resize(links_.size());
     wrench_.resize(links_.size());
     acceleration_.resize(links_.size());
@@ -92,10 +95,17 @@ void KinematicTree::choose_joints(const MultibodySystem& system) {
         for (const BodyIndex end : {joint.first, joint.second}) joints_of[place(end)].push_back(k);
     }
     link_of_.assign(bodies, 0);
-    using Candidate = std::tuple<int, std::int32_t>;  // rows, −joint: the largest is taken first
+    // Joints that only trees take, with an armature or at a massless body, go before all others.
+    const auto massless = [&](BodyIndex body) { return body != world_body && system.body(body).massless; };
+    const auto rank = [&](const JointParameters& joint) {
+        const bool needed =
+            joint.slide.armature > 0.0 || joint.turn.armature > 0.0 || massless(joint.first) || massless(joint.second);
+        return rows_saved(joint.kind) + (needed ? 6 : 0);
+    };
+    using Candidate = std::tuple<int, std::int32_t>;  // rank, −joint: the largest is taken first
     std::priority_queue<Candidate> candidates;
     const auto reached = [&](std::size_t at) {
-        for (const auto k : joints_of[at]) candidates.emplace(rows_saved(system.joint(k).kind), -k);
+        for (const auto k : joints_of[at]) candidates.emplace(rank(system.joint(k)), -k);
     };
     const auto grow = [&] {
         while (!candidates.empty()) {
@@ -119,6 +129,43 @@ void KinematicTree::choose_joints(const MultibodySystem& system) {
         add_link(system, static_cast<BodyIndex>(body), 0, -1);
         reached(body);
         grow();
+    }
+}
+
+void KinematicTree::look_at_massless(const MultibodySystem& system) {
+    std::vector<char> held(static_cast<std::size_t>(system.joint_count()), 0);
+    for (std::size_t k = 1; k < links_.size(); ++k) {
+        const Link& link = links_[k];
+        if (link.joint >= 0) held[static_cast<std::size_t>(link.joint)] = 1;
+        const BodyParameters& own = system.body(link.body);
+        for (auto at = static_cast<std::size_t>(link.parent); at > 0;
+             at = static_cast<std::size_t>(links_[at].parent)) {
+            Link& base = links_[at];
+            if (base.mass > 0.0 || base.joint < 0) continue;
+            const Vector3d arm = vector(own.pose.position) - vector(system.joint(base.joint).point);
+            base.carried_mass += link.mass;
+            base.carried_inertia += link.mass * arm.squaredNorm() + link.inertia.trace();
+        }
+    }
+    for (std::size_t k = 1; k < links_.size(); ++k) {
+        Link& link = links_[k];
+        if (link.mass > 0.0) continue;
+        link.name = system.body(link.body).name;
+        if (link.joint < 0)
+            throw InputError(fmt::format(
+                "the body \"{}\" has no mass, and no joint of a tree holds it: give it a mass or a joint", link.name));
+        if (link.carried_mass == 0.0)
+            throw InputError(fmt::format(
+                "the body \"{}\" has no mass, and carries none: give it a mass, or something to carry", link.name));
+    }
+    for (std::int32_t k = 0; k < system.joint_count(); ++k) {
+        const JointParameters& joint = system.joint(k);
+        if (joint.slide.armature == 0.0 && joint.turn.armature == 0.0) continue;
+        if (held[static_cast<std::size_t>(k)] == 0)
+            throw InputError(fmt::format(
+                "the joint \"{}\" has an armature and closes a loop, or a body with a motion of its own takes part in "
+                "it; joints of trees alone take one",
+                joint.name));
     }
 }
 
@@ -154,6 +201,23 @@ void KinematicTree::add_link(const MultibodySystem& system, BodyIndex body, std:
         link.arm = to_child * (point - child.x);
         link.own_axis = to_child * z;
         link.second_axis = to_child * across;
+        switch (given.kind) {
+            case JointKind::Revolute:
+                link.armature[0] = given.turn.armature;
+                break;
+            case JointKind::Prismatic:
+                link.armature[0] = given.slide.armature;
+                break;
+            case JointKind::Cylindrical:
+                link.armature[0] = given.slide.armature;
+                link.armature[1] = given.turn.armature;
+                break;
+            case JointKind::Spherical:
+                link.armature.head<3>().setConstant(given.turn.armature);
+                break;
+            default:
+                break;
+        }
     }
     link.kind = shape.kind;
     link.freedoms = shape.freedoms;
@@ -462,6 +526,8 @@ void KinematicTree::multiply_mass(double factor, const double* x, double* result
         }
         acceleration_[k] = moved;
         wrench_[k] = inertial(k);
+        for (int j = 0; j < link.freedoms; ++j)
+            result[link.column + j] += factor * link.armature[j] * x[link.column + j];
     }
     gather(factor, result);
 }
@@ -490,6 +556,7 @@ void KinematicTree::add_mass(double factor, MatrixAssembler& M) {
             Spatial wrench{own.inertia * turning + own.moment.cross(moving),
                            own.mass * moving + turning.cross(own.moment)};
             const std::int32_t column = link.column + j;
+            if (link.armature[j] > 0.0) M.add(column, column, factor * link.armature[j]);
             for (auto at = static_cast<std::int32_t>(k); at > 0;) {
                 const Link& other = links_[static_cast<std::size_t>(at)];
                 const LinkMotion& motion = motions_[static_cast<std::size_t>(at)];

@@ -22,6 +22,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "delassus/multibody.hpp"
@@ -50,8 +51,13 @@ struct Link {
     std::int32_t position = 0, coordinates = 0;   ///< and of the positions
     std::int32_t body_column = 0, body_position;  ///< of the body in states of the MultibodySystem
     bool leaf = true;
-    double mass = 0.0;
-    Matrix3d inertia = Matrix3d::Identity();  ///< about the mass centre, body frame
+    double mass = 0.0;  ///< 0: a massless body
+    // Of a massless body: its name, the mass that it carries, and the sum of the moments of inertia of that about the
+    // joint where the system was given.
+    std::string name;
+    double carried_mass = 0.0, carried_inertia = 0.0;
+    Matrix3d inertia = Matrix3d::Identity();                                     ///< about the mass centre, body frame
+    Eigen::Matrix<double, 6, 1> armature = Eigen::Matrix<double, 6, 1>::Zero();  ///< of its velocities
     // In the frame of the parent, or of the world on the ground: the point of the joint, its axis and two normal ones,
     // and the orientation of the link at coordinates 0.
     Vector3d point = Vector3d::Zero(), axis = Vector3d::UnitZ(), normals[2] = {Vector3d::UnitX(), Vector3d::UnitY()};
@@ -79,7 +85,8 @@ struct Spatial {
 class KinematicTree {
 public:
     /// Chooses the trees: each body, nearest to the ground first, is held by the joint with the most rows among those
-    /// that lead to it. system: built up to its finish(). Throws Unsupported for nodes of elements.
+    /// that lead to it, by one with an armature or at a massless body before all others. system: built up to its
+    /// finish(). Throws Unsupported for nodes of elements.
     explicit KinematicTree(const MultibodySystem& system);
 
     /// The ground first; parents before their children.
@@ -105,16 +112,21 @@ public:
     /// result += factor · Jᵀ (f − M̄ J̇ u), f being forces and torques on the bodies (torques in their frames) and M̄ the
     /// masses of the bodies.
     void project_with_bias(const double* f, double factor, double* result);
-    /// M += factor · Jᵀ M̄ J: by composite bodies, with entries for pairs of which one is on the way of the other to the
-    /// ground.
+    /// M += factor · (Jᵀ M̄ J + armatures): by composite bodies, with entries for pairs of which one is on the way of
+    /// the other to the ground.
     void add_mass(double factor, MatrixAssembler& M);
-    /// result += factor · Jᵀ M̄ J x.
+    /// result += factor · (Jᵀ M̄ J + armatures) x.
     void multiply_mass(double factor, const double* x, double* result);
-    /// u̇ ← (Jᵀ M̄ J)⁻¹ Jᵀ (f − M̄ J̇ u), by articulated bodies: O(n).
+    /// u̇ ← (Jᵀ M̄ J + armatures)⁻¹ Jᵀ (f − M̄ J̇ u), by articulated bodies: O(n). Throws StepFailure where a massless body
+    /// carries nothing that resists its joint, as where two of three axes have become parallel.
     void accelerate(const double* f, double* u_dot);
 
 private:
     void choose_joints(const MultibodySystem& system);
+    /// What massless bodies carry; throws InputError where nothing holds one, or it carries no mass. Likewise for an
+    /// armature of a joint that no tree holds.
+    void look_at_massless(const MultibodySystem& system);
+    void require_resistance(std::size_t link, double least) const;
     void add_link(const MultibodySystem& system, BodyIndex body, std::int32_t parent, std::int32_t joint);
     /// The acceleration of the parent as the link takes part in it: (ω̇_p, v̇_p + ω̇_p × d).
     [[nodiscard]] Spatial carried(std::size_t link) const;

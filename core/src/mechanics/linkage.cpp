@@ -87,7 +87,7 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         const Body& body = bodies[static_cast<std::size_t>(members_[k])];
         (*at_)[members_[k]].column = static_cast<std::int32_t>(6 * k);
         box.extend((*at_)[members_[k]].x);
-        arms_.push_back(std::sqrt(body.inertia.diagonal().maxCoeff() / body.parameters.mass));
+        arms_.push_back(std::sqrt(body.metric_inertia.diagonal().maxCoeff() / body.metric_mass));
         radius = std::max(radius, arms_.back());
     }
     const auto reach = [&](BodyIndex body, const Vector3d& point) {
@@ -103,7 +103,7 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         grounded = grounded || own.size() < (joint.gear ? 4U : 2U);
         has_loops_ = has_loops_ || joint.gear;
         if (joint.gear) {
-            rows_.push_back({&joint, nullptr, false, false});
+            rows_.push_back({&joint, nullptr, false, joint.gear->slides.has_value()});
         } else {
             const JointParameters& given = joint.parameters;
             reach(given.first, vector(given.point));
@@ -219,15 +219,28 @@ void Linkage::evaluate(const State& state, const std::vector<std::size_t>& rows,
         }
     };
     RowVector gradient;
+    const auto add_row = [&](std::size_t i, const Row& row, double factor) {
+        const auto columns = row.columns(*at_);
+        row.gradient(*at_, state.t, columns, gradient);
+        for (int k = 0; k < columns.bodies; ++k)
+            for (int j = 0; j < 6; ++j)
+                entries.emplace_back(static_cast<int>(i), columns.column[static_cast<std::size_t>(k)] + j,
+                                     factor * gradient[6 * k + j]);
+    };
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const RowOfJoint& one = rows_[rows[i]];
         const auto index = static_cast<Eigen::Index>(i);
         if (one.row == nullptr) {
             const Gear& gear = *one.joint->gear;
-            values.C[index] = gear.value(*at_);
-            values.rate[index] = gear.rate(*at_);
-            add_turn(i, gear.second, 1.0);
-            add_turn(i, gear.first, -gear.numerator / gear.denominator);
+            values.C[index] = gear.value(*at_, state.t);
+            values.rate[index] = gear.rate(*at_, state.t);
+            if (gear.slides) {
+                add_row(i, (*gear.slides)[1], 1.0);
+                add_row(i, (*gear.slides)[0], -gear.ratio());
+            } else {
+                add_turn(i, gear.second, 1.0);
+                add_turn(i, gear.first, -gear.ratio());
+            }
             continue;
         }
         const Row& row = *one.row;
@@ -244,12 +257,7 @@ void Linkage::evaluate(const State& state, const std::vector<std::size_t>& rows,
                 continue;
             }
         }
-        const auto columns = row.columns(*at_);
-        row.gradient(*at_, state.t, columns, gradient);
-        for (int k = 0; k < columns.bodies; ++k)
-            for (int j = 0; j < 6; ++j)
-                entries.emplace_back(static_cast<int>(i), columns.column[static_cast<std::size_t>(k)] + j,
-                                     gradient[6 * k + j]);
+        add_row(i, row, 1.0);
     }
     values.J.resize(m, static_cast<Eigen::Index>(6 * members_.size()));
     values.J.setFromTriplets(entries.begin(), entries.end());
@@ -318,8 +326,8 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> Linkage::scaled(const Values& value
         Matrix3d turn = Matrix3d::Identity() / arms_[k];
         double line = 1.0;
         if (metric == Metric::Mass) {
-            line = 1.0 / std::sqrt(body.parameters.mass);
-            turn = body.inertia.llt().matrixU().solve(Matrix3d::Identity());
+            line = 1.0 / std::sqrt(body.metric_mass);
+            turn = body.metric_inertia.llt().matrixU().solve(Matrix3d::Identity());
         }
         for (int i = 0; i < 3; ++i) {
             entries.emplace_back(first + i, first + i, line);
@@ -339,8 +347,8 @@ Eigen::VectorXd Linkage::unscaled(const Eigen::VectorXd& change, Metric metric) 
         auto line = result.segment<3>(static_cast<Eigen::Index>(6 * k));
         auto turn = result.segment<3>(static_cast<Eigen::Index>(6 * k + 3));
         if (metric == Metric::Mass) {
-            line /= std::sqrt(body.parameters.mass);
-            turn = body.inertia.llt().matrixU().solve(Vector3d(turn));
+            line /= std::sqrt(body.metric_mass);
+            turn = body.metric_inertia.llt().matrixU().solve(Vector3d(turn));
         } else {
             turn /= arms_[k];
         }

@@ -2,8 +2,10 @@
 // What a multibody system is made of once it is finished: data for the loops of multibody.cpp.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,9 @@ namespace delassus::mechanics {
 struct Body {
     BodyParameters parameters;
     Matrix3d inertia = Matrix3d::Identity();
+    // Those of the metric in which starts are assembled: of a massless body, of what it carries.
+    double metric_mass = 1.0;
+    Matrix3d metric_inertia = Matrix3d::Identity();
     bool mass_of_beams = false;                          ///< the elements beside it have its mass and inertia
     std::int32_t position = -1, column = -1;             ///< first entries in q and v; −1 if fixed or prescribed
     std::shared_ptr<const PrescribedMotion> prescribed;  ///< null: it moves freely, or is fixed
@@ -62,20 +67,25 @@ struct ModalLoad {
     ModalPoint point;  ///< times the weight
 };
 
-/// q₂ θ₂ − p₁ θ₁ = 0 modulo 2π, divided by q₂: the ratio p₁/q₂ of integers makes it a function of the configuration.
+/// q₂ θ₂ − p₁ θ₁ = 0 modulo 2π, divided by q₂: the ratio p₁/q₂ of integers makes it a function of the configuration. Of
+/// slides: s₂ − (p₁/q₂) s₁ = 0.
 struct Gear {
     Angle first, second;
+    std::optional<std::array<Row, 2>> slides = std::nullopt;  ///< s₁ and s₂, in place of the angles
     double numerator = 1.0, denominator = 1.0;
     double offset = 0.0;  ///< at t = 0
 
-    /// ∂/∂t, by bodies whose motion is prescribed, and the part of d²/dt² that their accelerations make.
-    [[nodiscard]] double rate(const Placements& at) const {
-        return second.prescribed_rate(at) - numerator / denominator * first.prescribed_rate(at);
+    [[nodiscard]] double ratio() const { return numerator / denominator; }
+    /// ∂/∂t, by bodies whose motion is prescribed, and of angles the part of d²/dt² that their accelerations make.
+    [[nodiscard]] double rate(const Placements& at, double t) const {
+        if (slides) return (*slides)[1].rate(at, t) - ratio() * (*slides)[0].rate(at, t);
+        return second.prescribed_rate(at) - ratio() * first.prescribed_rate(at);
     }
     [[nodiscard]] double acceleration(const Placements& at) const {
-        return second.prescribed_acceleration(at) - numerator / denominator * first.prescribed_acceleration(at);
+        return second.prescribed_acceleration(at) - ratio() * first.prescribed_acceleration(at);
     }
-    [[nodiscard]] double value(const Placements& at) const {
+    [[nodiscard]] double value(const Placements& at, double t) const {
+        if (slides) return (*slides)[1].value(at, t) - ratio() * (*slides)[0].value(at, t);
         const double angle = denominator * second.value(at) - numerator * first.value(at) - offset;
         return std::remainder(angle, 2.0 * M_PI) / denominator;
     }

@@ -74,15 +74,21 @@ BodyIndex MultibodySystem::add_body(const BodyParameters& parameters) {
     auto& self = *implementation_;
     self.must_not_be_finished();
     const auto& name = parameters.name;
-    refuse_unless(std::isfinite(parameters.mass) && parameters.mass > 0.0, "the mass of body", name,
-                  fmt::format("is {} kg; it must be positive", parameters.mass));
+    refuse_unless(parameters.massless || (std::isfinite(parameters.mass) && parameters.mass > 0.0), "the mass of body",
+                  name, fmt::format("is {} kg; it must be positive", parameters.mass));
+    refuse_unless(!parameters.massless || !(parameters.fixed || parameters.motion), "the body", name,
+                  "is massless, and is fixed or has a motion; it can be one of them");
     refuse_unless(finite(parameters.pose.position), "the position of body", name, "is not finite");
     refuse_unless(finite(parameters.velocity) && finite(parameters.angular_velocity), "the velocity of body", name,
                   "is not finite");
     mechanics::Body body;
     body.parameters = parameters;
     body.parameters.pose.orientation = normalized(parameters.pose.orientation, name);
-    body.inertia = tensor(parameters.inertia);
+    if (parameters.massless) {
+        body.parameters.mass = 0.0;
+        body.parameters.inertia = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    }
+    body.inertia = tensor(body.parameters.inertia);
     if (parameters.motion) {
         const BodyMotion& motion = *parameters.motion;
         refuse_unless(!parameters.fixed, "the body", name, "is fixed and has a motion; it can have one of them");
@@ -95,7 +101,7 @@ BodyIndex MultibodySystem::add_body(const BodyParameters& parameters) {
         body.parameters.pose = body.prescribed->pose(0.0);
         refuse_unless(finite(body.parameters.pose.position) && std::isfinite(body.parameters.pose.orientation[0]),
                       "the motion of body", name, "is not finite at t = 0");
-    } else if (!parameters.fixed) {
+    } else if (!parameters.fixed && !parameters.massless) {
         check_inertia(name, body.inertia);
     }
     self.bodies.push_back(std::move(body));
@@ -376,9 +382,55 @@ void MultibodySystem::finish() {
     }
     self.place_of_row.assign(static_cast<std::size_t>(rows), 0);
     self.number_rows();
+    self.make_metric();
     self.finished = true;
     self.find_bodies_alone(*this);
     self.make_detector();
+}
+
+// A massless body takes the mass of the next one that has some, along joints, and its inertia as if it were alike in
+// all directions. Where joints lead to none, it keeps unit mass: joint coordinates refuse it.
+void MultibodySystem::Implementation::make_metric() {
+    std::vector<std::size_t> reached;
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+        bodies[k].metric_mass = bodies[k].parameters.mass;
+        bodies[k].metric_inertia = bodies[k].inertia;
+        if (bodies[k].parameters.massless) {
+            bodies[k].metric_mass = 1.0;
+            bodies[k].metric_inertia.setIdentity();
+        } else if (bodies[k].column >= 0) {
+            reached.push_back(k);
+        }
+    }
+    if (std::none_of(bodies.begin(), bodies.end(), [](const auto& body) { return body.parameters.massless; })) return;
+    std::vector<std::vector<std::size_t>> neighbours(bodies.size());
+    for (const auto& joint : joints) {
+        const auto [a, b] = std::pair(joint.parameters.first, joint.parameters.second);
+        if (joint.gear || a == world_body || b == world_body) continue;
+        neighbours[static_cast<std::size_t>(a)].push_back(static_cast<std::size_t>(b));
+        neighbours[static_cast<std::size_t>(b)].push_back(static_cast<std::size_t>(a));
+    }
+    std::vector<char> known(bodies.size(), 0);
+    for (const auto k : reached) known[k] = 1;
+    for (std::size_t next = 0; next < reached.size(); ++next)
+        for (const auto other : neighbours[reached[next]]) {
+            if (known[other] || !bodies[other].parameters.massless) continue;
+            const auto& from = bodies[reached[next]];
+            bodies[other].metric_mass = from.metric_mass;
+            bodies[other].metric_inertia = from.metric_inertia.trace() / 3.0 * Matrix3d::Identity();
+            known[other] = 1;
+            reached.push_back(other);
+        }
+}
+
+std::string MultibodySystem::needs_joint_coordinates() const {
+    const auto& self = *implementation_;
+    for (const auto& body : self.bodies)
+        if (body.parameters.massless) return fmt::format("the body \"{}\" has no mass", body.parameters.name);
+    for (const auto& joint : self.joints)
+        if (joint.parameters.slide.armature > 0.0 || joint.parameters.turn.armature > 0.0)
+            return fmt::format("the joint \"{}\" has an armature", joint.parameters.name);
+    return {};
 }
 
 // By the entries that forces and constraints add at the start.

@@ -78,12 +78,20 @@ void MultibodySystem::Implementation::make_detector() {
         setup.shapes.push_back(sphere);
         shape_material.push_back(contact.material);
     }
-    const bool moves = std::any_of(setup.shapes.begin(), setup.shapes.end(), [&](const Shape& shape) {
+    const auto is_moved = [&](const Shape& shape) {
         const auto body = static_cast<std::size_t>(shape.body);
         return shape.body >= 0 && !setup.fixed[body] && (body >= bodies.size() || !bodies[body].prescribed);
-    });
+    };
+    const bool moves = std::any_of(setup.shapes.begin(), setup.shapes.end(), is_moved);
     if (moves) make_mesh_contacts();
-    const bool bodies_touch = moves && !shapes.empty() && setup.shapes.size() >= 2;
+    // Where nearly all may touch, the first pairs tell; shapes of bodies that are all kept apart are few.
+    const auto meets_another = [&](const Shape& one) {
+        return std::any_of(shapes.begin(), shapes.end(), [&](const Shape& other) {
+            return one.body != other.body && (is_moved(one) || is_moved(other)) &&
+                   !apart.contains(std::minmax(one.body, other.body));
+        });
+    };
+    const bool bodies_touch = moves && std::any_of(setup.shapes.begin(), setup.shapes.end(), meets_another);
     if (bodies_touch || mesh_touching) {
         size = median_size(setup.shapes);
         if (envelope == 0.0) envelope = 0.05 * size;

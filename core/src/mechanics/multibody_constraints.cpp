@@ -59,7 +59,7 @@ void MultibodySystem::constraint(const State& state, double* C) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { C[i] = row.value(self.at, state.t); });
-    self.for_each_gear([&](std::int32_t i, const Gear& gear) { C[i] = gear.value(self.at); });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) { C[i] = gear.value(self.at, state.t); });
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         Eigen::Map<Vector3d>(C + i) = self.node_at(one.node, state.q.data(), state.v.data()).x - one.place(body);
     });
@@ -72,7 +72,7 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
     self.place(state.q.data(), nullptr, state.t);
     for (const auto& joint : self.joints) {
         double* own = C + joint.first_row;
-        if (joint.gear) own[0] = joint.gear->value(self.at);
+        if (joint.gear) own[0] = joint.gear->value(self.at, state.t);
         for (std::size_t i = 0; i < joint.rows.size(); ++i) own[i] = joint.rows[i].value(self.at, state.t);
     }
     for (const auto& one : self.attachments)
@@ -82,12 +82,13 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
         put(one.value(self.modal_at[static_cast<std::size_t>(one.reduced)], self.at[one.body]), C + one.first_row);
 }
 
-void MultibodySystem::Implementation::add_gradient(const Row& row, double t, std::int32_t to,
-                                                   MatrixAssembler& D) const {
+void MultibodySystem::Implementation::add_gradient(const Row& row, double t, std::int32_t to, MatrixAssembler& D,
+                                                   double factor) const {
     const auto columns = row.columns(at);
     row.gradient(at, t, columns, gradient);
     for (int k = 0; k < columns.bodies; ++k)
-        for (int j = 0; j < 6; ++j) D.add(to, columns.column[static_cast<std::size_t>(k)] + j, gradient[6 * k + j]);
+        for (int j = 0; j < 6; ++j)
+            D.add(to, columns.column[static_cast<std::size_t>(k)] + j, factor * gradient[6 * k + j]);
 }
 
 void MultibodySystem::add_joint_jacobian(const State& state, MatrixAssembler& D) const {
@@ -103,6 +104,11 @@ void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t f
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { self.add_gradient(row, state.t, first_row + i, D); });
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        if (gear.slides) {
+            self.add_gradient((*gear.slides)[1], state.t, first_row + i, D);
+            self.add_gradient((*gear.slides)[0], state.t, first_row + i, D, -gear.ratio());
+            return;
+        }
         for (const auto& [angle, factor] : self.terms_of(gear))
             for (const bool second : {true, false}) {
                 const auto column = self.at[second ? angle.second : angle.first].column;
@@ -135,7 +141,7 @@ void MultibodySystem::constraint_rate(const State& state, double* C_t) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr, state.t);
     self.for_each_row([&](std::int32_t i, const Row& row) { C_t[i] = row.rate(self.at, state.t); });
-    self.for_each_gear([&](std::int32_t i, const Gear& gear) { C_t[i] = gear.rate(self.at); });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) { C_t[i] = gear.rate(self.at, state.t); });
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         Eigen::Map<Vector3d>(C_t + i) = body.prescribed() ? Vector3d(-one.velocity(body)) : Vector3d::Zero();
     });
@@ -149,6 +155,11 @@ void MultibodySystem::constraint_curvature(const State& state, double* c) const 
     self.for_each_row([&](std::int32_t i, const Row& row) { c[i] = row.curvature(self.at, state.t); });
     // θ̇ = z · (ω_s − ω_f), and at ω̄˙ = 0 also ω̇ = 0: what is left is ż · (ω_s − ω_f) = (ω_f × z) · ω_s.
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        if (gear.slides) {
+            c[i] = (*gear.slides)[1].curvature(self.at, state.t) -
+                   gear.ratio() * (*gear.slides)[0].curvature(self.at, state.t);
+            return;
+        }
         c[i] = gear.acceleration(self.at);
         for (const auto& [angle, factor] : self.terms_of(gear)) {
             const auto &first = self.at[angle.first], &second = self.at[angle.second];
@@ -182,6 +193,16 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
     });
     add_local(common, sum, 1.0, tangent, H);
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
+        if (gear.slides) {
+            for (const bool second : {true, false}) {
+                const Row& slide = (*gear.slides)[second ? 1 : 0];
+                const auto columns = slide.columns(self.at);
+                slide.hessian(self.at, state.t, columns, self.hessian);
+                const double weight = second ? 1.0 : -gear.ratio();
+                add_local(columns, self.hessian, factor * lambda[i] * weight, tangent, H);
+            }
+            return;
+        }
         for (const auto& [angle, scale] : self.terms_of(gear)) {
             const auto first = self.at[angle.first].column, second = self.at[angle.second].column;
             if (second < 0) continue;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Energy and momentum of a state of a multibody system.
+#include <cmath>
+
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -22,9 +24,35 @@ double MultibodySystem::kinetic_energy(const State& state) const {
                 0.5 * node.parameters.mass * Eigen::Map<const Vector3d>(state.v.data() + node.column).squaredNorm();
     self.place_modal(state.q.data(), state.v.data());
     for (std::size_t k = 0; k < self.reduced.size(); ++k) energy += self.modal_dynamics(k).kinetic_energy();
-    if (self.beam_inertias.empty()) return energy;
+    if (self.beam_inertias.empty() && !self.has_armature) return energy;
     self.place(state);
+    energy += self.energy_of_rotors(state.t);
     self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.kinetic_energy(at); });
+    return energy;
+}
+
+// ½ a ċ² of each coordinate c, and ½ a |ω_second − ω_first|² of a ball joint.
+double MultibodySystem::Implementation::energy_of_rotors(double t) const {
+    double energy = 0.0;
+    for (const auto& joint : joints) {
+        const auto &slide = joint.parameters.slide, &turn = joint.parameters.turn;
+        if (slide.armature > 0.0) {
+            const auto columns = joint.slide.columns(at);
+            joint.slide.gradient(at, t, columns, gradient);
+            double rate = 0.0;
+            for (int k = 0; k < columns.bodies; ++k) {
+                const auto& place = at[columns.body[static_cast<std::size_t>(k)]];
+                rate += gradient.segment<3>(6 * k).dot(place.v) + gradient.segment<3>(6 * k + 3).dot(place.omega);
+            }
+            energy += 0.5 * slide.armature * rate * rate;
+        }
+        if (turn.armature == 0.0) continue;
+        const auto &first = at[joint.parameters.first], &second = at[joint.parameters.second];
+        const double square = joint.parameters.kind == JointKind::Spherical
+                                  ? (second.A * second.omega - first.A * first.omega).squaredNorm()
+                                  : std::pow(joint.angle.rate(at), 2);
+        energy += 0.5 * turn.armature * square;
+    }
     return energy;
 }
 

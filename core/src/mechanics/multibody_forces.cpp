@@ -126,6 +126,19 @@ void MultibodySystem::add_mass(const State& state, double factor, MatrixAssemble
     });
 }
 
+void MultibodySystem::add_metric(double factor, MatrixAssembler& M) const {
+    const auto& self = *implementation_;
+    add_mass(initial_state(), factor, M);
+    for (const auto& body : self.moving) {
+        const auto& stands_in = self.bodies[static_cast<std::size_t>(body.body)];
+        if (!stands_in.parameters.massless) continue;
+        for (int i = 0; i < 3; ++i) {
+            M.add(body.column + i, body.column + i, factor * stands_in.metric_mass);
+            M.add(body.column + 3 + i, body.column + 3 + i, factor * stands_in.metric_inertia(i, i));
+        }
+    }
+}
+
 void MultibodySystem::multiply_mass(const State& state, double factor, const double* x, double* result) const {
     const auto& self = *implementation_;
     for (const auto& body : self.moving) {

@@ -25,6 +25,7 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::TurnSpring> turn_springs;
     std::vector<mechanics::TurnDamper> turn_dampers;
     std::vector<mechanics::JointFriction> frictions;
+    bool has_armature = false;  // of a joint
     struct CountedAngle {
         std::int32_t joint = -1;
         std::unique_ptr<double> reference;  ///< its address lasts
@@ -122,6 +123,8 @@ struct MultibodySystem::Implementation {
                                const Motion* target, bool potential);
     /// What the parameters of a joint say of its coordinates.
     void add_joint_forces(std::int32_t joint);
+    /// The kinetic energy of armatures; after place().
+    [[nodiscard]] double energy_of_rotors(double t) const;
     /// Visits the springs of rows, then those of angles.
     template <class Visitor>
     void for_each_spring(Visitor&& visit) const {
@@ -161,7 +164,8 @@ struct MultibodySystem::Implementation {
         return place_of_row[static_cast<std::size_t>(joint.first_row) + i];
     }
     /// D ← with the gradient of a row of a joint in its row `to`; at the placement of now.
-    void add_gradient(const mechanics::Row& row, double t, std::int32_t to, MatrixAssembler& D) const;
+    void add_gradient(const mechanics::Row& row, double t, std::int32_t to, MatrixAssembler& D,
+                      double factor = 1.0) const;
     /// Visits the kept rows of all joints but gears: visit(row of C, Row).
     template <class Visitor>
     void for_each_row(Visitor&& visit) const {
@@ -240,7 +244,7 @@ struct MultibodySystem::Implementation {
         double factor;
     };
     static std::array<GearTerm, 2> terms_of(const mechanics::Gear& gear) {
-        return {GearTerm{gear.second, 1.0}, GearTerm{gear.first, -gear.numerator / gear.denominator}};
+        return {GearTerm{gear.second, 1.0}, GearTerm{gear.first, -gear.ratio()}};
     }
 
     /// The body of a shape or of a node contact, or the node: bodies first, nodes after them, −1 for the world.
@@ -273,6 +277,8 @@ struct MultibodySystem::Implementation {
     /// kind: 0, 1, … as MeshContact::Kind.
     [[nodiscard]] static std::uint64_t mesh_contact_key(int kind, const std::array<std::uint64_t, 3>& feature);
     void find_bodies_alone(const MultibodySystem& system);
+    /// metric_mass and metric_inertia of all bodies.
+    void make_metric();
 
     void collect_limits(double h, UnilateralRows& rows) const;
     void collect_frictions(UnilateralRows& rows) const;

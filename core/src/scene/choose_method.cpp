@@ -52,7 +52,7 @@ class Rates {
 public:
     explicit Rates(const MultibodySystem& mechanics)
         : mechanics_(mechanics), n_(mechanics.n()), start_(mechanics.initial_state()) {
-        M_.compute(assembled(n_, n_, [&](MatrixAssembler& target) { mechanics_.add_mass(start_, 1.0, target); }));
+        M_.compute(assembled(n_, n_, [&](MatrixAssembler& target) { mechanics_.add_metric(1.0, target); }));
     }
 
     /// The fastest that stiffness and spins make, and that damping does, 1/s.
@@ -211,6 +211,8 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
 }  // namespace
 
 void choose_method(SceneSystem& system) {
+    if (system.coordinates_chosen && !system.system->needs_joint_coordinates().empty())
+        system.coordinates = Coordinates::Joint;
     if (system.integrator != chosen) return;
     system.integrator = "euler_implicit_linearized";
     system.method_reason = why_default(system);

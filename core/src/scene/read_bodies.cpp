@@ -308,6 +308,7 @@ void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
               {"angular_velocity",
                [&](const YAML::Node& n) { body.angular_velocity = vector3(source_, n, "angular_velocity"); }},
               {"fixed", [&](const YAML::Node& n) { body.fixed = truth(source_, n, "fixed"); }},
+              {"massless", [&](const YAML::Node& n) { body.massless = truth(source_, n, "massless"); }},
               {"motion",
                [&](const YAML::Node& n) {
                    body.motion = read_body_motion(n, copy);
@@ -322,8 +323,11 @@ void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
         source_.refuse(motion_place, fmt::format("the velocities of body \"{}\" follow from its \"motion\"; give no "
                                                  "\"velocity\" and no \"angular_velocity\"",
                                                  body.name));
+    if (body.massless && (mass || density || inertia))
+        source_.refuse(item,
+                       fmt::format("body \"{}\" is massless, and has a mass, a density or an inertia", body.name));
     if (mass && density) source_.refuse(item, "a body has either \"mass\" or \"density\", not both");
-    if (!body.fixed && !body.motion) {
+    if (!body.fixed && !body.motion && !body.massless) {
         if (!mass && !density)
             source_.refuse(item,
                            fmt::format("body \"{}\" lacks the key \"mass\" (or \"density\", with shapes)", body.name));

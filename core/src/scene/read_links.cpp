@@ -36,6 +36,7 @@ SystemReader::Handlers SystemReader::coordinate_handlers(JointCoordinate& forces
                  if (!stiffness) source_.refuse(n, "\"spring\" lacks the key \"stiffness\"");
              }},
             {"friction", [&](const YAML::Node& n) { forces.friction = nonnegative_number(source_, n, "friction"); }},
+            {"armature", [&](const YAML::Node& n) { forces.armature = nonnegative_number(source_, n, "armature"); }},
             {"start", [&](const YAML::Node& n) { forces.start = finite_number(source_, n, "start"); }},
             {"start_rate", [&](const YAML::Node& n) { forces.start_rate = finite_number(source_, n, "start_rate"); }}};
 }
@@ -104,13 +105,13 @@ void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
         if (own_place.IsDefined())
             source_.refuse(own_place,
                            fmt::format("the cylindrical joint \"{}\" has two coordinates: give damping, spring, "
-                                       "friction and start in \"slide: {{…}}\" and \"turn: {{…}}\"",
+                                       "friction, armature and start in \"slide: {{…}}\" and \"turn: {{…}}\"",
                                        joint.name));
     } else {
         if (parts.IsDefined())
             source_.refuse(parts,
                            fmt::format("\"slide\" and \"turn\" are for cylindrical joints; the joint \"{}\" takes "
-                                       "\"damping\", \"spring\", \"friction\" and \"start\" themselves",
+                                       "\"damping\", \"spring\", \"friction\", \"armature\" and \"start\" themselves",
                                        joint.name));
         (joint.kind == JointKind::Prismatic ? joint.slide : joint.turn) = own;
     }

@@ -53,6 +53,12 @@ public:
           relaxation_(*system.system, {.tolerance = rule_.tolerance}) {
         solver_.cancelled = cancelled;
         if (!system.leave_out) solver_.leave_nothing_out();
+        for (const BodyParameters& body : system.bodies)
+            if (body.massless)
+                throw Unsupported(fmt::format(
+                    "the search for an equilibrium moves bodies by their masses, and the body \"{}\" has none; give it "
+                    "a small mass and inertia",
+                    body.name));
     }
     ~Search() { mechanics_.set_load_factor(1.0); }
     Search(const Search&) = delete;

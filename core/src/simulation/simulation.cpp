@@ -153,6 +153,8 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         }
     };
     with_name([&] {
+        if (const std::string what = system.system->needs_joint_coordinates(); !in_joints && !what.empty())
+            throw Unsupported(what + ", which joint coordinates alone take; give coordinates: joint");
         // Checked here without loading the plugin, which may never be needed.
         SolverConfig solver = system.solver;
         if (solver.name.empty()) solver.name = auto_name;
