@@ -62,9 +62,14 @@ void PartitionedGaussSeidel::find_scaling(const sdk::LocalProblemView& problem) 
 sdk::Outcome PartitionedGaussSeidel::solve(const sdk::LocalProblemView& problem, const sdk::Request& request,
                                            sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     const Session session;
+    CostMeter& meter = *part_.processes().meter();
+    meter.begin(problem.raw->m_all, 0);
     part_.load(problem);
     const sdk::ProblemView& split = part_.problem();
-    operator_.free_velocity(split, u_);
+    {
+        const auto multiplying = meter.span(DELASSUS_PHASE_PRODUCTS);
+        operator_.free_velocity(split, u_);
+    }
     residual_.assign(split, diagonal_, u_);
     std::array<double, 2> sums = {0.0, lambda.allFinite() ? 0.0 : 1.0};
     for (std::size_t c = 0; c < split.cones.size(); ++c) {
@@ -79,8 +84,12 @@ sdk::Outcome PartitionedGaussSeidel::solve(const sdk::LocalProblemView& problem,
     for (const delassus_cone& cone : split.cones) sdk::project(cone, lambda_.data() + cone.first_row);
 
     sdk::Monitor monitor(request, iteration_.stall_window());
-    iteration_.run(model_, operator_, reference_, problem.coulomb, request, monitor, lambda_,
-                   [&](const sdk::Vector& reactions) { return measured(reactions); });
+    {
+        // A sweep multiplies and projects cone by cone.
+        const auto sweeping = meter.span(DELASSUS_PHASE_PROJECTIONS);
+        iteration_.run(model_, operator_, reference_, problem.coulomb, request, monitor, lambda_,
+                       [&](const sdk::Vector& reactions) { return measured(reactions); });
+    }
     lambda = monitor.best();
     x = part_.own(part_.velocity(operator_, monitor.best()));
     sdk::Outcome& outcome = monitor.outcome();
@@ -90,11 +99,13 @@ sdk::Outcome PartitionedGaussSeidel::solve(const sdk::LocalProblemView& problem,
                       1e-6 * static_cast<double>(part_.bytes_a_sweep()));
         outcome.message = text;
     }
+    outcome.cost = meter.end();
     return outcome;
 }
 
 // From u = D H⁻¹(a + Dᵀλ) + E λ + b.
 double PartitionedGaussSeidel::measured(const sdk::Vector& lambda) {
+    const auto multiplying = part_.processes().meter()->span(DELASSUS_PHASE_PRODUCTS);
     const sdk::ProblemView& split = part_.problem();
     const sdk::Vector v = part_.velocity(operator_, lambda);
     u_ = split.b;

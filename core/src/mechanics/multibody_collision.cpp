@@ -2,6 +2,7 @@
 // The shapes of a multibody system as the collision detector sees them.
 #include <algorithm>
 
+#include "delassus/error.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -115,6 +116,7 @@ void MultibodySystem::be_part_of(const MultibodySystem& whole, PartNumbers numbe
     self.size = whole.implementation_->size;
     self.envelope = whole.implementation_->envelope;
     self.recovery = whole.recovery_speed();
+    self.unilateral_whole = whole.has_unilateral();
     for (auto& body : self.moving)
         if (std::binary_search(numbers.touched.begin(), numbers.touched.end(), body.body)) body.alone = false;
     self.numbers = std::move(numbers);

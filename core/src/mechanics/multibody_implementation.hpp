@@ -81,6 +81,7 @@ struct MultibodySystem::Implementation {
     double size = 0.0;                  // the median of the shapes that collide
     PartNumbers numbers;                // of a part of another system; empty otherwise
     std::optional<double> recovery;     // likewise, m/s
+    bool unilateral_whole = false;      // likewise: the other system has contacts or stops
     std::unique_ptr<CollisionDetector> detector;
     struct MeshTouching;
     std::shared_ptr<MeshTouching> mesh_touching;  // null: no two meshes can meet

@@ -66,8 +66,9 @@ bool MultibodySystem::detects_contacts() const {
 
 bool MultibodySystem::has_unilateral() const {
     const auto& self = *implementation_;
-    return detects_contacts() || !self.bounded_motors.empty() || !self.bounded_actuators.empty() ||
-           !self.frictions.empty() || std::any_of(self.joints.begin(), self.joints.end(), [](const auto& joint) {
+    return self.unilateral_whole || detects_contacts() || !self.bounded_motors.empty() ||
+           !self.bounded_actuators.empty() || !self.frictions.empty() ||
+           std::any_of(self.joints.begin(), self.joints.end(), [](const auto& joint) {
                return !std::isnan(joint.parameters.lower) || !std::isnan(joint.parameters.upper);
            });
 }
