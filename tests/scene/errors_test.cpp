@@ -115,7 +115,8 @@ INSTANTIATE_TEST_SUITE_P(
              "joints have, and spherical and universal ones take damping"},
         Case{"DampingOfACylindricalJoint",
              head + bodies + "joints:\n  - {name: j, kind: cylindrical, second: ball, damping: 1}\n",
-             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring, friction and "
+             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring, friction, "
+             "armature and "
              "start in "
              "\"slide: {…}\" and \"turn: {…}\""},
         Case{"SlideOfARevoluteJoint",
