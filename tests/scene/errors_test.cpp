@@ -109,18 +109,20 @@ INSTANTIATE_TEST_SUITE_P(
              "universal "
              "joints take damping alone"},
         Case{"DampingOfAFixedJoint", head + bodies + "joints:\n  - {name: j, kind: fixed, second: ball, damping: 1}\n",
-             "s.yaml, line 6: the joint \"j\" has no angle for a spring, damping, friction or start: revolute and "
+             "s.yaml, line 6: the joint \"j\" has no angle for a spring, damping, friction, armature or start: "
+             "revolute and "
              "cylindrical "
              "joints have, and spherical and universal ones take damping"},
         Case{"DampingOfACylindricalJoint",
              head + bodies + "joints:\n  - {name: j, kind: cylindrical, second: ball, damping: 1}\n",
-             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring, friction and "
+             "s.yaml, line 6: the cylindrical joint \"j\" has two coordinates: give damping, spring, friction, "
+             "armature and "
              "start in "
              "\"slide: {…}\" and \"turn: {…}\""},
         Case{"SlideOfARevoluteJoint",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, slide: {damping: 1}}\n",
              "s.yaml, line 6: \"slide\" and \"turn\" are for cylindrical joints; the joint \"j\" takes \"damping\", "
-             "\"spring\", \"friction\" and \"start\" themselves"},
+             "\"spring\", \"friction\", \"armature\" and \"start\" themselves"},
         Case{"StartBeyondTheLimits",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, upper: 1, start: 1.2}\n",
              "s.yaml, line 6: the start of the joint \"j\" lies beyond its limits"},
