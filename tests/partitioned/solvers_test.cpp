@@ -158,7 +158,9 @@ TEST_P(PartitionedPlugins, TellWhatTheTimeGoesTo) {
     EXPECT_GT(cost.phases[DELASSUS_PHASE_PROJECTIONS], 0.0);
     EXPECT_GT(cost.setup, 0.0);
     const bool sampled = std::string(GetParam().plugin) == "apgd_petsc";  // one iteration stands for 32
-    EXPECT_LE(sum, sampled ? 3.0 * cost.solve + 0.01 : 1.001 * cost.solve);
+    // The core's clock stands still in its own callbacks, that of a sweep does not.
+    const double callbacks = std::string(GetParam().plugin) == "pgs_petsc" ? 0.1 * cost.solve + 0.002 : 0.0;
+    EXPECT_LE(sum, sampled ? 3.0 * cost.solve + 0.01 : 1.001 * cost.solve + callbacks);
     if (run->size() == 1) {
         EXPECT_EQ(cost.bytes_sent, 0);
         EXPECT_EQ(cost.phases[DELASSUS_PHASE_EXCHANGE] + cost.phases[DELASSUS_PHASE_WAITING], 0.0);
