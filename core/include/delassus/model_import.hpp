@@ -37,7 +37,7 @@ struct ImportedScene {
     std::vector<NotCarriedOver> without_effect;  ///< looks, sensors and the like, by kind
 };
 
-/// Reads a model. The kind of file follows from its root element: <mujoco>, <robot> or <sdf>. scene: the file that the
+/// Reads a model. The kind of file follows from its root element: `mujoco`, `robot` or `sdf`. scene: the file that the
 /// text is for; paths in the text are relative to its folder. Writes nothing. The text is a scene that read_scene()
 /// takes once the files are there. Throws InputError: no such file, not a model, what the format's library says of it,
 /// a missing module, or a model without a scene (nothing moves that has mass).
