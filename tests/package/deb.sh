@@ -59,7 +59,12 @@ fi
 
 # Together they hold what `cmake --install` installs, and their copyright files.
 cmake --install "$build" --prefix "$scratch/prefix" >/dev/null
-files_of() { (cd "$1" && find . ! -type d | sort); }
+# Completions for zsh are in a folder of Debian's own, where they come from a package.
+files_of() { (cd "$1" && find . ! -type d | sed 's|zsh/vendor-completions|zsh/site-functions|' | sort); }
+for document in man/man1/delassus.1 bash-completion/completions/delassus zsh/vendor-completions/_delassus \
+    fish/vendor_completions.d/delassus.fish; do
+    [ -s "$root/usr/share/$document" ] || fail "the package delassus has no $document"
+done
 diff <(files_of "$scratch/prefix") <(files_of "$root/usr" | grep -v '/copyright$') || fail "the packages and the install tree differ"
 rm -r "$scratch/prefix"
 if find "$root/usr" -type f \( -name '*.so*' -o -path '*/bin/*' \) -exec ldd {} + | grep 'not found'; then fail "libraries are missing"; fi

@@ -135,8 +135,8 @@ void add_bench(CLI::App& program, Action& action) {
 
     auto* compare =
         bench->add_subcommand("compare", "Compare the times of two folders of results, as ratios with their spread");
-    compare->add_option("a", arguments->before, "Results before a change")->required()->type_name("A");
-    compare->add_option("b", arguments->after, "Results after it")->required()->type_name("B");
+    compare->add_option("a", arguments->before, "Results before a change")->required()->type_name("DIR");
+    compare->add_option("b", arguments->after, "Results after it")->required()->type_name("DIR");
     compare->add_flag("--any-machine", arguments->any_machine, "Compare results even if their machines differ");
     compare->add_flag("--json", arguments->json, "Print the comparison as JSON");
     compare->callback([arguments, &action] { action.run = [arguments] { return compare_results(*arguments); }; });

@@ -41,6 +41,9 @@ std::pair<std::string, std::string> parse_setting(const std::string& text);
 /// The --plugin-path option that every subcommand with plugins has.
 void add_plugin_path(CLI::App& subcommand, std::vector<std::filesystem::path>& folders);
 
+/// The --law option of subcommands that let a person change the law of friction.
+void add_law(CLI::App& subcommand, std::string& law, const std::string& description);
+
 /// The folders made absolute.
 std::vector<std::filesystem::path> absolute(std::vector<std::filesystem::path> folders);
 

@@ -127,8 +127,7 @@ void add_compare(CLI::App& program, Action& action) {
         ->type_name("A,B,C(KEY=VALUE)")
         ->expected(1)
         ->take_all();
-    command->add_option("--law", arguments->law, "Friction law in place of the problems' own: associated | coulomb")
-        ->type_name("LAW");
+    add_law(*command, arguments->law, "Friction law in place of the problems' own");
     command->add_option("--tolerance", settings.tolerance, "Natural error to reach [1e-6]")->type_name("REAL");
     command->add_option("--time-limit", settings.time_limit, "Limit of a solver's own time in one run [30]")
         ->type_name("SECONDS");

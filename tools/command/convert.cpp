@@ -38,10 +38,7 @@ void add_convert(CLI::App& program, Action& action) {
     command->add_option("output", arguments->output, "Problem folder, or HDF5 file (.h5, .hdf5)")
         ->required()
         ->type_name("OUT");
-    command
-        ->add_option("--law", arguments->law,
-                     "Friction law of the result: associated | coulomb (FCLib files mean coulomb)")
-        ->type_name("LAW");
+    add_law(*command, arguments->law, "Friction law of the result (FCLib files mean coulomb)");
     command->callback([arguments, &action] { action.run = [arguments] { return convert(*arguments); }; });
 }
 

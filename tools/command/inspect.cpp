@@ -223,8 +223,7 @@ void add_inspect(CLI::App& program, Action& action) {
     command->add_option("problem", arguments->problem, "Problem folder, or HDF5 file (.h5, .hdf5)")
         ->required()
         ->type_name("PROBLEM");
-    command->add_option("--law", arguments->law, "Friction law in place of the problem's own: associated | coulomb")
-        ->type_name("LAW");
+    add_law(*command, arguments->law, "Friction law in place of the problem's own");
     add_plugin_path(*command, arguments->plugin_path);
     command->add_flag("--qualification", arguments->qualification,
                       "Check LICQ and the pointed friction cone: are reactions unique, are they bounded?");

@@ -28,6 +28,10 @@ void add_plugin_path(CLI::App& subcommand, std::vector<std::filesystem::path>& f
     subcommand.add_option("--plugin-path", folders, "Folders to search for plugins first")->type_name("DIR");
 }
 
+void add_law(CLI::App& subcommand, std::string& law, const std::string& description) {
+    subcommand.add_option("--law", law, description)->type_name("associated|coulomb");
+}
+
 std::vector<std::filesystem::path> absolute(std::vector<std::filesystem::path> folders) {
     for (auto& folder : folders) folder = std::filesystem::absolute(folder);
     return folders;

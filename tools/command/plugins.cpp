@@ -191,7 +191,9 @@ void add_plugins(CLI::App& program, Action& action) {
     list_command->callback(on_call(list));
 
     auto* info_command = plugins->add_subcommand("info", "Show what a plugin can take, and its options");
-    info_command->add_option("plugin", arguments->plugin, "Name of a plugin, or path of a shared library")->required();
+    info_command->add_option("plugin", arguments->plugin, "Name of a plugin, or path of a shared library")
+        ->required()
+        ->type_name("NAME|LIB");
     add_plugin_path(*info_command, arguments->plugin_path);
     info_command->add_flag("--json", arguments->json, "Print JSON");
     info_command->add_flag("--schema", arguments->schema, "Print the JSON Schema of its options");
@@ -199,14 +201,16 @@ void add_plugins(CLI::App& program, Action& action) {
     info_command->callback(on_call(info));
 
     auto* check_command = plugins->add_subcommand("check", "Run the conformance suite over a plugin");
-    check_command->add_option("plugin", arguments->plugin, "Name of a plugin, or path of a shared library")->required();
+    check_command->add_option("plugin", arguments->plugin, "Name of a plugin, or path of a shared library")
+        ->required()
+        ->type_name("NAME|LIB");
     add_plugin_path(*check_command, arguments->plugin_path);
     check_command->add_flag("--json", arguments->json, "Print JSON");
     check_command->callback(on_call(check));
 
     auto* describe_command =
         plugins->add_subcommand("describe", "Print the sidecar of a shared library, or write it beside it");
-    describe_command->add_option("plugin", arguments->plugin, "Path of a shared library")->required();
+    describe_command->add_option("plugin", arguments->plugin, "Path of a shared library")->required()->type_name("LIB");
     describe_command->add_flag("--sidecar", arguments->sidecar, "Write it beside the library");
     describe_command->callback(on_call(describe));
 }

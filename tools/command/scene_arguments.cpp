@@ -8,11 +8,10 @@ namespace delassus::command {
 void add_scene_arguments(CLI::App& command, SceneArguments& arguments) {
     command.add_option("scene", arguments.file, "Scene file (YAML)")->required()->type_name("SCENE");
     command.add_option("--solver", arguments.solver, "Solver of every system in place of the file's")
-        ->type_name("NAME[(KEY=VALUE,…)]");
-    command.add_option("--law", arguments.law, "Law of friction of every system: associated or coulomb")
-        ->type_name("LAW");
+        ->type_name("SOLVER[(KEY=VALUE,…)]");
+    add_law(command, arguments.law, "Law of friction of every system");
     command.add_option("--integrator", arguments.integrator, "Timestepper of every system in place of the file's")
-        ->type_name("NAME[(KEY=VALUE,…)]");
+        ->type_name("METHOD[(KEY=VALUE,…)]");
     command.add_option("--set", arguments.settings, "Value of the file to change, e.g. bodies.ball.mass=2")
         ->type_name("PATH=VALUE")
         ->expected(1)

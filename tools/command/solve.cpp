@@ -170,8 +170,7 @@ void add_solve(CLI::App& program, Action& action) {
         ->type_name("KEY=VALUE")
         ->expected(1)
         ->take_all();
-    command->add_option("--law", arguments->law, "Friction law in place of the problem's own: associated | coulomb")
-        ->type_name("LAW");
+    add_law(*command, arguments->law, "Friction law in place of the problem's own");
     command->add_option("--tolerance", arguments->tolerance, "Natural error to reach [1e-8]")->type_name("REAL");
     command->add_option("--max-iterations", arguments->max_iterations, "Limit of iterations [1000000]")->type_name("N");
     command->add_option("--time-limit", arguments->time_limit, "Limit of the solver's own time [none]")
@@ -183,8 +182,8 @@ void add_solve(CLI::App& program, Action& action) {
         ->type_name("DIR");
     command
         ->add_option("--partition", arguments->partition,
-                     "Under mpirun, who gets which bodies: auto | file (by the order of the file) | scotch [auto]")
-        ->type_name("HOW");
+                     "Under mpirun, who gets which bodies; file: by the order of the file [auto]")
+        ->type_name("auto|file|scotch");
     command->add_option("--config", arguments->config, "YAML file with the same settings; flags override it")
         ->type_name("FILE");
     add_plugin_path(*command, arguments->plugin_path);
