@@ -7,6 +7,8 @@ import tempfile
 import unittest
 from pathlib import Path, PurePosixPath
 
+import delassus
+
 SCRIPT = Path(os.environ["DELASSUS_SOURCE_DIR"]) / "scripts" / "build-site"
 LOADER = importlib.machinery.SourceFileLoader("build_site", str(SCRIPT))
 site = importlib.util.module_from_spec(importlib.util.spec_from_loader("build_site", LOADER))
@@ -27,6 +29,16 @@ class Site(unittest.TestCase):
             self.assertEqual(adapted("[a](../examples/notebooks/pile.ipynb)"), "[a](../examples/notebooks/pile.md)")
             self.assertEqual(adapted("[a](../setup.py#L3)"), "[a](../setup.py)")
             self.assertTrue((Path(scratch) / "setup.py").is_file())
+
+    def test_every_public_name_is_in_the_reference(self):
+        with tempfile.TemporaryDirectory() as scratch:
+            page = Path(scratch) / "python-reference.rst"
+            page.write_text(".. autofunction:: delassus.solve\n")
+            site.add_what_is_not_listed(page)
+            text = page.read_text()
+            for name in delassus.__all__:
+                self.assertEqual(text.count(f":: delassus.{name}\n"), 1, name)
+            self.assertIn("autoclass:: delassus.Problem\n", text)
 
     def test_broken_links(self):
         with tempfile.TemporaryDirectory() as scratch:
