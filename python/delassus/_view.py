@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pages of HTML that are shown in a notebook."""
+from __future__ import annotations
+
+import os
+import tempfile
+from html import escape
+from typing import Union
+
+
+class View:
+    """A page for a browser, whole in one text: shown in a frame by Jupyter, written to a file by write()."""
+
+    def __init__(self, html: str, height: int = 640):
+        self.html = html  #: the page
+        self.height = height  #: of the frame in a notebook, pixels
+
+    def write(self, path: Union[str, "os.PathLike[str]"]) -> None:
+        """Write the page to a file; one that is there is replaced whole or stays as it was."""
+        path = os.fspath(path)
+        handle, part = tempfile.mkstemp(dir=os.path.dirname(path) or ".", prefix=".delassus-", suffix=".html")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(self.html)
+            mask = os.umask(0)
+            os.umask(mask)
+            os.chmod(part, 0o666 & ~mask)  # mkstemp's files are for their owner only
+            os.replace(part, path)
+        except BaseException:
+            os.unlink(part)
+            raise
+
+    def _repr_html_(self) -> str:
+        return (f'<iframe srcdoc="{escape(self.html)}" style="width: 100%; height: {self.height}px; border: 0" '
+                'sandbox="allow-scripts" title="Delassus"></iframe>')
+
+    def __repr__(self) -> str:
+        return f"<delassus.View: {len(self.html) / 1e6:.1f} MB of HTML; write(path) puts it into a file>"
