@@ -9,6 +9,7 @@
 #include "solver_classes.hpp"
 #include "solvers.hpp"
 #include "system_runs.hpp"
+#include "views.hpp"
 
 PYBIND11_MODULE(_delassus, module) {
     module.doc() = "The border between Delassus and Python; use the package delassus.";
@@ -19,4 +20,5 @@ PYBIND11_MODULE(_delassus, module) {
     delassus::python::bind_solver_classes(module);
     delassus::python::bind_scenes(module);
     delassus::python::bind_system_runs(module);
+    delassus::python::bind_views(module);
 }

@@ -272,6 +272,22 @@ inline py::dict reactions_of(SystemRun& self) {
     return result;
 }
 
+inline py::list timestepper_rows() {
+    py::list methods;
+    for (const TimestepperInfo& info : timesteppers()) {
+        py::dict row, options;
+        for (const OptionInfo& option : info.options) options[py::str(option.key)] = option.default_value;
+        row["name"] = info.name;
+        row["description"] = info.description;
+        row["order"] = info.order;
+        row["constraints"] = info.constraints;
+        row["unilateral"] = info.unilateral;
+        row["options"] = options;
+        methods.append(row);
+    }
+    return methods;
+}
+
 inline void bind_system_runs(py::module_& module) {
     using namespace py::literals;
 
@@ -302,19 +318,7 @@ inline void bind_system_runs(py::module_& module) {
         .def("contacts", &reactions_of)
         .def("warnings", look([](const SystemRun& run) { return run.warnings(); }));
 
-    py::list methods;
-    for (const TimestepperInfo& info : timesteppers()) {
-        py::dict row, options;
-        for (const OptionInfo& option : info.options) options[py::str(option.key)] = option.default_value;
-        row["name"] = info.name;
-        row["description"] = info.description;
-        row["order"] = info.order;
-        row["constraints"] = info.constraints;
-        row["unilateral"] = info.unilateral;
-        row["options"] = options;
-        methods.append(row);
-    }
-    module.attr("_timesteppers") = methods;
+    module.def("_timesteppers", &timestepper_rows);
 }
 
 }  // namespace delassus::python

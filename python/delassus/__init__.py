@@ -23,6 +23,7 @@ import scipy.sparse
 from . import _delassus
 from ._delassus import Cone, Error, InputError, PluginError, Result, SolveRequest, StepFailure, StepRecord, \
     Unsupported
+from ._builder import SceneBuilder
 from ._compare import Comparison, compare
 from ._derivative import Derivative
 from ._plugins import Path, folders as _folders, own_plugins as _own_plugins, registry as _registry, text as _text
@@ -32,9 +33,9 @@ from ._view import View
 
 __version__: str = _delassus.version
 __all__ = ["Comparison", "Cone", "Derivative", "DynamicalSystem", "Error", "FreeSpin", "InputError", "PluginError",
-           "Problem", "Result", "Scene", "Simulation", "SolveRequest", "Solver", "State", "StepFailure", "StepRecord",
+           "Problem", "Result", "Scene", "SceneBuilder", "Simulation", "SolveRequest", "Solver", "State", "StepFailure", "StepRecord",
            "Trajectory", "Unilateral", "Unsupported", "View", "compare", "derivative", "plugins", "read", "register",
-           "simulate", "solve", "unbuilt"]
+           "simulate", "solve", "timesteppers", "unbuilt"]
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
 
@@ -287,3 +288,9 @@ def plugins(plugin_path: Sequence[Path] = ()) -> list:
 def unbuilt() -> dict:
     """Solvers that this build left out, by name, each with the reason."""
     return _registry().unbuilt()
+
+
+def timesteppers() -> list:
+    """The methods that step a system in time: dicts of name, description, order, options with their defaults, and whether
+    they take 'constraints' and 'unilateral' rows (contacts, stops, motors with limits)."""
+    return _delassus._timesteppers()

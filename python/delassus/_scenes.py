@@ -10,11 +10,14 @@ from typing import Any, Mapping, Optional, Sequence, Union
 import numpy as np
 
 from . import _delassus
+from ._builder import SceneBuilder
 from ._delassus import InputError, StepFailure, StepRecord
 from ._plugins import Path, folders, registry
 from ._system import DynamicalSystem, _Asked
 from ._view import View
 from ._yaml import yaml_of
+
+_NO_END = 1e300  # for the reader of scenes, which wants finite times
 
 Named = Union[str, Mapping[str, Any]]  #: 'name', 'name(key=value, …)', or {'name': …, 'options': {…}, …} as in scenes
 
@@ -38,7 +41,9 @@ class Scene(_delassus.Scene):
     def __init__(self, source: Union[Path, Mapping[str, Any]], *, set: Optional[Mapping[str, Any]] = None,
                  solver: str = "", integrator: str = "", law: Optional[str] = None, step: Optional[float] = None,
                  end: Optional[float] = None, tolerance: Optional[float] = None):
-        if isinstance(source, Mapping):
+        if isinstance(source, SceneBuilder):
+            scene, is_file = source.to_yaml() or "{}\n", False
+        elif isinstance(source, Mapping):
             scene, is_file = yaml_of(source), False
         else:
             scene = os.fspath(source)
@@ -53,6 +58,8 @@ class Scene(_delassus.Scene):
 def _settings(integrator: Named, solver: Named, law: Optional[str], step: Optional[float], end: Optional[float],
               tolerance: Any) -> Scene:
     """A scene with nothing in it but how a system is to be run; its reader checks it all."""
+    if end == np.inf:
+        end = _NO_END
     scene: dict = {"bodies": []}
     scene.update({key: value for key, value in (("step", step), ("end", end), ("tolerance", tolerance))
                   if value is not None})
@@ -97,6 +104,7 @@ class Simulation:
                 chosen["integrator"] = ("moreau_jean" if "unilateral" in self._asked.methods else
                                         "dormand_prince(error_limit=1e-5)")
             self.scene: Union[Scene, DynamicalSystem] = scene
+            self.end: Optional[float] = end  #: s; None where the scene knows it
             self._run: Any = self._noting(lambda: _delassus.SystemRun(self._asked, _settings(**chosen), plugins))
             return
         given = {key: value for key, value in chosen.items() if value not in ("", None)}
@@ -105,6 +113,7 @@ class Simulation:
         elif given:
             raise InputError(f"{', '.join(given)} belong to the Scene: give them where it is made")
         self._run = _delassus.SceneRun(scene, plugins, system)
+        self.end = None
         self.scene = scene
         self.bodies = scene.bodies(system)
 
@@ -261,6 +270,8 @@ def simulate(scene: Union[Scene, DynamicalSystem, Simulation, Path, Mapping[str,
         if given:
             raise InputError(f"{', '.join(given)} belong to the Simulation: give them where it is made")
         simulation = scene
+    if simulation.end == np.inf:
+        raise InputError("a simulation without an end cannot be simulated whole: give an end, or take steps")
     frames, contacts, records = [], [], []
 
     def record() -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from html import escape
 from typing import Union
+
+from ._files import write_whole
 
 
 class View:
@@ -17,18 +18,7 @@ class View:
 
     def write(self, path: Union[str, "os.PathLike[str]"]) -> None:
         """Write the page to a file; one that is there is replaced whole or stays as it was."""
-        path = os.fspath(path)
-        handle, part = tempfile.mkstemp(dir=os.path.dirname(path) or ".", prefix=".delassus-", suffix=".html")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(self.html)
-            mask = os.umask(0)
-            os.umask(mask)
-            os.chmod(part, 0o666 & ~mask)  # mkstemp's files are for their owner only
-            os.replace(part, path)
-        except BaseException:
-            os.unlink(part)
-            raise
+        write_whole(path, self.html)
 
     def _repr_html_(self) -> str:
         return (f'<iframe srcdoc="{escape(self.html)}" style="width: 100%; height: {self.height}px; border: 0" '
