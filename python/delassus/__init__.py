@@ -23,6 +23,7 @@ import scipy.sparse
 from . import _delassus
 from ._delassus import Cone, Error, InputError, PluginError, Result, SolveRequest, StepFailure, StepRecord, \
     Unsupported
+from ._bench import Benchmark, bench
 from ._builder import SceneBuilder
 from ._compare import Comparison, compare
 from ._derivative import Derivative
@@ -32,10 +33,10 @@ from ._system import DynamicalSystem, FreeSpin, State, Unilateral
 from ._view import View
 
 __version__: str = _delassus.version
-__all__ = ["Comparison", "Cone", "Derivative", "DynamicalSystem", "Error", "FreeSpin", "InputError", "PluginError",
-           "Problem", "Result", "Scene", "SceneBuilder", "Simulation", "SolveRequest", "Solver", "State", "StepFailure", "StepRecord",
-           "Trajectory", "Unilateral", "Unsupported", "View", "compare", "derivative", "plugins", "read", "register",
-           "simulate", "solve", "timesteppers", "unbuilt"]
+__all__ = ["Benchmark", "Comparison", "Cone", "Derivative", "DynamicalSystem", "Error", "FreeSpin", "InputError",
+           "PluginError", "Problem", "Result", "Scene", "SceneBuilder", "Simulation", "SolveRequest", "Solver", "State",
+           "StepFailure", "StepRecord", "Trajectory", "Unilateral", "Unsupported", "View", "bench", "compare",
+           "derivative", "plugins", "read", "register", "simulate", "solve", "timesteppers", "unbuilt"]
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
 
