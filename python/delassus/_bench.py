@@ -73,6 +73,9 @@ def bench(suite: Any, output: Optional[Union[str, "os.PathLike[str]"]] = None, o
             file = folder / "suite.yaml"
             file.write_text(yaml_of(_with_files(suite, folder)) + "\n", encoding="utf-8")
             suite = file
+            said_of = str(file)
+        else:
+            said_of = ""
         arguments = ["bench", "run", os.fspath(suite), "--output", str(folder)]
         for name in [only] if isinstance(only, str) else only:
             arguments += ["--only", name]
@@ -82,7 +85,8 @@ def bench(suite: Any, output: Optional[Union[str, "os.PathLike[str]"]] = None, o
             arguments += ["--plugin-path", *folders(plugin_path)]
         code, said = run_command(arguments)
         if code != 0:
-            raise InputError(said.strip().removeprefix("delassus: ") or f"the command ended with code {code}")
+            sentence = said.strip().removeprefix("delassus: ") or f"the command ended with code {code}"
+            raise InputError(sentence.replace(said_of, "the suite") if said_of else sentence)
         return _read(folder)
 
 
