@@ -218,21 +218,30 @@ private:
         const Array<double> values(from);
         for (py::ssize_t i = 0; i < values.size(); ++i) to[i] += factor * values.at(i);
     }
-    /// The entries (rows, columns, values).
-    static void add(const py::object& entries, double factor, Tangent tangent, std::int32_t first_row,
+    /// A dense matrix, whose zeros make no entries, or (rows, columns, values), or () for nothing.
+    static void add(const py::object& matrix, double factor, Tangent tangent, std::int32_t first_row,
                     MatrixAssembler& to) {
-        const py::tuple parts(entries);
+        const auto put = [&](std::int32_t row, std::int32_t column, double value) {
+            if (tangent == Tangent::Exact) {
+                to.add(first_row + row, column, factor * value);
+            } else {
+                to.add(row, column, 0.5 * factor * value);
+                to.add(column, row, 0.5 * factor * value);
+            }
+        };
+        if (py::isinstance<py::array>(matrix)) {
+            const Array<double> dense(matrix);
+            const double* value = dense.data();
+            for (std::int32_t row = 0; row < dense.shape(0); ++row)
+                for (std::int32_t column = 0; column < dense.shape(1); ++column, ++value)
+                    if (*value != 0.0) put(row, column, *value);
+            return;
+        }
+        const py::tuple parts(matrix);
+        if (parts.empty()) return;
         const auto rows = parts[0].cast<Array<std::int32_t>>(), columns = parts[1].cast<Array<std::int32_t>>();
         const auto values = parts[2].cast<Array<double>>();
-        for (py::ssize_t k = 0; k < values.size(); ++k) {
-            const double value = factor * values.at(k);
-            if (tangent == Tangent::Exact) {
-                to.add(first_row + rows.at(k), columns.at(k), value);
-            } else {
-                to.add(rows.at(k), columns.at(k), 0.5 * value);
-                to.add(columns.at(k), rows.at(k), 0.5 * value);
-            }
-        }
+        for (py::ssize_t k = 0; k < values.size(); ++k) put(rows.at(k), columns.at(k), values.at(k));
     }
     void add_if_any(const char* method, const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
         if (!has(method)) return;

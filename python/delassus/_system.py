@@ -2,8 +2,9 @@
 """Dynamical systems written in Python, and how the library asks them."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, List, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 import scipy.sparse
@@ -127,9 +128,31 @@ class DynamicalSystem:
         return errors
 
 
-def _dense(entries: Tuple, columns: int, rows: Optional[int] = None) -> np.ndarray:
-    i, j, values = entries
-    return scipy.sparse.coo_matrix((values, (i, j)), (columns if rows is None else rows, columns)).toarray()
+Entries = Union[np.ndarray, Tuple]  #: a dense matrix, or (rows, columns, values); () is nothing
+
+
+def _dense(matrix: Entries, columns: int, rows: Optional[int] = None) -> np.ndarray:
+    if isinstance(matrix, np.ndarray):
+        return matrix
+    shape = (columns if rows is None else rows, columns)
+    if not matrix:
+        return np.zeros(shape)
+    i, j, values = matrix
+    return scipy.sparse.coo_matrix((values, (i, j)), shape).toarray()
+
+
+def _times(matrix: Entries, x: np.ndarray, rows: int) -> np.ndarray:
+    if isinstance(matrix, np.ndarray):
+        return matrix @ x
+    i, j, values = matrix
+    return np.bincount(i, values * x[j], rows)
+
+
+def _transposed_times(matrix: Entries, x: np.ndarray, columns: int) -> np.ndarray:
+    if isinstance(matrix, np.ndarray):
+        return x @ matrix
+    i, j, values = matrix
+    return np.bincount(j, values * x[i], columns)
 
 
 _OPTIONAL = ("acceleration", "gyroscopic_damping", "free_spins", "definite_constraint_stiffness", "unilateral", "energy",
@@ -140,8 +163,8 @@ _STEP = np.finfo(float).eps ** (1 / 3)
 
 
 class _Asked:
-    """A system as the extension module asks it: states as (t, q, v), shapes checked, matrices as (rows, columns,
-    values), derivatives by differences where the class gives none."""
+    """A system as the extension module asks it: states as (t, q, v), shapes checked, matrices as Entries,
+    derivatives by differences where the class gives none."""
 
     def __init__(self, system: DynamicalSystem):
         self._system = system
@@ -215,7 +238,7 @@ class _Asked:
 
     def _note(self, name: str, values: np.ndarray, t: Optional[float]) -> None:
         # The methods of the library know what to do in a trial step: shorten it, or fail.
-        if not np.isfinite(values).all():
+        if not math.isfinite(values.sum()):
             self.not_finite = f"{self._name}.{name}()" + ("" if t is None else f" at t = {t:.9g}")
 
     def _vector(self, name: str, value: Any, size: int, letter: str, t: Optional[float] = None) -> np.ndarray:
@@ -227,20 +250,18 @@ class _Asked:
         return value
 
     def _matrix(self, name: str, value: Any, shape: Tuple[int, int], letters: str,
-                t: Optional[float] = None) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+                t: Optional[float] = None) -> Entries:
         if scipy.sparse.issparse(value):
-            found, entries = value.shape, value.tocoo()
-            rows, columns, values = entries.row, entries.col, self._numbers(name, entries.data)
+            entries = value.tocoo()
+            values = self._numbers(name, entries.data)
+            result: Entries = (entries.row, entries.col, values)
         else:
-            value = self._numbers(name, value)
-            found = value.shape
-            if found == shape:
-                rows, columns = np.nonzero(value)
-                values = value[rows, columns]
-        if found != shape:
-            raise InputError(f"{self._name}.{name}() returned a matrix of shape {found}; it must be {shape}, {letters}")
+            result = value = values = self._numbers(name, value)
+        if value.shape != shape:
+            raise InputError(f"{self._name}.{name}() returned a matrix of shape {value.shape}; it must be {shape}, "
+                             f"{letters}")
         self._note(name, values, t)
-        return rows, columns, values
+        return result
 
     # ---- The user's methods ----
 
@@ -269,8 +290,7 @@ class _Asked:
     def multiply_mass(self, t, q, v, x):
         if self.given("multiply_mass"):
             return self._vector("multiply_mass", self._system.multiply_mass(self._state(t, q, v), x), self.n, "n", t)
-        rows, columns, values = self.mass(t, q, v)
-        return np.bincount(rows, values * x[columns], self.n)
+        return _times(self.mass(t, q, v), x, self.n)
 
     def force(self, t, q, v):
         return self._vector("force", self._system.force(self._state(t, q, v)), self.n, "n", t)
@@ -290,7 +310,7 @@ class _Asked:
             return self.differences[name](t, q, v, *more)
         value = method(self._state(t, q, v), *more)
         if value is None:  # nothing
-            return (), (), ()
+            return ()
         return self._matrix(name, value, (self.n, self.n), "(n, n)", t)
 
     def stiffness(self, t, q, v):
@@ -389,12 +409,8 @@ class _Asked:
             delta[j] = 0.0
         return result
 
-    def _entries(self, matrix: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        rows, columns = np.nonzero(matrix)
-        return rows, columns, matrix[rows, columns]
-
     def _stiffness(self, t, q, v):
-        return self._entries(self.columns(lambda moved: -self.force(t, moved, v), q, self.n, self.n))
+        return self.columns(lambda moved: -self.force(t, moved, v), q, self.n, self.n)
 
     def _damping(self, t, q, v):
         result = np.zeros((self.n, self.n))
@@ -402,25 +418,15 @@ class _Asked:
             step = np.zeros(self.n)
             step[j] = _STEP * max(1.0, abs(v[j]))
             result[:, j] = (self.force(t, q, v - step) - self.force(t, q, v + step)) / (2.0 * step[j])
-        return self._entries(result)
-
-    def _times_mass(self, t, q, v, x):
-        if self.given("multiply_mass"):
-            return self.multiply_mass(t, q, v, x)
-        rows, columns, values = self.mass(t, q, v)
-        return np.bincount(rows, values * x[columns], self.n)
+        return result
 
     def _inertial_stiffness(self, t, q, v, acceleration):
-        return self._entries(
-            self.columns(lambda moved: self._times_mass(t, moved, v, acceleration), q, self.n, self.n))
-
-    def _transposed_jacobian(self, t, q, v, multipliers):
-        rows, columns, values = self.constraint_jacobian(t, q, v)
-        return np.bincount(columns, values * multipliers[rows], self.n)
+        return self.columns(lambda moved: self.multiply_mass(t, moved, v, acceleration), q, self.n, self.n)
 
     def _constraint_stiffness(self, t, q, v, multipliers):
-        return self._entries(
-            self.columns(lambda moved: self._transposed_jacobian(t, moved, v, multipliers), q, self.n, self.n))
+        return self.columns(
+            lambda moved: _transposed_times(self.constraint_jacobian(t, moved, v), multipliers, self.n), q, self.n,
+            self.n)
 
     def _rate(self, t, q, v):
         step = _STEP * max(1.0, abs(t))
@@ -433,7 +439,6 @@ class _Asked:
 
         def speed(s):
             moved = self._moved(q, s * v)
-            rows, columns, values = self.constraint_jacobian(t + s, moved, v)
-            return np.bincount(rows, values * v[columns], self.m) + self.constraint_rate(t + s, moved, v)
+            return _times(self.constraint_jacobian(t + s, moved, v), v, self.m) + self.constraint_rate(t + s, moved, v)
 
         return (speed(step) - speed(-step)) / (2.0 * step)
