@@ -53,10 +53,8 @@ public:
             constexpr double shortest = 1e-6;  // as in the runs of scenes
             control_ = std::make_unique<AdaptiveStepping>(
                 system_, *timestepper_,
-                StepControl{.absolute = limit,
-                            .initial = set_.step,
-                            .smallest = shortest * set_.step,
-                            .largest = set_.step},
+                StepControl{
+                    .absolute = limit, .initial = set_.step, .smallest = shortest * set_.step, .largest = set_.step},
                 fmt::format("{} cannot follow the motion there; take an implicit method, or euler_implicit_linearized, "
                             "which is less exact and may go on",
                             set_.integrator));
@@ -121,8 +119,7 @@ private:
             const auto finite = [](const std::vector<double>& values) {
                 return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
             };
-            if (!finite(next.q) || !finite(next.v))
-                throw StepFailure("the state at the end of the step is not finite");
+            if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
             const SolverEffort& effort = solver_->effort();
             if (effort.worst_miss > 100.0)  // as in the runs of scenes
                 throw StepFailure(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used",

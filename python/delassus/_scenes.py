@@ -66,6 +66,8 @@ def _settings(integrator: Named, solver: Named, law: Optional[str], step: Option
     for key, value in (("integrator", integrator), ("solver", solver)):
         if isinstance(value, Mapping):
             scene[key] = value
+        elif not isinstance(value, str):
+            raise InputError(f"{key} is of type {type(value).__name__}; it must be a name, or a dict as in scenes")
     names = {key: value for key, value in (("integrator", integrator), ("solver", solver)) if isinstance(value, str)}
     return Scene(scene, law=law, **names)
 

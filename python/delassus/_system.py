@@ -131,6 +131,13 @@ class DynamicalSystem:
 Entries = Union[np.ndarray, Tuple]  #: a dense matrix, or (rows, columns, values); () is nothing
 
 
+def _sparse(matrix: Entries, n: int) -> scipy.sparse.csr_matrix:
+    if isinstance(matrix, np.ndarray) or not matrix:
+        return scipy.sparse.csr_matrix(matrix if len(matrix) else (n, n))
+    i, j, values = matrix
+    return scipy.sparse.csr_matrix((values, (i, j)), (n, n))
+
+
 def _dense(matrix: Entries, columns: int, rows: Optional[int] = None) -> np.ndarray:
     if isinstance(matrix, np.ndarray):
         return matrix
@@ -214,10 +221,22 @@ class _Asked:
                 getattr(self, name)(*self._start)
         if self.not_finite:
             raise InputError(f"{self.not_finite}: a value is not finite")
+        self._check_mass()
 
     def given(self, name: str) -> bool:
         """Whether the class has the method."""
         return callable(getattr(self._system, name, None))
+
+    def _check_mass(self) -> None:
+        """At the start only, and whether it is definite only where that costs little."""
+        mass = _sparse(self.mass(*self._start), self.n)
+        size = abs(mass).max()
+        if abs(mass - mass.T).max() > 1e-10 * size:
+            raise InputError(f"{self._name}.mass() returned a matrix that is not symmetric")
+        least = np.linalg.eigvalsh(mass.toarray())[0] if self.n <= 200 else mass.diagonal().min()
+        if least < -1e-10 * size:
+            raise InputError(f"{self._name}.mass() returned a matrix that is not positive definite: it has the "
+                             f"{'eigenvalue' if self.n <= 200 else 'diagonal entry'} {least:.3g}")
 
     # ---- What methods return ----
 
@@ -359,13 +378,22 @@ class _Asked:
 
     def unilateral(self, t, q, v, h) -> List[Tuple]:
         result = []
-        for place, block in enumerate(self._system.unilateral(self._state(t, q, v), h)):
+        blocks = self._system.unilateral(self._state(t, q, v), h)
+        if not isinstance(blocks, (list, tuple)):
+            raise InputError(f"{self._name}.unilateral() returned a {type(blocks).__name__}; it must be a list")
+        for place, block in enumerate(blocks):
             name = f"unilateral()[{place}]"
             if not isinstance(block, Unilateral):
                 raise InputError(f"{self._name}.{name} is of type {type(block).__name__}; it must be a Unilateral")
             if not isinstance(block.cone, Cone):
                 raise InputError(f"{self._name}.{name}.cone is of type {type(block.cone).__name__}; make it by "
                                  "Cone.nonnegative, Cone.friction or Cone.box")
+            if block.cone.kind == "free":
+                raise InputError(f"{self._name}.{name}.cone is free; a bilateral row belongs into constraint")
+            if not 0.0 <= block.restitution <= 1.0:
+                raise InputError(f"{self._name}.{name}.restitution is {block.restitution}; it must be in [0, 1]")
+            if not block.compliance >= 0.0:
+                raise InputError(f"{self._name}.{name}.compliance is {block.compliance}; it must be 0 or positive")
             rows = block.cone.rows
             jacobian = block.jacobian
             if not scipy.sparse.issparse(jacobian):

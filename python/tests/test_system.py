@@ -321,6 +321,12 @@ class Mistakes(unittest.TestCase):
         self.expect(r"Own.unilateral\(\)\[0\] is of type tuple", unilateral=lambda self, state, h: [(1, 2)])
         self.expect(r"Own.unilateral\(\)\[0\].jacobian is of shape \(1, 2\); it must be \(3, 2\)",
                     unilateral=lambda self, state, h: [Unilateral(Cone.friction(0.1), np.zeros((1, 2)))])
+        self.expect(r"Own.unilateral\(\) returned a NoneType; it must be a list", unilateral=lambda self, state, h: None)
+        self.expect("restitution is 2; it must be in", unilateral=lambda self, state, h: [
+            Unilateral(Cone.nonnegative(), [1.0, 0.0], restitution=2)])
+        self.expect("belongs into constraint", unilateral=lambda self, state, h: [Unilateral(Cone.free(), [1.0, 0.0])])
+        self.expect("not symmetric", mass=lambda self, state: np.array([[1.0, 0.5], [0.0, 1.0]]))
+        self.expect("not positive definite: it has the eigenvalue -2", mass=lambda self, state: np.diag([1.0, -2.0]))
         self.expect("has no method force", NotImplementedError, force=DynamicalSystem.force)
 
     def test_wrong_settings(self):
@@ -330,6 +336,8 @@ class Mistakes(unittest.TestCase):
                                    ("theta", {"step": 0.1, "end": 1.0, "integrator": "moreau_jean(theta=7)"})):
             with self.assertRaisesRegex(delassus.InputError, sentence):
                 delassus.Simulation(Duffing(), **settings)
+        with self.assertRaisesRegex(delassus.InputError, "integrator is of type int"):
+            delassus.Simulation(Duffing(), integrator=7, step=0.1, end=1.0)
         with self.assertRaisesRegex(delassus.InputError, "give an instance"):
             delassus.Simulation(Duffing, step=0.1, end=1.0)
         with self.assertRaisesRegex(delassus.InputError, "step belong to the Scene"):
