@@ -21,7 +21,9 @@ class View:
         write_whole(path, self.html)
 
     def _repr_html_(self) -> str:
-        return (f'<iframe srcdoc="{escape(self.html)}" style="width: 100%; height: {self.height}px; border: 0" '
+        # Links within the page (#…) would lead to the notebook without the base.
+        page = self.html.replace("<head>", '<head><base href="about:srcdoc">', 1)
+        return (f'<iframe srcdoc="{escape(page)}" style="width: 100%; height: {self.height}px; border: 0" '
                 'sandbox="allow-scripts" title="Delassus"></iframe>')
 
     def __repr__(self) -> str:

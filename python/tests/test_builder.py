@@ -178,6 +178,7 @@ class Views(unittest.TestCase):
         self.assertIn("a ball: at rest", view.html)
         shown = view._repr_html_()
         self.assertTrue(shown.startswith("<iframe srcdoc="))
+        self.assertIn("&lt;base href=&quot;about:srcdoc&quot;&gt;", shown)
         self.assertNotIn('"', shown[len('<iframe srcdoc="'):shown.index('" style=')])
         with tempfile.TemporaryDirectory() as folder:
             view.write(Path(folder) / "ball.html")
