@@ -68,6 +68,9 @@ class Results(unittest.TestCase):
 
     def test_report(self):
         self.assertIn("| solver", self.results.summary)
+        if self.results.report is None:
+            self.assertTrue(self.results._repr_html_().startswith("<table>"))
+            self.skipTest("the build has no chart library")
         self.assertIn("Mine", self.results.report.html)
         self.assertTrue(self.results._repr_html_().startswith("<iframe srcdoc="))
         with tempfile.TemporaryDirectory() as folder:
