@@ -79,9 +79,8 @@ TEST_F(ProcessesSuite, RunsPilesOnOneAndTwoProcesses) {
                 EXPECT_GE(seconds.at(phase), 0.0) << phase;
                 sum += seconds.at(phase).get<double>();
             }
-            // Some iterations stand for the others, so that the sum is not exact.
             EXPECT_GT(sum, 0.0);
-            EXPECT_LT(sum, 3.0 * seconds.at("solve").get<double>() + 0.01);
+            EXPECT_LE(sum, (1.0 + 1e-5) * seconds.at("solve").get<double>() + 1e-6);  // rounding, also of floats
         }
         for (const Json& problem : set.problems)
             if (problem.at("problem") == row.at("problem")) {

@@ -115,6 +115,16 @@ void add(SolveCost& total, const SolveCost& stage) {
     total.bytes_sent = total.bytes_sent < 0 || stage.bytes_sent < 0 ? -1 : total.bytes_sent + stage.bytes_sent;
 }
 
+/// A solver's clock runs on while the core looks at an iterate, which does not count, and it may estimate phases from a
+/// part of the iterations. Its phases are shares of the core's time at most.
+void fit_phases(SolveCost& cost) {
+    double sum = 0.0;
+    for (const double seconds : cost.phases)
+        if (std::isfinite(seconds)) sum += seconds;
+    if (!(sum > cost.solve)) return;
+    for (double& seconds : cost.phases) seconds *= cost.solve / sum;
+}
+
 std::string quoted_name(const PreparedPart& problem) {
     const std::string& name = problem.problem().name;
     return name.empty() ? "the problem" : fmt::format("\"{}\"", name);
@@ -281,6 +291,7 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
     }
     cost.bytes_sent = outcome.bytes_sent;
     seconds[1] = cost.solve = watch.seconds();
+    fit_phases(cost);
     communicator->max(seconds);
     report.seconds_solve = seconds[1];
     report.analyses = outcome.analyses;

@@ -249,7 +249,7 @@ std::vector<Cone> expand_cones(const ProblemJson& json) {
 }
 
 std::string problem_json_text(const Problem& problem) {
-    OrderedJson document;
+    OrderedJson document = OrderedJson::object();  // nlohmann crashes where memory ends as a null becomes one
     document["format"] = "delassus-problem";
     document["version"] = 1;
     document["n"] = problem.n();
@@ -260,7 +260,7 @@ std::string problem_json_text(const Problem& problem) {
     for (std::size_t first = 0, last = 0; first < cones.size(); first = last) {
         const Cone& cone = cones[first];
         last = first + 1;
-        OrderedJson run;
+        OrderedJson run = OrderedJson::object();
         const sdk::ConeOperations& kind = operations_of(cone);
         run["kind"] = kind.name;
         if (kind.is_separable()) {

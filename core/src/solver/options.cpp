@@ -100,7 +100,7 @@ std::vector<OptionValue> resolve_options(std::string_view solver, const std::vec
 std::string options_schema(std::string_view solver, const std::vector<OptionInfo>& table) {
     nlohmann::ordered_json properties = nlohmann::ordered_json::object();
     for (const auto& option : table) {
-        nlohmann::ordered_json property;
+        nlohmann::ordered_json property = nlohmann::ordered_json::object();
         property["description"] = option.unit.empty() ? option.doc : fmt::format("{} [{}]", option.doc, option.unit);
         switch (option.type) {
             case DELASSUS_OPTION_BOOLEAN:

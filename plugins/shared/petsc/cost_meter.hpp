@@ -37,8 +37,8 @@ public:
         Together(CostMeter& meter, delassus_phase phase)
             : meter_(meter),
               phase_(phase),
-              begin_(meter.clock_.is_on() ? Clock::now() : Clock::time_point()),
-              span_(meter.clock_, phase) {}
+              span_(meter.clock_, phase),
+              begin_(meter.clock_.is_on() ? Clock::now() : Clock::time_point()) {}
         ~Together() {
             if (meter_.clock_.is_on()) meter_.note(phase_, std::chrono::duration<float>(Clock::now() - begin_).count());
         }
@@ -49,8 +49,8 @@ public:
         using Clock = sdk::PhaseClock::Clock;
         CostMeter& meter_;
         delassus_phase phase_;
+        sdk::PhaseClock::Span span_;  // begins before begin_ and ends after what is noted: no more is moved than it has
         Clock::time_point begin_;
-        sdk::PhaseClock::Span span_;
     };
 
     /// Bytes of a reduction, which PETSc does not count.

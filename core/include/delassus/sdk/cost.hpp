@@ -30,7 +30,8 @@ struct Cost {
 
 /// Adds up the seconds of phases. One phase runs at a time: a Span inside another one's life takes the time from it.
 /// Each Span reads the clock twice, 40 ns or so. Where iterations are shorter than some microseconds, one in `stride`
-/// is timed and stands for the others.
+/// is timed by phases. Its shares then stand for those of all iterations, whose time as a whole is always taken: so the
+/// phases never add up to more than what the iterations took.
 class PhaseClock {
 public:
     using Clock = std::chrono::steady_clock;
@@ -54,12 +55,23 @@ public:
     }
     /// An iteration begins, and the one before it ends; no Span may live.
     void next_iteration() {
+        const bool on = iterations_++ % stride_ == 0;
+        if (stride_ > 1 && (!inside_ || on_ || on)) {
+            const auto now = Clock::now();
+            if (inside_ && on_) timed_ += now - iteration_begin_;
+            if (!inside_) first_begin_ = now;
+            iteration_begin_ = now;
+        }
         inside_ = true;
-        on_ = iterations_++ % stride_ == 0;
-        timed_ += on_ ? 1 : 0;
+        on_ = on;
     }
     /// What follows belongs to no iteration; no Span may live.
     void end_iterations() {
+        if (stride_ > 1 && inside_) {
+            const auto now = Clock::now();
+            if (on_) timed_ += now - iteration_begin_;
+            all_ += now - first_begin_;
+        }
         inside_ = false;
         on_ = true;
     }
@@ -72,8 +84,9 @@ public:
         taken[from] -= seconds;
         taken[to] += seconds;
     }
+    /// Of all that has ended: iterations count from end_iterations() on.
     [[nodiscard]] std::array<double, DELASSUS_PHASE_COUNT> seconds() const {
-        const double each = timed_ > 0 ? static_cast<double>(iterations_) / static_cast<double>(timed_) : 0.0;
+        const double each = timed_ > Clock::duration::zero() ? std::chrono::duration<double>(all_) / timed_ : 1.0;
         auto all = outside_seconds_;
         for (std::size_t k = 0; k < all.size(); ++k) all[k] += each * inside_seconds_[k];
         return all;
@@ -93,10 +106,11 @@ private:
     }
 
     std::array<double, DELASSUS_PHASE_COUNT> inside_seconds_ = {}, outside_seconds_ = {};
-    std::int64_t stride_ = 1, iterations_ = 0, timed_ = 0;
+    std::int64_t stride_ = 1, iterations_ = 0;
     int phase_ = none;
     bool inside_ = false, on_ = true;
-    Clock::time_point begin_;
+    Clock::time_point begin_, iteration_begin_, first_begin_;
+    Clock::duration all_ = {}, timed_ = {};  // of iterations, and of those that were timed by phases
 };
 
 }  // namespace delassus::sdk
