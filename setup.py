@@ -33,16 +33,19 @@ class BuildByCMake(build_ext):
                                  text=True).stdout
         if not re.search(r"^python_with_plugins: phony", targets, re.MULTILINE):
             raise SystemExit("CMake left the Python package out; its summary above says why")
-        call("cmake", "--build", "--preset", "release", "--target", "python_with_plugins")
+        call("cmake", "--build", "--preset", "release", "--target", "python_with_plugins", "delassus_command",
+             "delassus_documents")
         package = Path(self.build_lib).resolve() / "delassus"
         shutil.rmtree(package, ignore_errors=True)
         with tempfile.TemporaryDirectory() as stage:
-            for component in ("library", "plugins", "python"):
+            for component in ("library", "plugins", "command", "python"):
                 call("cmake", "--install", BUILD, "--prefix", stage, "--component", component)
             (python,) = (file.parent for file in Path(stage).rglob("delassus/__init__.py"))
             (library,) = {file.parent for file in Path(stage).rglob("libdelassus.so.*")}
             shutil.copytree(python, package)
             shutil.copytree(library / "delassus", package / "lib" / "delassus")
+            (package / "bin").mkdir()
+            shutil.copy(Path(stage) / "bin" / "delassus", package / "bin" / "delassus")  # for bench()
             # Wheels hold no links: each library gets the name by which the loader asks for it.
             for link in library.glob("libdelassus*.so.*"):
                 if link.is_symlink():

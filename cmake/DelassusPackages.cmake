@@ -70,7 +70,7 @@ Headers, documentation and examples for programs that embed Delassus and for aut
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-delassus)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "libdelassus ${same_version}, ${DELASSUS_PYTHON_VERSIONS}, python3-numpy, python3-scipy")
-set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS delassus-plugins)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "delassus-plugins, delassus")  # the latter for bench() and the pages
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Saddle-point and cone-complementarity problems: the Python package
 Solves problems of NumPy arrays and SciPy matrices with the solvers of Delassus, and simulates scenes.")
 

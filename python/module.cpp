@@ -8,6 +8,8 @@
 #include "scenes.hpp"
 #include "solver_classes.hpp"
 #include "solvers.hpp"
+#include "system_runs.hpp"
+#include "views.hpp"
 
 PYBIND11_MODULE(_delassus, module) {
     module.doc() = "The border between Delassus and Python; use the package delassus.";
@@ -17,4 +19,6 @@ PYBIND11_MODULE(_delassus, module) {
     delassus::python::bind_solvers(module);
     delassus::python::bind_solver_classes(module);
     delassus::python::bind_scenes(module);
+    delassus::python::bind_system_runs(module);
+    delassus::python::bind_views(module);
 }

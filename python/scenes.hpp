@@ -202,7 +202,7 @@ inline void bind_scenes(py::module_& module) {
                                record.contacts, record.solved ? "solved" : "a solve missed its tolerance");
         });
 
-    py::class_<SharedSimulation>(module, "Simulation")
+    py::class_<SharedSimulation>(module, "SceneRun")
         .def(py::init<std::shared_ptr<SharedScene>, std::shared_ptr<const Registry>, const std::string&>(), "scene"_a,
              "registry"_a, "system"_a)
         .def("step", &SharedSimulation::step,
@@ -237,6 +237,13 @@ inline void bind_scenes(py::module_& module) {
         .def_property_readonly(
             "record", [](SharedSimulation& self) { return self.look([](const Simulation& s) { return s.record(); }); },
             "The StepRecord of the last step; of the start before the first.")
+        .def_property_readonly(
+            "multipliers",
+            [](SharedSimulation& self) {
+                return array_of(self.look([](const Simulation& s) { return s.multipliers(); }));
+            },
+            "λ of all rows of joints, motors and attachments after the last step, forces (N, Nm); empty before the "
+            "first.")
         .def("contacts", &contacts_of,
              "The contacts of the last step, found where it began: a dict of arrays with a row each. 'bodies' × 2 "
              "(numbers in bodies(), −1 the world), 'point' × 3 (m), 'normal' × 3 (unit, from the first to the second), "

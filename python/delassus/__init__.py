@@ -14,11 +14,8 @@ x are velocities and λ reaction impulses in SI scenes (m/s, N s), but no unit i
 """
 from __future__ import annotations
 
-import functools
 import os
-import warnings
-from dataclasses import dataclass, field
-from typing import Any, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import scipy.sparse
@@ -26,34 +23,22 @@ import scipy.sparse
 from . import _delassus
 from ._delassus import Cone, Error, InputError, PluginError, Result, SolveRequest, StepFailure, StepRecord, \
     Unsupported
+from ._bench import Benchmark, bench
+from ._builder import SceneBuilder
 from ._compare import Comparison, compare
 from ._derivative import Derivative
-from ._yaml import yaml_of
+from ._plugins import Path, folders as _folders, own_plugins as _own_plugins, registry as _registry, text as _text
+from ._scenes import Scene, Simulation, Trajectory, simulate
+from ._system import DynamicalSystem, FreeSpin, State, Unilateral
+from ._view import View
 
 __version__: str = _delassus.version
-__all__ = ["Comparison", "Cone", "Derivative", "Error", "InputError", "PluginError", "Problem", "Result", "Scene",
-           "Simulation", "SolveRequest", "Solver", "StepFailure", "StepRecord", "Trajectory", "Unsupported", "compare",
-           "derivative", "plugins", "read", "register", "simulate", "solve", "unbuilt"]
+__all__ = ["Benchmark", "Comparison", "Cone", "Derivative", "DynamicalSystem", "Error", "FreeSpin", "InputError",
+           "PluginError", "Problem", "Result", "Scene", "SceneBuilder", "Simulation", "SolveRequest", "Solver", "State",
+           "StepFailure", "StepRecord", "Trajectory", "Unilateral", "Unsupported", "View", "bench", "compare",
+           "derivative", "plugins", "read", "register", "simulate", "solve", "timesteppers", "unbuilt"]
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
-Path = Union[str, "os.PathLike[str]"]
-
-
-_own_plugins: list = []  # of register()
-
-
-@functools.lru_cache(maxsize=None)
-def _registry(folders: Tuple[str, ...] = ()) -> _delassus.Registry:
-    registry = _delassus.Registry(list(folders))
-    for plugin in _own_plugins:
-        registry._add(plugin)
-    return registry
-
-
-def _folders(plugin_path: Sequence[Path]) -> Tuple[str, ...]:
-    if isinstance(plugin_path, (str, os.PathLike)):
-        plugin_path = [plugin_path]
-    return tuple(os.path.abspath(os.fspath(folder)) for folder in plugin_path)
 
 
 def _reals(array: Any, name: str) -> np.ndarray:
@@ -79,19 +64,6 @@ def _rows(matrix: Optional[Matrix], name: str):
         rows = rows.copy()  # the user's matrix stays as it is
         rows.sum_duplicates()
     return rows.indptr, rows.indices, _reals(rows.data, name), rows.shape
-
-
-def _text(key: str, value: Any) -> str:
-    """An option's value as a configuration file has it."""
-    if isinstance(value, (bool, np.bool_)):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, (int, np.integer)):
-        return str(int(value))
-    if isinstance(value, (float, np.floating)):
-        return repr(float(value))
-    raise InputError(f"option {key} is of type {type(value).__name__}; it must be a number, a bool or a text")
 
 
 class Problem(_delassus.Problem):
@@ -323,131 +295,7 @@ def unbuilt() -> dict:
     return _registry().unbuilt()
 
 
-class Scene(_delassus.Scene):
-    """One or several mechanical systems, with their timesteppers and solvers (docs/scenes.md).
-
-    Parameters
-    ----------
-    source : a path of a YAML file, a text in YAML (anything with a line break), or a dict of the same keys
-    set : values by path that replace those of the source, e.g. {"bodies.ball.mass": 2}
-    solver, integrator : 'name' or 'name(key=value, …)' for every system
-    law : 'associated' or 'coulomb', for every system
-    step, end : s, for every system
-    tolerance : m or rad, from which steps follow
-
-    Raises InputError that names file, line, key and the nearest valid key.
-    """
-
-    def __init__(self, source: Union[Path, Mapping[str, Any]], *, set: Optional[Mapping[str, Any]] = None,
-                 solver: str = "", integrator: str = "", law: Optional[str] = None, step: Optional[float] = None,
-                 end: Optional[float] = None, tolerance: Optional[float] = None):
-        if isinstance(source, Mapping):
-            text, is_file = yaml_of(source), False
-        else:
-            text = os.fspath(source)
-            is_file = "\n" not in text
-        values = [(path, yaml_of(value)) for path, value in (set or {}).items()]
-        super().__init__(text, is_file, values, solver, integrator, law, step, end, tolerance)
-
-    def __repr__(self) -> str:
-        return f"<delassus.Scene: {self.title or 'without a title'}, systems {', '.join(self.systems)}>"
-
-
-class Simulation(_delassus.Simulation):
-    """A system of a scene, step by step.
-
-    Parameters
-    ----------
-    scene : a Scene, or what Scene takes; two simulations of one Scene step one at a time
-    system : its name; '' where the scene has only one
-    """
-
-    def __init__(self, scene: Union[Scene, Path, Mapping[str, Any]], system: str = "",
-                 plugin_path: Sequence[Path] = ()):
-        if not isinstance(scene, Scene):
-            scene = Scene(scene)
-        super().__init__(scene, _registry(_folders(plugin_path)), system)
-        self.scene: Scene = scene
-        self.bodies: list = scene.bodies(system)  #: names, in the order of poses and twists
-
-    def __repr__(self) -> str:
-        return f"<delassus.Simulation: t = {self.time} s, {len(self.bodies)} bodies>"
-
-
-@dataclass
-class Trajectory:
-    """What simulate() recorded: K states, of B bodies. Units are those of the scene, SI as a rule."""
-
-    bodies: list  #: names of the B bodies
-    time: np.ndarray  #: (K,), s
-    positions: np.ndarray  #: (K, ·) coordinates q of all that can move
-    velocities: np.ndarray  #: (K, ·) v of all that can move
-    poses: np.ndarray  #: (K, B, 7): mass centre in the world (m), unit quaternion (w, x, y, z)
-    twists: np.ndarray  #: (K, B, 6): velocity in the world frame (m/s), angular velocity in the body frame (rad/s)
-    energy: np.ndarray  #: (K,), J
-    penetration: np.ndarray  #: (K,), m
-    drift: np.ndarray  #: (K,), largest |C| of joints and motors, m or rad
-    natural: np.ndarray  #: (K,), largest natural error of the solves of the step that ends there
-    contacts: dict = field(repr=False)  #: a row for each contact of each state: Simulation.contacts() with 'state' (k)
-    status: str = "finished"  #: or 'unsolved' (a solve missed its tolerance), 'diverged', 'failed'
-    message: str = ""  #: what a person should know; '' where the run finished
-    steps: int = 0  #: steps taken
-
-    def body(self, name: str) -> np.ndarray:
-        """(K, 7): the poses of one body."""
-        return self.poses[:, self._number(name)]
-
-    def twist(self, name: str) -> np.ndarray:
-        """(K, 6): the velocities of one body."""
-        return self.twists[:, self._number(name)]
-
-    def _number(self, name: str) -> int:
-        if name not in self.bodies:
-            raise InputError(f"there is no body {name!r}, but {', '.join(self.bodies)}")
-        return self.bodies.index(name)
-
-
-def simulate(scene: Union[Scene, Simulation, Path, Mapping[str, Any]], system: str = "", every: int = 1,
-             plugin_path: Sequence[Path] = ()) -> Trajectory:
-    """Simulate a system to its end, and record every so many steps, the start and the end.
-
-    scene : a Scene, what Scene takes, or a Simulation, which goes on from where it is
-    system : its name; '' where the scene has only one
-
-    A step that fails ends the run: what was recorded comes back with status 'failed' and the sentence. Whatever is not
-    'finished' is also a RuntimeWarning. Raises Unsupported where a solver or timestepper cannot take the system.
-    """
-    if every < 1:
-        raise InputError(f"every is {every}; it must be 1 or more")
-    simulation = scene if isinstance(scene, _delassus.Simulation) else Simulation(scene, system, plugin_path)
-    frames, contacts = [], []
-
-    def record() -> None:
-        now = simulation.record
-        frames.append((simulation.time, simulation.positions, simulation.velocities, simulation.poses,
-                       simulation.twists, now.energy, now.penetration, now.drift, now.natural))
-        contacts.append(simulation.contacts())
-
-    status, message, steps, recorded, solved = "finished", "", 0, True, True
-    record()
-    try:
-        while not simulation.finished:
-            solved = simulation.step().solved and solved
-            steps += 1
-            recorded = steps % every == 0
-            if recorded:
-                record()
-    except StepFailure as failure:
-        status, message = "failed", str(failure)
-    if not recorded:
-        record()
-    if status == "finished" and not all(np.isfinite(frames[-1][k]).all() for k in (1, 2)):
-        status, message = "diverged", f"the state at t = {frames[-1][0]} s is not finite"
-    elif status == "finished" and not solved:
-        status, message = "unsolved", "; ".join(simulation.warnings()) or "a solve missed its tolerance"
-    if status != "finished":
-        warnings.warn(f"the simulation ended as {status}: {message}", RuntimeWarning, stacklevel=2)
-    arrays = [np.array(column) for column in zip(*frames)]
-    table = {key: np.concatenate([frame[key] for frame in contacts]) for key in contacts[0]}
-    table["state"] = np.repeat(np.arange(len(contacts)), [len(frame["gap"]) for frame in contacts])
-    return Trajectory(simulation.bodies, *arrays, contacts=table, status=status, message=message, steps=steps)
+def timesteppers() -> list:
+    """The methods that step a system in time: dicts of name, description, order, options with their defaults, and whether
+    they take 'constraints' and 'unilateral' rows (contacts, stops, motors with limits)."""
+    return _delassus._timesteppers()

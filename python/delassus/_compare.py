@@ -38,7 +38,7 @@ class Comparison(list):
     def to_csv(self, path: Union[str, "os.PathLike[str]"]) -> None:
         """Write the columns as CSV (RFC 4180), without the curves."""
         with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
+            writer = csv.DictWriter(file, self.columns, extrasaction="ignore")
             writer.writeheader()
             writer.writerows(self)
 
@@ -50,12 +50,12 @@ class Comparison(list):
             raise ImportError("plot() needs matplotlib (python3-matplotlib)") from None
         if axes is None:
             axes = plt.subplots()[1]
-        several = len({row["problem"] for row in self}) > 1
+        keys = [key for key in ("problem", "law", "tolerance") if len({row[key] for row in self}) > 1]
         for row in self:
             curve = row["curve"]
             if curve is None or not len(curve):
                 continue
-            label = f"{row['problem']}: {row['solver']}" if several else row["solver"]
+            label = ", ".join([row["solver"], *(_text(row[key]) for key in keys)])
             axes.loglog(np.maximum(curve[:, 1], 1e-7), curve[:, 2], ".-", label=label)
         axes.set_xlabel("time in the solver, s")
         axes.set_ylabel("natural error")

@@ -31,7 +31,7 @@ class Documents(unittest.TestCase):
         return printed.getvalue()
 
     def test_python_page(self):
-        self.assertTrue(self.run_blocks("docs/python.md", 6).startswith("solved"))
+        self.assertTrue(self.run_blocks("docs/python.md", 9).startswith("solved"))
 
     def test_readme(self):
         self.assertTrue(self.run_blocks("README.md", 1).startswith("solved"))

@@ -83,6 +83,14 @@ class Sources(unittest.TestCase):
         np.testing.assert_allclose(steps, [0.02, 0.02, 0.01], rtol=1e-9)
         np.testing.assert_allclose(np.abs(simulation.contacts()["force"][0, 2]), 3 * 9.81, rtol=1e-6)
 
+    def test_settings_by_keyword(self):
+        run = delassus.simulate(ball(), solver="pgs", step=0.02, end=0.06)
+        np.testing.assert_allclose(run.time, [0.0, 0.02, 0.04, 0.06], atol=1e-12)
+        with self.assertRaisesRegex(delassus.InputError, "end belong to the Scene"):
+            delassus.simulate(delassus.Scene(ball()), end=1.0)
+        with self.assertRaisesRegex(delassus.InputError, "solver belong to the Simulation"):
+            delassus.simulate(delassus.Simulation(ball()), solver="pgs")
+
     def test_refusals(self):
         for sentence, scene in (('did you mean "bodies"', {"bodys": []}), ("/nowhere.yaml", "/nowhere.yaml"),
                                 ("sticks, slides", EXAMPLES / "box_on_incline.yaml"),

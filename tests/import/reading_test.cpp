@@ -237,6 +237,19 @@ TEST(ImportMjcf, WritesFrictionByPairs) {
     EXPECT_EQ(friction("ball", "ghost"), 1.0);  // dimensions 1 and 3
 }
 
+TEST(ImportMjcf, TakesARoundEllipsoidForASphere) {
+    const ScratchFolder folder;
+    std::ofstream(folder / "a.xml") << mjcf_of(
+        "<geom type='plane' size='1 1 1'/><body><freejoint/><geom type='ellipsoid' size='0.1 0.1 0.1' pos='0 0 0.2'/>"
+        "<geom type='ellipsoid' size='0.1 0.1 0.2'/></body>");
+    const auto imported = import_model(folder / "a.xml", folder / "s.yaml");
+    EXPECT_EQ(imported.lost.size(), 1U);
+    const auto shapes = YAML::Load(imported.yaml)["bodies"][1]["shapes"];
+    ASSERT_EQ(shapes.size(), 2U);
+    EXPECT_EQ(shapes[0]["sphere"]["radius"].as<double>(), 0.1);
+    EXPECT_TRUE(shapes[1]["convex"]);
+}
+
 TEST(ImportMjcf, WritesHullsBesideTheScene) {
     Imported meshes(model_file("meshes.xml"));
     ASSERT_EQ(meshes.text.files.size(), 1U);

@@ -9,7 +9,7 @@
     document.title = `${session.suite.title} – Delassus benchmark`;
     at("title").textContent = `Benchmark: ${session.suite.title}`;
     const asked = results.solves.filter((row) => row.cause !== "unsupported");
-    at("summary").textContent = `${session.suite.description}. ` + [
+    at("summary").textContent = (session.suite.description ? `${session.suite.description}. ` : "") + [
       results.solves.length === 0 ? "" : `${plural(solverLabels.length, "solver")} on ${plural(new Set(results.solves.map((row) => row.problem)).size, "problem")}: ` +
         `${asked.filter(solvedRow).length} of ${asked.length} runs solved, ${results.solves.length - asked.length} refused`,
       results.simulations.length === 0 ? "" : `${plural(results.simulations.length, "run")} of ${plural(results.scenes.length, "scene")}`,

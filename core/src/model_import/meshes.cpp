@@ -125,6 +125,11 @@ void add_mesh(Model& model, const ModelShape& at, const std::string& address, co
 }
 
 ModelShape ellipsoid(Model& model, ModelShape at, const Vector3d& radii, const std::string& what) {
+    if ((radii.array() == radii.x()).all()) {
+        at.form = Form::Sphere;
+        at.size.x() = radii.x();
+        return at;
+    }
     at.form = Form::Hull;
     for (const Vector3d& point : sphere_points()) at.points.push_back(radii.cwiseProduct(point));
     model.lose(what, "an ellipsoid: a polyhedron of 162 points in its surface stands in");

@@ -164,7 +164,7 @@ DELASSUS_API void add_mesh(Model& model, const ModelShape& at, const std::string
                            const std::filesystem::path& model_file, const std::string& what,
                            std::vector<ModelShape>& shapes);
 
-/// An ellipsoid as the hull of points in its surface, with a loss.
+/// An ellipsoid as the hull of points in its surface, with a loss; as a sphere where all radii are equal.
 DELASSUS_API ModelShape ellipsoid(Model& model, ModelShape at, const Vector3d& radii, const std::string& what);
 
 /// No two of these bodies touch: as links of one robot in Gazebo do not, unless told to.

@@ -14,6 +14,7 @@
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
+#include "simulation/fixed_step.hpp"
 #include "simulation/look_ahead.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
@@ -27,27 +28,6 @@ namespace delassus {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// Times within this fraction of a step are equal but for rounding.
-constexpr double rounding_of_step = 1e-9;
-
-/// A step of fixed size from t: its size, and the time that it reaches.
-struct FixedStep {
-    double h, end;
-};
-
-// Times are multiples of the step, counted, not summed: t = k h. Where `end` is no multiple, the last steps share what
-// remains, so that none is shorter than half a step: a sliver would divide C and Φ by next to nothing. A run that is
-// ended here or goes on later takes the same steps up to the last two.
-FixedStep fixed_step(double t, double end, double h) {
-    const double remaining = end - t;
-    if (remaining <= (1.0 + rounding_of_step) * h)
-        return {remaining >= (1.0 - rounding_of_step) * h ? h : remaining, end};
-    if (remaining < (1.5 - rounding_of_step) * h) return {0.5 * remaining, t + 0.5 * remaining};
-    const double count = std::round(t / h);
-    const bool on_grid = std::abs(t - count * h) <= rounding_of_step * h;
-    return {h, on_grid ? (count + 1.0) * h : t + h};
-}
 
 /// Throws Unsupported if the system's timestepper solves for more than the velocities of one step.
 void require_sleeping(const SceneSystem& system) {

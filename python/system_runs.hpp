@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Running a system that is a class of Python, step by step.
+#pragma once
+
+#include <fmt/format.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "delassus/adaptive_stepping.hpp"
+#include "delassus/registry.hpp"
+#include "delassus/simulation.hpp"
+#include "delassus/step_solver.hpp"
+#include "delassus/timestepper.hpp"
+#include "guards.hpp"
+#include "python_system.hpp"
+#include "scenes.hpp"
+#include "simulation/fixed_step.hpp"
+
+namespace delassus::python {
+
+/// A PythonSystem with its state, its timestepper and its solver. As with Simulation, a step that throws leaves
+/// everything as it was.
+class SystemRun {
+public:
+    /// settings: a scene of one system, of which only integrator, solver, step, tolerance and end count. With the GIL.
+    SystemRun(py::object object, const std::shared_ptr<SharedScene>& settings, std::shared_ptr<const Registry> registry)
+        : registry_(std::move(registry)),
+          settings_(settings),
+          set_(settings->scene.systems.front()),
+          system_(std::move(object)) {
+        const py::gil_scoped_release without_gil;
+        solver_ = std::make_unique<StepSolver>(*registry_, set_.solver);
+        SolverConfig named = set_.solver;
+        if (named.name.empty()) named.name = "auto";
+        check_solver(*registry_, named);
+        state_ = system_.initial_state();
+        timestepper_ = make_timestepper(set_.integrator, system_, set_.integrator_options);
+        if (set_.control) {
+            control_ = std::make_unique<AdaptiveStepping>(system_, *timestepper_, *set_.control);
+        } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
+            constexpr double shortest = 1e-6;  // as in the runs of scenes
+            control_ = std::make_unique<AdaptiveStepping>(
+                system_, *timestepper_,
+                StepControl{
+                    .absolute = limit, .initial = set_.step, .smallest = shortest * set_.step, .largest = set_.step},
+                fmt::format("{} cannot follow the motion there; take an implicit method, or euler_implicit_linearized, "
+                            "which is less exact and may go on",
+                            set_.integrator));
+        }
+        measure(state_, record_);
+    }
+
+    /// What look(run) returns, a value.
+    template <typename Look>
+    auto look(const Look& look) {
+        return in_turn(turn_, [&] { return look(*this); });
+    }
+
+    StepRecord step() {
+        Interrupts interrupts;
+        StepRecord record;
+        try {
+            record = look([&](SystemRun& self) {
+                self.solver_->cancelled = [&interrupts] { return interrupts.came(); };
+                struct Forget {
+                    StepSolver& solver;
+                    ~Forget() { solver.cancelled = nullptr; }
+                } const forget{*self.solver_};
+                return self.take_step();
+            });
+        } catch (const StepInterrupted&) {
+            interrupts.rethrow();
+            throw;
+        }
+        interrupts.rethrow();
+        return record;
+    }
+
+    [[nodiscard]] bool finished() const {
+        return set_.end - state_.t <= (set_.control ? 0.0 : rounding_of_step * set_.step);
+    }
+    [[nodiscard]] const State& state() const { return state_; }
+    [[nodiscard]] const StepRecord& record() const { return record_; }
+    [[nodiscard]] const StepReport& report() const { return report_; }
+    [[nodiscard]] const std::string& integrator() const { return set_.integrator; }
+    [[nodiscard]] std::vector<std::string> warnings() const {
+        if (unsolved_ == 0) return {};
+        return {fmt::format("{} of {} steps rest on a solve that missed its tolerance; the first: {}", unsolved_,
+                            record_.step, first_unsolved_)};
+    }
+
+private:
+    const StepRecord& take_step() {
+        if (finished())
+            throw InputError(
+                fmt::format("the simulation has reached its end, {} s: there is no further step", set_.end));
+        const auto begin = std::chrono::steady_clock::now();
+        const auto where = [&] { return fmt::format("step {} from t = {:.9g} s", record_.step + 1, state_.t); };
+        const std::vector<double> memory = timestepper_->save();
+        const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
+        State next = state_;
+        StepRecord record;
+        AdaptiveStepReport taken;
+        solver_->reset_effort();
+        try {
+            advance(next, taken, record, memory);
+            const auto finite = [](const std::vector<double>& values) {
+                return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+            };
+            if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
+            const SolverEffort& effort = solver_->effort();
+            if (effort.worst_miss > 100.0)  // as in the runs of scenes
+                throw StepFailure(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used",
+                                              effort.unsolved, effort.worst_miss));
+            measure(next, record);
+        } catch (const Unsupported& error) {
+            undo(memory, control);
+            throw Unsupported(fmt::format("{}: {}", where(), error.what()));
+        } catch (const StepInterrupted&) {
+            undo(memory, control);
+            throw;
+        } catch (const StepFailure& error) {
+            undo(memory, control);
+            throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+        } catch (const InputError& error) {
+            undo(memory, control);
+            throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+        } catch (...) {  // of the user's methods
+            undo(memory, control);
+            throw;
+        }
+        const SolverEffort& effort = solver_->effort();
+        record.step = record_.step + 1;
+        record.h = taken.h;
+        record.rejected = taken.rejected;
+        record.impact = taken.impact;
+        record.contacts = taken.step.unilateral_blocks;
+        record.newton_iterations = taken.step.newton_iterations;
+        record.solver_iterations = effort.iterations;
+        record.natural = effort.worst_natural;
+        record.solved = taken.step.solved;
+        record.linearization = taken.step.linearization;
+        record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+        if (!record.solved && ++unsolved_ == 1) first_unsolved_ = fmt::format("{}: {}", where(), taken.step.message);
+        record_ = record;
+        state_ = std::move(next);
+        report_ = std::move(taken.step);
+        return record_;
+    }
+
+    void advance(State& state, AdaptiveStepReport& taken, StepRecord& record, const std::vector<double>& memory) {
+        if (set_.control) {
+            taken = control_->step(state, set_.end, *solver_);
+            return;
+        }
+        const FixedStep step = fixed_step(state.t, set_.end, set_.step);
+        if (control_) {
+            for (record.parts = 0; state.t < step.end; ++record.parts) {
+                AdaptiveStepReport part = control_->step(state, step.end, *solver_);
+                part.step.follow(taken.step);
+                std::swap(taken.step, part.step);
+                taken.rejected += part.rejected;
+            }
+        } else {
+            try {
+                timestepper_->step(state, step.h, *solver_, taken.step);
+            } catch (const StepTooLong& failure) {
+                advance_in_parts(state, step.h, taken.step, record, memory, failure);
+            }
+        }
+        taken.h = step.h;
+        state.t = step.end;
+    }
+
+    // Twice as many parts until the method can take them all.
+    void advance_in_parts(State& state, double h, StepReport& report, StepRecord& record,
+                          const std::vector<double>& memory, const StepTooLong& failure) {
+        constexpr std::int64_t most = 64;
+        for (std::int64_t parts = 2; parts <= most; parts *= 2) {
+            state = state_;
+            timestepper_->restart();
+            timestepper_->load(memory);
+            report.clear();
+            try {
+                for (std::int64_t i = 0; i < parts; ++i) {
+                    StepReport part = timestepper_->step(state, h / static_cast<double>(parts), *solver_);
+                    part.follow(report);
+                    std::swap(report, part);
+                }
+            } catch (const StepTooLong&) {
+                continue;
+            }
+            record.parts = parts;
+            return;
+        }
+        throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
+    }
+
+    void undo(const std::vector<double>& memory, const std::vector<double>& control) {
+        timestepper_->restart();
+        timestepper_->load(memory);
+        if (control_) control_->load(control);
+    }
+
+    /// record ← what is known of a state. The system does not say what momentum is.
+    void measure(const State& state, StepRecord& record) {
+        constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+        record.t = state.t;
+        record.energy = system_.energy(state);
+        std::vector<double> momentum(state.v.size(), 0.0);
+        system_.multiply_mass(state, 1.0, state.v.data(), momentum.data());
+        record.kinetic = 0.0;
+        for (std::size_t i = 0; i < momentum.size(); ++i) record.kinetic += 0.5 * state.v[i] * momentum[i];
+        record.momentum = record.angular_momentum = {unknown, unknown, unknown};
+        std::vector<double> C(static_cast<std::size_t>(system_.m()), 0.0);
+        system_.constraint(state, C.data());
+        for (const double value : C) record.drift = std::max(record.drift, std::abs(value));
+        if (!system_.has_unilateral()) return;
+        system_.collect_unilateral(state, set_.step, rows_);
+        std::size_t row = 0;
+        for (const auto& block : rows_.blocks()) {
+            if (block.cone.kind == ConeKind::Friction || block.cone.kind == ConeKind::Nonnegative)
+                record.penetration = std::max(record.penetration, -rows_.rows()[row].gap);
+            row += static_cast<std::size_t>(block.cone.rows);
+        }
+    }
+
+    std::shared_ptr<const Registry> registry_;
+    std::shared_ptr<SharedScene> settings_;
+    const SceneSystem& set_;
+    PythonSystem system_;
+    Turn turn_;
+    State state_;
+    std::unique_ptr<StepSolver> solver_;
+    std::unique_ptr<Timestepper> timestepper_;
+    std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the parts of fixed ones; or empty
+    StepRecord record_;
+    StepReport report_;  // of the last step
+    UnilateralRows rows_;
+    std::int64_t unsolved_ = 0;
+    std::string first_unsolved_;
+};
+
+/// The unilateral blocks of the last step.
+inline py::dict reactions_of(SystemRun& self) {
+    const std::vector<BlockReaction> reactions = self.look([](const SystemRun& run) { return run.report().reactions; });
+    std::vector<std::uint64_t> keys;
+    std::vector<double> forces;
+    for (const BlockReaction& one : reactions) {
+        keys.push_back(one.key);
+        forces.insert(forces.end(), one.force.begin(), one.force.end());
+    }
+    const auto count = static_cast<py::ssize_t>(reactions.size());
+    py::dict result;
+    result["key"] = array_of(std::move(keys));
+    result["force"] = array_of(std::move(forces), {count, 3});
+    return result;
+}
+
+inline py::list timestepper_rows() {
+    py::list methods;
+    for (const TimestepperInfo& info : timesteppers()) {
+        py::dict row, options;
+        for (const OptionInfo& option : info.options) options[py::str(option.key)] = option.default_value;
+        row["name"] = info.name;
+        row["description"] = info.description;
+        row["order"] = info.order;
+        row["constraints"] = info.constraints;
+        row["unilateral"] = info.unilateral;
+        row["options"] = options;
+        methods.append(row);
+    }
+    return methods;
+}
+
+inline void bind_system_runs(py::module_& module) {
+    using namespace py::literals;
+
+    const auto look = [](auto what) { return [what](SystemRun& self) { return self.look(what); }; };
+    py::class_<SystemRun>(module, "SystemRun")
+        .def(py::init<py::object, const std::shared_ptr<SharedScene>&, std::shared_ptr<const Registry>>(), "system"_a,
+             "settings"_a, "registry"_a)
+        .def("step", &SystemRun::step)
+        .def_property_readonly("finished", look([](const SystemRun& run) { return run.finished(); }))
+        .def_property_readonly("time", look([](const SystemRun& run) { return run.state().t; }))
+        .def_property_readonly(
+            "positions",
+            [](SystemRun& self) {
+                return array_of(self.look([](const SystemRun& run) { return std::vector(run.state().q); }));
+            })
+        .def_property_readonly(
+            "velocities",
+            [](SystemRun& self) {
+                return array_of(self.look([](const SystemRun& run) { return std::vector(run.state().v); }));
+            })
+        .def_property_readonly("record", look([](const SystemRun& run) { return run.record(); }))
+        .def_property_readonly(
+            "multipliers",
+            [](SystemRun& self) {
+                return array_of(self.look([](const SystemRun& run) { return std::vector(run.report().multipliers); }));
+            })
+        .def_property_readonly("integrator", [](const SystemRun& self) { return self.integrator(); })
+        .def("contacts", &reactions_of)
+        .def("warnings", look([](const SystemRun& run) { return run.warnings(); }));
+
+    module.def("_timesteppers", &timestepper_rows);
+}
+
+}  // namespace delassus::python
