@@ -7,7 +7,7 @@
 #include <initializer_list>
 #include <iterator>
 #include <memory>
-#include <span>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -18,8 +18,7 @@ namespace delassus {
 /// const, first copies what is borrowed into memory of its own; so reading through a const reference never copies, and
 /// nothing writes to the owner's memory. The owner must not write to it either as long as an Array has it.
 ///
-/// Otherwise as std::vector, to which `std::vector<Value>(array.begin(), array.end())` copies it. It is one range of
-/// memory, so that it converts to std::span.
+/// Otherwise as std::vector, from which and to which it converts; to a std::span without a copy.
 template <typename Value>
 class Array {
 public:
@@ -48,6 +47,7 @@ public:
     }
     ~Array() = default;
     Array& operator=(const Array& other) {
+        if (this == &other) return *this;
         own_ = other.own_;  // in the memory that is there, if it is enough
         owner_ = other.owner_;
         show_as(other);
@@ -72,12 +72,10 @@ public:
 
     /// An array in the owner's memory of `size` values, which stays and keeps its values as long as the owner lives.
     [[nodiscard]] static Array borrowed(const Value* data, std::size_t size, std::shared_ptr<const void> owner) {
-        Array array;
-        array.data_ = data;
-        array.size_ = size;
-        array.owner_ = std::move(owner);
-        return array;
+        return Array(data, size, std::move(owner));
     }
+    /// A copy.
+    operator std::vector<Value>() const { return {begin(), end()}; }
     [[nodiscard]] bool borrows() const noexcept { return owner_ != nullptr; }
     /// Hands the memory to an owner of its own, from which this array and its copies then borrow.
     void share() {
@@ -96,6 +94,10 @@ public:
     [[nodiscard]] const Value* cbegin() const noexcept { return data_; }
     [[nodiscard]] const Value* cend() const noexcept { return data_ + size_; }
     [[nodiscard]] const Value& operator[](std::size_t at) const { return data_[at]; }
+    [[nodiscard]] const Value& at(std::size_t at) const {
+        if (at >= size_) throw std::out_of_range("Array::at");
+        return data_[at];
+    }
     [[nodiscard]] const Value& front() const { return data_[0]; }
     [[nodiscard]] const Value& back() const { return data_[size_ - 1]; }
 
@@ -158,11 +160,13 @@ public:
     friend bool operator==(const Array& one, const Array& two) {
         return std::equal(one.begin(), one.end(), two.begin(), two.end());
     }
-    friend bool operator==(const Array& one, std::span<const Value> two) {
+    friend bool operator==(const Array& one, const std::vector<Value>& two) {
         return std::equal(one.begin(), one.end(), two.begin(), two.end());
     }
 
 private:
+    Array(const Value* data, std::size_t size, std::shared_ptr<const void>&& owner)
+        : data_(data), size_(size), owner_(std::move(owner)) {}
     /// The vector, with what was borrowed copied into it.
     std::vector<Value>& own() {
         if (owner_) {
