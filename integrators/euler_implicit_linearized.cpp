@@ -284,7 +284,7 @@ private:
     // less what else stands in H v⁺: a − H v⁺ + h² G v⁺ + M (v⁺ − v), with a and H as they were assembled.
     void judge_linearization(const State& begin, double h, StepReport& report) {
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = end_.v[i] - begin.v[i];
-        impulse_ = problem_.a;
+        impulse_.assign(problem_.a.begin(), problem_.a.end());
         problem_.H.multiply_add(-1.0, end_.v.data(), impulse_.data());
         G_.finish().multiply_add(1.0, end_.v.data(), impulse_.data());
         system_.multiply_mass(begin, 1.0, delta_.data(), impulse_.data());

@@ -3,6 +3,7 @@
 #include <pybind11/pybind11.h>
 
 #include "delassus/version.hpp"
+#include "derivatives.hpp"
 #include "errors.hpp"
 #include "problems.hpp"
 #include "scenes.hpp"
@@ -17,6 +18,7 @@ PYBIND11_MODULE(_delassus, module) {
     delassus::python::bind_errors(module);
     delassus::python::bind_problems(module);
     delassus::python::bind_solvers(module);
+    delassus::python::bind_derivatives(module);
     delassus::python::bind_solver_classes(module);
     delassus::python::bind_scenes(module);
     delassus::python::bind_system_runs(module);

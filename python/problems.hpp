@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "arrays.hpp"
@@ -31,10 +32,43 @@ struct SharedProblem {
 
     explicit SharedProblem(Problem&& data) {
         const py::gil_scoped_release without_gil;
+        for (SparseMatrix* matrix : {&data.H, &data.D, &data.E}) {
+            matrix->row_start.share();
+            matrix->column.share();
+            matrix->value.share();
+        }
         prepared = std::make_unique<PreparedProblem>(std::move(data));
     }
+    explicit SharedProblem(PreparedProblem&& made) : prepared(std::make_unique<PreparedProblem>(std::move(made))) {}
     [[nodiscard]] const Problem& data() const { return prepared->problem(); }
 };
+
+/// Names the problem that this thread has a solver work with, as long as it lives.
+class ProblemInUse {
+public:
+    explicit ProblemInUse(const PreparedProblem& problem) : before_(std::exchange(slot(), &problem)) {}
+    ~ProblemInUse() { slot() = before_; }
+    ProblemInUse(const ProblemInUse&) = delete;
+    ProblemInUse& operator=(const ProblemInUse&) = delete;
+    /// Null where there is none.
+    static const PreparedProblem* now() { return slot(); }
+
+private:
+    static const PreparedProblem*& slot() {
+        thread_local const PreparedProblem* problem = nullptr;
+        return problem;
+    }
+    const PreparedProblem* before_;
+};
+
+/// A problem on its way to the class of Python that users know.
+struct Handover {
+    std::unique_ptr<SharedProblem> problem;
+};
+
+inline bool is_problem(const py::object& object) {
+    return py::isinstance<SharedProblem>(object);
+}
 
 inline void check_shape(const SparseMatrix& matrix, const char* name, std::int32_t rows, std::int32_t columns,
                         const char* sizes) {
@@ -43,25 +77,29 @@ inline void check_shape(const SparseMatrix& matrix, const char* name, std::int32
                                      matrix.rows, matrix.columns, sizes, rows, columns));
 }
 
-inline std::unique_ptr<SharedProblem> make_problem(const py::object& H, const py::object& D, const Reals& a,
-                                                   const Reals& b, const std::vector<Cone>& cones, const py::object& E,
-                                                   const std::string& law, const std::string& name) {
+inline std::unique_ptr<SharedProblem> make_problem(const py::object& H, const py::object& D, const py::array& a,
+                                                   const py::array& b, const std::vector<Cone>& cones,
+                                                   const py::object& E, const std::string& law, const std::string& name,
+                                                   bool copy) {
+    Lender lender(copy);
     Problem data;
     data.name = name;
-    data.a = vector_of(a, "a");
-    data.b = vector_of(b, "b");
+    data.a = reals_of(a, "a", lender);
+    data.b = reals_of(b, "b", lender);
     data.cones = cones;
     data.law = law_of(law);
-    const auto take = [](const py::object& parts, SparseMatrix& matrix, const char* letter, std::int32_t rows,
-                         std::int32_t columns, const char* sizes) {
+    const auto take = [&lender](const py::object& parts, SparseMatrix& matrix, const char* letter, std::int32_t rows,
+                                std::int32_t columns, const char* sizes) {
         if (parts.is_none()) return;
-        matrix = matrix_of(py::tuple(parts), letter);
+        matrix = matrix_of(py::tuple(parts), letter, lender);
         check_shape(matrix, letter, rows, columns, sizes);
     };
     take(H, data.H, "H", data.n(), data.n(), "n × n");
     take(D, data.D, "D", data.m(), data.n(), "m × n");
     take(E, data.E, "E", data.m(), data.m(), "m × m");
-    return std::make_unique<SharedProblem>(std::move(data));
+    auto problem = std::make_unique<SharedProblem>(std::move(data));
+    lender.keep();
+    return problem;
 }
 
 inline py::tuple parts_of(const SparseMatrix& matrix, const py::object& owner) {
@@ -204,11 +242,12 @@ inline void bind_problems(py::module_& module) {
         .def_property_readonly("hi", [](const Cone& cone) { return array_of(std::vector(cone.hi)); })
         .def("__repr__", &text_of);
 
+    py::class_<Handover>(module, "_Handover");  // NOLINT(bugprone-unused-raii)
     const auto matrix = [](const SparseMatrix Problem::*member) {
         return [member](const py::object& self) { return parts_of(self.cast<SharedProblem&>().data().*member, self); };
     };
     py::class_<SharedProblem>(module, "Problem")
-        .def(py::init(&make_problem), "H"_a, "D"_a, "a"_a, "b"_a, "cones"_a, "E"_a, "law"_a, "name"_a)
+        .def(py::init(&make_problem), "H"_a, "D"_a, "a"_a, "b"_a, "cones"_a, "E"_a, "law"_a, "name"_a, "copy"_a)
         .def(py::init([](const std::string& path) {
                  Problem data;
                  {
@@ -218,20 +257,17 @@ inline void bind_problems(py::module_& module) {
                  return std::make_unique<SharedProblem>(std::move(data));
              }),
              "path"_a)
+        .def(py::init([](Handover& prepared) { return std::move(prepared.problem); }))
         .def_property_readonly("_H", matrix(&Problem::H))
         .def_property_readonly("_D", matrix(&Problem::D))
         .def_property_readonly("_E", matrix(&Problem::E))
         .def_property_readonly(
             "a",
-            [](SharedProblem& self) {
-                return array_of(in_turn(self.turn, [&] { return std::vector<double>(self.data().a); }));
-            },
+            [](SharedProblem& self) { return array_of(in_turn(self.turn, [&] { return vector_of(self.data().a); })); },
             "The right-hand side of the balance, n; a copy.")
         .def_property_readonly(
             "b",
-            [](SharedProblem& self) {
-                return array_of(in_turn(self.turn, [&] { return std::vector<double>(self.data().b); }));
-            },
+            [](SharedProblem& self) { return array_of(in_turn(self.turn, [&] { return vector_of(self.data().b); })); },
             "The constant part of the constraint velocities, m; a copy.")
         .def_property_readonly("cones", [](const SharedProblem& self) { return self.data().cones; })
         .def_property_readonly(

@@ -89,16 +89,24 @@ private:
     std::int32_t n_, m_;
 };
 
-/// The problem as a delassus.Problem of its own: what a solver keeps of it stays whole.
-inline py::object copy_of(const delassus_problem& raw) {
-    const auto matrix = [](const delassus_matrix& from) -> py::object {
-        const auto rows = static_cast<std::size_t>(from.rows), entries = static_cast<std::size_t>(from.entries);
-        return py::make_tuple(array_of(std::vector<std::int32_t>(from.row_start, from.row_start + rows + 1)),
-                              array_of(std::vector<std::int32_t>(from.column, from.column + entries)),
-                              array_of(std::vector<double>(from.value, from.value + entries)),
-                              py::make_tuple(from.rows, from.columns));
-    };
-    py::list cones;
+inline SparseMatrix copy_of(const delassus_matrix& raw) {
+    SparseMatrix matrix;
+    matrix.rows = raw.rows;
+    matrix.columns = raw.columns;
+    matrix.row_start.assign(raw.row_start, raw.row_start + raw.rows + 1);
+    matrix.column.assign(raw.column, raw.column + raw.entries);
+    matrix.value.assign(raw.value, raw.value + raw.entries);
+    return matrix;
+}
+
+inline Problem copy_of(const delassus_problem& raw) {
+    Problem problem;
+    problem.H = copy_of(raw.H);
+    problem.D = copy_of(raw.D);
+    problem.E = copy_of(raw.E);
+    problem.a.assign(raw.a, raw.a + raw.n);
+    problem.b.assign(raw.b, raw.b + raw.m);
+    problem.law = static_cast<Law>(raw.law);
     for (std::int32_t k = 0; k < raw.cone_count; ++k) {
         const delassus_cone& from = *delassus_cone_at(&raw, k);
         Cone cone = Cone::free(from.rows);
@@ -106,12 +114,21 @@ inline py::object copy_of(const delassus_problem& raw) {
         if (from.parameter_count > 0) std::copy_n(from.parameters, from.parameter_count, cone.parameters.begin());
         if (from.lo) cone.lo.assign(from.lo, from.lo + from.rows);
         if (from.hi) cone.hi.assign(from.hi, from.hi + from.rows);
-        cones.append(cone);
+        problem.cones.push_back(std::move(cone));
     }
-    return py::module_::import("delassus")
-        .attr("_problem_of")(matrix(raw.H), matrix(raw.D), array_of(std::vector<double>(raw.a, raw.a + raw.n)),
-                             array_of(std::vector<double>(raw.b, raw.b + raw.m)), cones, matrix(raw.E),
-                             raw.law == DELASSUS_LAW_COULOMB ? "coulomb" : "associated");
+    return problem;
+}
+
+/// The problem as a delassus.Problem, which a solver may keep: what it has of it stays whole. It reads the matrices of
+/// the Problem that is being solved, and copies those of a scene, which end with a step.
+inline py::object problem_of(const delassus_problem& raw) {
+    Handover made;
+    if (const PreparedProblem* shown = ProblemInUse::now(); shown && &shown->raw() == &raw) {
+        made.problem = std::make_unique<SharedProblem>(shown->with_law(shown->problem().law));
+    } else {
+        made.problem = std::make_unique<SharedProblem>(copy_of(raw));
+    }
+    return py::module_::import("delassus").attr("_problem_of")(std::move(made));
 }
 
 /// An object of the class, behind the border's void*. All of it is used with the GIL.
@@ -138,7 +155,7 @@ struct SolverObject {
 
     std::int32_t call(const char* method, const delassus_problem& raw) {
         return guarded([&] {
-            if (py::hasattr(object, method)) object.attr(method)(copy_of(raw));
+            if (py::hasattr(object, method)) object.attr(method)(problem_of(raw));
             return DELASSUS_SOLVED;
         });
     }
@@ -147,7 +164,7 @@ struct SolverObject {
                        delassus_outcome& outcome) {
         const auto shown = std::make_shared<SolveRequest>(request, raw, x, lambda);
         const std::int32_t status = guarded([&] {
-            const py::object answer = object.attr("solve")(copy_of(raw), shown);
+            const py::object answer = object.attr("solve")(problem_of(raw), shown);
             if (!py::isinstance<py::tuple>(answer) || py::len(answer) < 2 || py::len(answer) > 3)
                 throw InputError("solve() must return (x, lam) or (x, lam, status)");
             const py::tuple parts(answer);
@@ -309,7 +326,7 @@ inline std::shared_ptr<Plugin> plugin_of(const py::object& type, const std::stri
         std::string refusal;
         const std::int32_t status = self.guarded([&] {
             if (py::hasattr(self.object, "refusal")) {
-                const py::object answer = self.object.attr("refusal")(copy_of(*problem));
+                const py::object answer = self.object.attr("refusal")(problem_of(*problem));
                 if (!answer.is_none()) refusal = answer.cast<std::string>();
             }
             return DELASSUS_SOLVED;

@@ -61,7 +61,7 @@ private:
 
 /// u = D x + E λ + b; m.
 inline std::vector<double> constraint_velocities(const Problem& problem, const Solution& solution) {
-    std::vector<double> u = problem.b;
+    std::vector<double> u = vector_of(problem.b);
     if (problem.n() > 0) problem.D.multiply_add(1.0, solution.x.data(), u.data());
     if (problem.E.entries() > 0) problem.E.multiply_add(1.0, solution.lambda.data(), u.data());
     return u;
@@ -93,6 +93,7 @@ inline SolveResult solve(SharedSolver& self, SharedProblem& problem, double tole
         const py::gil_scoped_release without_gil;
         const std::scoped_lock lock(self.turn, problem.turn);
         const LawForNow law_for_now(*problem.prepared, law ? law_of(*law) : problem.data().law);
+        const ProblemInUse in_use(*problem.prepared);
         report = self.solver->solve(*problem.prepared, solution, settings);
         u = constraint_velocities(problem.data(), solution);
     }
@@ -205,6 +206,7 @@ inline void bind_solvers(py::module_& module) {
             [](SharedSolver& self, SharedProblem& problem) {
                 const py::gil_scoped_release without_gil;
                 const std::scoped_lock lock(self.turn, problem.turn);
+                const ProblemInUse in_use(*problem.prepared);
                 return self.solver->refusal(*problem.prepared, SolveSettings());
             },
             "problem"_a, "'' if the solver can take the problem; else a sentence that says why not.")

@@ -81,20 +81,24 @@ class Problem(_delassus.Problem):
         Compliance: symmetric positive semidefinite, both triangles.
     law : 'associated' (the convex problem) or 'coulomb' (exact Coulomb friction)
     name : for messages and tables
+    copy : True: copy every array and leave those given alone
 
-    The problem owns its data: each array is copied once here, and what is done to the user's arrays later has no
-    effect on it. (Solvers read that copy; nothing is copied at a solve.) Raises InputError, with one sentence, where
-    shapes, indices or values are wrong.
+    Nothing is copied where the types fit: a and b contiguous arrays of float64, matrices in CSR with values of float64,
+    indices of int32, and columns ascending without repetition. Solvers then read the very memory of the arrays, so
+    those become read-only, as do the arrays that they are views of: writing to one raises NumPy's ValueError. What does
+    not fit is converted once, and what others could still write to (a view of a part of an array in use, memory of
+    PyTorch or of a file) is copied; both stay as they are. Raises InputError, with one sentence, where shapes, indices
+    or values are wrong; the arrays are then as before.
     """
 
     def __init__(self, H: Optional[Matrix], D: Optional[Matrix], a: Any, b: Any, cones: Sequence[Cone],
-                 E: Optional[Matrix] = None, law: str = "associated", name: str = ""):
+                 E: Optional[Matrix] = None, law: str = "associated", name: str = "", copy: bool = False):
         for cone in cones:
             if not isinstance(cone, Cone):
                 raise InputError(f"cones has an entry of type {type(cone).__name__}; "
                                  "make them by Cone.free, Cone.nonnegative, Cone.box or Cone.friction")
         super().__init__(_rows(H, "H"), _rows(D, "D"), _reals(a, "a"), _reals(b, "b"), list(cones), _rows(E, "E"), law,
-                         name)
+                         name, copy)
 
     @classmethod
     def read(cls, path: Path) -> "Problem":
@@ -123,7 +127,7 @@ class Problem(_delassus.Problem):
         return _matrix(self._E)
 
     def set_right_hand_side(self, a: Any, b: Any) -> None:
-        """Replace a (n) and b (m). What a Solver analysed or factorised stays valid."""
+        """Replace a (n) and b (m) by copies of these. What a Solver analysed or factorised stays valid."""
         super().set_right_hand_side(_reals(a, "a"), _reals(b, "b"))
 
     def errors(self, x: Any, lam: Any) -> dict:
@@ -234,9 +238,9 @@ _CAPABILITIES = ("free", "nonnegative", "box", "friction", "associated", "coulom
                  "h_definite", "reduced", "compliance", "redundant", "warm_start")
 
 
-def _problem_of(H, D, a, b, cones, E, law) -> Problem:
+def _problem_of(prepared) -> Problem:
     problem = Problem.__new__(Problem)
-    _delassus.Problem.__init__(problem, H, D, a, b, cones, E, law, "")
+    _delassus.Problem.__init__(problem, prepared)
     return problem
 
 

@@ -14,7 +14,9 @@ derivative there and C that of û by u, the implicit function theorem gives
 
 (Facchinei and Pang 2003, sections 4.5 and 5.1, for the method; the projection onto a cone of friction is that of
 core/src/sdk, cut into three cases). One factor of this matrix serves derivatives along directions, and its transpose
-gradients.
+gradients. J, C and, where H is diagonal, of small blocks or absent, the factor are those of python/derivatives.hpp: it
+eliminates dx and the rows of open contacts, whose J is zero, and factors I − J + ρ J C (D H⁻¹ Dᵀ + E) of the others.
+Any other H is factored together with all rows by SuperLU.
 """
 from __future__ import annotations
 
@@ -24,6 +26,7 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
+from . import _delassus
 from ._delassus import InputError
 
 
@@ -42,57 +45,16 @@ class Derivative:
     def __init__(self, problem, result):
         self._problem, self._H, self._D, self._E = problem, problem.H, problem.D, problem.E
         self._x, self._lam = np.array(result.x), np.array(result.lam)
-        n, m = problem.n, problem.m
-        self._u = np.array(result.u)
-        local = np.zeros(m)
-        if n > 0:
-            local += self._D.multiply(self._D) @ (1.0 / np.maximum(self._H.diagonal(), 1e-300))
-        local += self._E.diagonal()
         tolerance = max(1e-9, 10.0 * result.errors["natural"])
-        self.degenerate: List[int] = []
-        self._blocks = []  # (rows, ∂Π/∂μ − ρ J ∂û/∂μ)
-        jacobian, moved = [], []
-        row = 0
-        for number, cone in enumerate(problem.cones):
-            at = slice(row, row + cone.rows)
-            rho = cone.rows / local[at].sum() if local[at].sum() > 0.0 else 1.0
-            J, JC, by_mu, degenerate = _block(cone, self._lam[at], self._u[at], rho, result.law == "coulomb", tolerance)
-            if degenerate:
-                self.degenerate.append(number)
-            jacobian.append(J)
-            moved.append(rho * JC)
-            self._blocks.append((at, by_mu))
-            row += cone.rows
-        self._J = sparse.block_diag(jacobian, format="csr") if m else sparse.csr_matrix((0, 0))
-        self._JC = sparse.block_diag(moved, format="csr") if m else sparse.csr_matrix((0, 0))
-        self.unique = True
-        self._factor = self._factorize(self._E)
-        if self._factor is None:
-            self.unique = False
-            compliance = 1e-10 * (local.mean() if m else 1.0)
-            self._factor = self._factorize(self._E + compliance * sparse.identity(m, format="csr"))
-            if self._factor is None:
+        self._blocks = _delassus._Linearization(problem, result.lam, result.u, result.law == "coulomb", tolerance)
+        self.degenerate: List[int] = self._blocks.degenerate
+        small = self._blocks.has_small_blocks
+        self._factor = self._blocks if small else _Whole(self._H, self._D, self._E, self._blocks)
+        self.unique: bool = self._factor.factorize(0.0)
+        if not self.unique:
+            local = self._blocks.local
+            if not self._factor.factorize(1e-10 * (local.mean() if len(local) else 1.0)):
                 raise InputError("the derivative does not exist: H is singular where the active constraints leave it free")
-
-    def _factorize(self, E):
-        n, m = self._problem.n, self._problem.m
-        identity = sparse.identity(m, format="csr")
-        lower = identity - self._J + self._JC @ E
-        if n > 0:
-            matrix = sparse.bmat([[self._H, -self._D.T], [self._JC @ self._D, lower]], format="csc")
-        else:
-            matrix = lower.tocsc()
-        # Rows of unlike units: each is divided by its largest entry.
-        size = np.maximum(abs(matrix).max(axis=1).toarray().ravel(), 1e-300) if n + m else np.ones(0)
-        self._size = size
-        if n + m == 0:
-            return _Nothing()
-        try:
-            factor = splu((sparse.diags(1.0 / size) @ matrix).tocsc())
-        except RuntimeError:
-            return None
-        pivots = np.abs(factor.U.diagonal())
-        return factor if pivots.min() > 1e-11 * pivots.max() else None
 
     def jvp(self, *, a: Optional[Any] = None, b: Optional[Any] = None, H: Optional[Any] = None,
             D: Optional[Any] = None, E: Optional[Any] = None,
@@ -100,7 +62,7 @@ class Derivative:
         """(dx, dlam, du) along changes of the data: a (n), b (m), H, D, E (matrices of their shapes), mu (one entry for
         each block, of which those of friction count). What is not given does not change."""
         n, m = self._problem.n, self._problem.m
-        first, second = np.zeros(n), np.zeros(m)
+        first = np.zeros(n)
         change = np.zeros(m)  # of u at fixed x and λ
         if a is not None:
             first += _vector(a, n, "a")
@@ -114,13 +76,10 @@ class Derivative:
             change += D @ self._x
         if E is not None:
             change += _matrix(E, (m, m), "E") @ self._lam
-        second -= self._JC @ change
+        second = -self._blocks.moved(change)
         if mu is not None:
-            mu = _vector(mu, len(self._blocks), "mu")
-            for (at, by_mu), value in zip(self._blocks, mu):
-                second[at] += by_mu * value
-        y = self._factor.solve(np.concatenate([first, second]) / self._size)
-        dx, dlam = y[:n], y[n:]
+            second += self._blocks.by_mu(_vector(mu, len(self._problem.cones), "mu"))
+        dx, dlam = self._factor.solve(first, second)
         return dx, dlam, self._D @ dx + self._E @ dlam + change
 
     def vjp(self, *, x: Optional[Any] = None, lam: Optional[Any] = None, u: Optional[Any] = None) -> Dict[str, Any]:
@@ -130,21 +89,45 @@ class Derivative:
         the problem's own patterns, each entry taken as a variable of its own (a symmetric change of H counts both)."""
         n, m = self._problem.n, self._problem.m
         to_u = np.zeros(m) if u is None else _vector(u, m, "u")
-        to_x = (np.zeros(n) if x is None else _vector(x, n, "x")) + self._D.T @ to_u
-        to_lam = (np.zeros(m) if lam is None else _vector(lam, m, "lam")) + self._E.T @ to_u
-        y = self._factor.solve(np.concatenate([to_x, to_lam]), trans="T") / self._size
-        p, q = y[:n], y[n:]
-        w = to_u - self._JC.T @ q
-        mu = np.array([by_mu @ q[at] for at, by_mu in self._blocks])
-        return {"a": p, "b": w, "mu": mu,
-                "H": _outer(self._H, [(-p, self._x)]),
-                "D": _outer(self._D, [(self._lam, p), (w, self._x)]),
-                "E": _outer(self._E, [(w, self._lam)])}
+        to_x = np.zeros(n) if x is None else _vector(x, n, "x")
+        to_lam = np.zeros(m) if lam is None else _vector(lam, m, "lam")
+        if u is not None:
+            to_x, to_lam = self._blocks.gradient_start(to_x, to_lam, to_u)
+        p, q = self._factor.solve_transposed(to_x, to_lam)
+        w, mu, H, D, E = self._blocks.gradient_parts(p, q, to_u, self._x, self._lam)
+        return {"a": p, "b": w, "mu": mu, "H": _like(self._H, H), "D": _like(self._D, D), "E": _like(self._E, E)}
 
 
-class _Nothing:
-    def solve(self, y, trans="N"):
-        return y
+class _Whole:
+    """The factor of all rows, by SuperLU."""
+
+    def __init__(self, H, D, E, blocks):
+        self._H, self._D, self._E = H, D, E
+        shape = (D.shape[0],) * 2
+        self._J, self._JC = (sparse.csr_matrix(entries, shape=shape) for entries in (blocks.J(), blocks.JC()))
+
+    def factorize(self, compliance: float) -> bool:
+        identity = sparse.identity(len(self._D.indptr) - 1, format="csr")
+        lower = identity - self._J + self._JC @ (self._E + compliance * identity)
+        matrix = sparse.bmat([[self._H, -self._D.T], [self._JC @ self._D, lower]], format="csc")
+        # Rows of unlike units: each is divided by its largest entry.
+        self._size = np.maximum(abs(matrix).max(axis=1).toarray().ravel(), 1e-300)
+        try:
+            self._factor = splu((sparse.diags(1.0 / self._size) @ matrix).tocsc())
+        except RuntimeError:
+            return False
+        pivots = np.abs(self._factor.U.diagonal())
+        return bool(pivots.min() > 1e-11 * pivots.max())
+
+    def solve(self, first, second):
+        return self._halves(self._factor.solve(np.concatenate([first, second]) / self._size))
+
+    def solve_transposed(self, to_x, to_lam):
+        return self._halves(self._factor.solve(np.concatenate([to_x, to_lam]), trans="T") / self._size)
+
+    def _halves(self, y):
+        n = self._H.shape[0]
+        return y[:n], y[n:]
 
 
 def _vector(values, size: int, name: str) -> np.ndarray:
@@ -161,52 +144,9 @@ def _matrix(values, shape: Tuple[int, int], name: str):
     return values
 
 
-def _outer(pattern, factors):
-    """Σ left rightᵀ at the entries of the pattern."""
-    result = pattern.copy()
-    rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
-    result.data = sum((left[rows] * right[pattern.indices] for left, right in factors), np.zeros(len(pattern.indices)))
+def _like(pattern, data):
+    """A matrix with the places of another one, which it may not change."""
+    result = sparse.csr_matrix(pattern.shape)
+    result.data, result.indices, result.indptr = data, pattern.indices, pattern.indptr
+    result.has_canonical_format = True
     return result
-
-
-def _block(cone, lam, u, rho: float, coulomb: bool, tolerance: float):
-    """J, J C, ∂Π/∂μ − ρ J ∂û/∂μ, and whether the solution is not differentiable there."""
-    rows = cone.rows
-    none = np.zeros(rows)
-    if cone.kind == "free":
-        return np.eye(rows), np.eye(rows), none, False
-    size = max(np.linalg.norm(lam), rho * np.linalg.norm(u), 1e-300)
-    if cone.kind != "friction":
-        lo = cone.lo if cone.kind == "box" else np.zeros(rows)
-        hi = cone.hi if cone.kind == "box" else np.full(rows, np.inf)
-        z = lam - rho * u
-        inner = (z > lo) & (z < hi)
-        near = np.minimum(np.abs(z - lo), np.abs(z - hi)) <= tolerance * size
-        J = np.diag(inner.astype(float))
-        return J, J, none, bool(near.any())
-    mu = cone.mu
-    C, by_mu_of_u = np.eye(rows), np.zeros(rows)
-    speed = np.linalg.norm(u[1:])
-    u_hat = u.copy()
-    if coulomb:
-        u_hat[0] += mu * speed
-        by_mu_of_u[0] = speed
-        if rho * speed > tolerance * size:
-            C[0, 1:] += mu * u[1:] / speed
-    z = lam - rho * u_hat
-    normal, tangential = z[0], np.linalg.norm(z[1:])
-    sticks, opens = tangential - mu * normal, normal + mu * tangential
-    degenerate = min(abs(sticks), abs(opens)) <= tolerance * size
-    if sticks <= 0.0:
-        J, by_mu = np.eye(rows), np.zeros(rows)
-    elif opens <= 0.0:
-        J, by_mu = np.zeros((rows, rows)), np.zeros(rows)
-    else:
-        t = z[1:] / tangential
-        along = np.concatenate([[1.0], mu * t])
-        alpha = opens / (1.0 + mu * mu)
-        J = np.outer(along, along) / (1.0 + mu * mu)
-        J[1:, 1:] += mu * alpha / tangential * (np.eye(rows - 1) - np.outer(t, t))
-        alpha_by_mu = (tangential - 2.0 * mu * alpha) / (1.0 + mu * mu)
-        by_mu = np.concatenate([[alpha_by_mu], (alpha + mu * alpha_by_mu) * t])
-    return J, J @ C, by_mu - rho * J @ by_mu_of_u, degenerate

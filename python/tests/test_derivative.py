@@ -1,11 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Derivatives of solutions against central differences."""
+import os
 import unittest
+from pathlib import Path
 
 import delassus
 import numpy as np
 import scipy.sparse as sparse
 from delassus import Cone
+
+
+SHARED = Path(os.environ.get("DELASSUS_SHARED_PROBLEMS") or
+              Path(os.environ["DELASSUS_SOURCE_DIR"]).parent / "shared" / "problems")
+
+#: Shared problems of other engines where no contact is near an edge of its cone.
+NONDEGENERATE = (
+    "problems/Confeti-ex13-4contact-Fc3D-SBM", "problems/CubeH8", "problems/GFC3D_OneContact", "problems/GFC3D_TwoRods1",
+    "problems/NESpheres_10_1", "problems/Rover1039", "problems/Rover9770", "problems-robotics/adroit-hammer-t200-m41",
+    "problems-robotics/b2-t300-m34", "problems-robotics/chain30-t400-m93", "problems-robotics/cloth-t100-m64",
+    "problems-robotics/dog-t300-m24", "problems-robotics/go1-t400-m27", "problems-robotics/go2-t100-m26",
+    "problems-robotics/h1-t600-m26", "problems-robotics/hammock-t150-m187", "problems-robotics/hand-pen-t300-m34",
+    "problems-robotics/humanoid-t200-m16", "problems-robotics/humanoidCMU-t600-m25",
+    "problems-robotics/humanoids8-t200-m132", "problems-robotics/quadruped-t200-m11",
+    "problems-robotics/shadowhand-t400-m23", "problems-robotics/softbox-t200-m672",
+    "problems-robotics/stack10-t200-m120", "problems-robotics/stacker-t300-m31")
 
 
 def random_problem(seed, law, compliant):
@@ -92,6 +110,74 @@ class Derivatives(unittest.TestCase):
                 by_gradient = (gradient[name].multiply(change).sum() if sparse.issparse(change)
                                else gradient[name] @ change)
                 self.assertAlmostEqual(along, by_gradient, delta=1e-9 * max(1.0, abs(along)), msg=f"{seed}, {name}")
+
+    def test_problems_of_other_engines(self):
+        checked = 0
+        for name in NONDEGENERATE:
+            folder = SHARED.parent / name
+            if not folder.exists():
+                continue
+            problem = delassus.read(folder)
+            result = delassus.solve(problem, tolerance=1e-13)
+            derivative = delassus.derivative(problem, result)
+            self.assertEqual((derivative.degenerate, derivative.unique), ([], True), name)
+            rng = np.random.default_rng(1)
+            a, b = problem.a, problem.b
+            da = rng.standard_normal(problem.n) * np.abs(a).max(initial=0.0)
+            db = rng.standard_normal(problem.m) * np.abs(result.u).max()
+            found = derivative.jvp(a=da, b=db)
+            least = {}  # error by the step, of which the best is taken: between rounding and curvature
+            for step in (1e-4, 1e-5, 1e-6):
+                ends = []
+                for s in (step, -step):
+                    problem.set_right_hand_side(a + s * da, b + s * db)
+                    ends.append(delassus.solve(problem, tolerance=1e-13))
+                for what, value in zip(("x", "lam", "u"), found):
+                    known = (getattr(ends[0], what) - getattr(ends[1], what)) / (2 * step)
+                    scale = np.abs(known).max(initial=0.0)
+                    if scale > 1e-9:
+                        error = np.abs(value - known).max() / scale
+                        least[what] = min(least.get(what, np.inf), error)
+                if max(least.values()) < 1e-6:
+                    break
+            self.assertIn("lam", least, name)
+            self.assertLess(max(least.values()), 1e-6, (name, least))
+            checked += 1
+        if checked == 0:
+            self.skipTest(f"there are no shared problems in {SHARED}")
+        self.assertGreaterEqual(checked, 20 if (SHARED.parent / "problems-robotics").exists() else 5)
+
+    def test_a_sparse_H_and_its_blocks_agree(self):
+        # The same bodies with coupled masses: a rotation of the velocities fills H and changes nothing else.
+        for seed in range(4):
+            data = random_problem(seed, "coulomb" if seed % 2 else "associated", seed % 3 == 0)
+            n = data["H"].shape[0]
+            rng = np.random.default_rng(3000 + seed)
+            turn = np.linalg.qr(rng.standard_normal((n, n)))[0]
+            turned = {**data, "H": turn @ data["H"].toarray() @ turn.T, "D": data["D"].toarray() @ turn.T,
+                      "a": turn @ data["a"]}
+            turned["H"] = 0.5 * (turned["H"] + turned["H"].T)
+            weights = rng.standard_normal(data["D"].shape[0])
+            found = []
+            for arguments in (data, turned):
+                problem = delassus.Problem(**arguments)
+                found.append((problem, delassus.derivative(problem, delassus.solve(problem, tolerance=1e-13))))
+            self.assertEqual([problem.structure for problem, _ in found], ["blocks", "definite"])
+            blocks, whole = (derivative.vjp(lam=weights, u=weights) for _, derivative in found)
+            np.testing.assert_allclose(turn.T @ whole["a"], blocks["a"], atol=1e-8)
+            np.testing.assert_allclose(whole["b"], blocks["b"], atol=1e-8)
+            np.testing.assert_allclose(whole["mu"], blocks["mu"], atol=1e-8)
+
+    def test_open_contacts_alone(self):
+        # Nothing acts: the reduced system is empty.
+        problem = delassus.Problem(2 * np.eye(3), np.eye(3), [1.0, 0.5, 0.0], np.ones(3), [Cone.friction(0.3)])
+        derivative = delassus.derivative(problem, delassus.solve(problem, tolerance=1e-12))
+        dx, dlam, du = derivative.jvp(a=[1.0, 2.0, 3.0])
+        np.testing.assert_allclose(dx, [0.5, 1.0, 1.5])
+        np.testing.assert_array_equal(dlam, 0.0)
+        gradient = derivative.vjp(x=[1.0, 0.0, 0.0], u=[0.0, 1.0, 0.0])
+        np.testing.assert_allclose(gradient["a"], [0.5, 0.5, 0.0])
+        np.testing.assert_array_equal(gradient["b"], [0.0, 1.0, 0.0])
 
     def test_degenerate_blocks_are_named(self):
         # A ball that touches the ground without weight, beside one that rests on it.

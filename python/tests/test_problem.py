@@ -63,9 +63,9 @@ class Matrices(unittest.TestCase):
         np.testing.assert_array_equal(delassus.Problem(**coupled(D=D)).D.toarray(),
                                       [[-1.0, 1.0, 0, 0], [0, 0, 1.0, -1.0], [0, 0, 0.5, 0.5]])
 
-    def test_the_problem_owns_its_data(self):
+    def test_a_copy_owns_its_data(self):
         arguments = coupled()
-        problem = delassus.Problem(**arguments)
+        problem = delassus.Problem(**arguments, copy=True)
         arguments["H"].data[:] = 7.0
         arguments["a"][:] = 7.0
         np.testing.assert_array_equal(problem.H.toarray(), coupled()["H"].toarray())

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@
 namespace delassus::tests {
 
 /// Equality of every bit: −0 is not 0 here.
-inline bool same_bits(const std::vector<double>& left, const std::vector<double>& right) {
+inline bool same_bits(std::span<const double> left, std::span<const double> right) {
     return left.size() == right.size() &&
            (left.empty() || std::memcmp(left.data(), right.data(), left.size() * sizeof(double)) == 0);
 }

@@ -58,7 +58,7 @@ private:
     /// slot_ and the pattern of matrix_, for the places that were added.
     void find_pattern();
     /// values ← the sums; their number is that of the pattern.
-    void sum_up(std::vector<double>& values) const;
+    void sum_up(Array<double>& values) const;
 
     struct Place {
         std::int32_t row, column;

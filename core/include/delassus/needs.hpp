@@ -59,7 +59,7 @@ public:
 
     /// Replaces a (n) and b (m); everything analysed or factorised stays valid. Throws InputError on a wrong size or a
     /// value that is not finite.
-    DELASSUS_API void set_right_hand_side(std::vector<double> a, std::vector<double> b);
+    DELASSUS_API void set_right_hand_side(Array<double> a, Array<double> b);
 
     /// Replaces this problem by another one, and leaves this one's arrays in the other. If the entries have the same
     /// places, analysis and scratch memory are reused, and nothing is allocated as long as H is block-diagonal. Throws

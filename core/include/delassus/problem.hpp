@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "delassus/array.hpp"
 #include "delassus/export.hpp"
 
 namespace delassus {
@@ -30,9 +31,9 @@ struct Triplet {
 struct SparseMatrix {
     std::int32_t rows = 0;
     std::int32_t columns = 0;
-    std::vector<std::int32_t> row_start = {0};  ///< rows + 1 positions
-    std::vector<std::int32_t> column;           ///< one for each entry
-    std::vector<double> value;                  ///< one for each entry
+    Array<std::int32_t> row_start = {0};  ///< rows + 1 positions
+    Array<std::int32_t> column;           ///< one for each entry
+    Array<double> value;                  ///< one for each entry
 
     [[nodiscard]] std::int32_t entries() const { return static_cast<std::int32_t>(value.size()); }
 
@@ -93,14 +94,15 @@ struct Cone {
     }
 };
 
-/// A problem by value. Whoever fills it owns it; PreparedProblem checks it and shows it to solvers.
+/// A problem by value, though its arrays may borrow their memory (Array). PreparedProblem checks it and shows it to
+/// solvers.
 struct Problem {
     std::string name;         ///< for messages and tables; a reader sets it from the file's name
     SparseMatrix H;           ///< n × n, both triangles; 0 × 0 for a reduced problem
     SparseMatrix D;           ///< m × n
     SparseMatrix E;           ///< m × m, symmetric positive semidefinite, both triangles; 0 × 0 if absent
-    std::vector<double> a;    ///< n
-    std::vector<double> b;    ///< m
+    Array<double> a;          ///< n
+    Array<double> b;          ///< m
     std::vector<Cone> cones;  ///< in the order of the rows; together m rows
     Law law = Law::Associated;
     std::string source;  ///< where it came from

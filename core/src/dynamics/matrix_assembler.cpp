@@ -39,9 +39,10 @@ void MatrixAssembler::finish_into(SparseMatrix& matrix) {
     sum_up(matrix.value);
 }
 
-void MatrixAssembler::sum_up(std::vector<double>& values) const {
+void MatrixAssembler::sum_up(Array<double>& values) const {
     values.assign(matrix_.column.size(), 0.0);
-    for (std::size_t k = 0; k < count_; ++k) values[static_cast<std::size_t>(slot_[k])] += values_[k];
+    double* const sums = values.data();
+    for (std::size_t k = 0; k < count_; ++k) sums[slot_[k]] += values_[k];
 }
 
 void MatrixAssembler::find_pattern() {

@@ -385,7 +385,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
 // of all numbers vanish and no error can be measured any more. Far above that it counts as rest.
 bool StepSolver::Implementation::is_at_rest(const Problem& problem) {
     constexpr double nothing = 1e-100;
-    const auto vanish = [](const std::vector<double>& values) {
+    const auto vanish = [](std::span<const double> values) {
         return std::all_of(values.begin(), values.end(), [](double value) { return std::abs(value) < nothing; });
     };
     return vanish(problem.a) && vanish(problem.b) && hold_zero(problem.cones);

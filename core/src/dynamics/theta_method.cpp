@@ -301,8 +301,8 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
             report.message = "the speeds of sliding contacts did not settle";
             return;
         }
-        last_a_ = problem_.a;
-        last_b_ = problem_.b;
+        last_a_.assign(problem_.a.begin(), problem_.a.end());
+        last_b_.assign(problem_.b.begin(), problem_.b.end());
         report.solved = before;
         const bool solved = solve(solver, report);
         solved_from_ = guess_;

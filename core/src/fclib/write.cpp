@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 
 #include "delassus/error.hpp"
 #include "fclib/fclib.hpp"
@@ -72,13 +73,13 @@ public:
 
     [[nodiscard]] hid_t id() const { return group_.get(); }
 
-    void integer(const char* dataset, std::int32_t value) const { integers(dataset, {value}); }
+    void integer(const char* dataset, std::int32_t value) const { integers(dataset, {&value, 1}); }
 
-    void integers(const char* dataset, const std::vector<std::int32_t>& values) const {
+    void integers(const char* dataset, std::span<const std::int32_t> values) const {
         write(dataset, H5T_NATIVE_INT32, values.size(), values.data());
     }
 
-    void numbers(const char* dataset, const std::vector<double>& values) const {
+    void numbers(const char* dataset, std::span<const double> values) const {
         write(dataset, H5T_NATIVE_DOUBLE, values.size(), values.data());
     }
 

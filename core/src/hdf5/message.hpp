@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "delassus/array.hpp"
+
 namespace delassus::hdf5 {
 
 class Packer {
@@ -31,6 +33,10 @@ public:
         } else {
             each(values, [this](const Element& element) { (*this)(element); });
         }
+    }
+    template <class Number>
+    void operator()(const delassus::Array<Number>& values) {
+        array(values.data(), values.size());
     }
     /// part(element) packs one.
     template <class Vector, class Part>
@@ -71,6 +77,10 @@ public:
             each(values, [this](Element& element) { (*this)(element); });
         }
     }
+    template <class Number>
+    void operator()(delassus::Array<Number>& values) {
+        array(values);
+    }
     /// part(element) unpacks one.
     template <class Vector, class Part>
     void each(Vector& values, Part&& part) {
@@ -80,11 +90,11 @@ public:
     }
 
 private:
-    template <class Array>
-    void array(Array& values) {
+    template <class Values>
+    void array(Values& values) {
         std::size_t count = 0;
         (*this)(count);
-        constexpr std::size_t size = sizeof(typename Array::value_type);
+        constexpr std::size_t size = sizeof(typename Values::value_type);
         values.clear();
         if (count > bytes_.size() / size) {
             good_ = false;

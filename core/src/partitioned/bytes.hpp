@@ -35,10 +35,10 @@ class ByteReader {
 public:
     explicit ByteReader(const Bytes& bytes) : bytes_(bytes) {}
 
-    /// Appends the next array to values.
-    template <class Value>
+    /// Appends the next array to values, a std::vector or an Array.
+    template <class Values, class Value = typename Values::value_type>
     requires std::is_trivially_copyable_v<Value>
-    void append(std::vector<Value>& values) {
+    void append(Values& values) {
         std::int64_t count = 0;
         take(&count, sizeof count);
         const auto before = values.size();

@@ -357,7 +357,7 @@ std::string matrix_market_text(const SparseMatrix& matrix, bool may_be_symmetric
     return text;
 }
 
-std::string vector_market_text(const std::vector<double>& vector) {
+std::string vector_market_text(std::span<const double> vector) {
     std::string text = fmt::format("%%MatrixMarket matrix array real general\n{} 1\n", vector.size());
     text.reserve(text.size() + vector.size() * 24);
     for (const double value : vector) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,6 @@ std::vector<double> parse_vector_market(std::string_view text, const std::string
 /// The text of a matrix, as `symmetric` if it is exactly so and may_be_symmetric. Every number reads back bit by bit.
 std::string matrix_market_text(const SparseMatrix& matrix, bool may_be_symmetric);
 
-std::string vector_market_text(const std::vector<double>& vector);
+std::string vector_market_text(std::span<const double> vector);
 
 }  // namespace delassus

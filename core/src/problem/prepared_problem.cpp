@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <utility>
 
 #include "delassus/error.hpp"
 #include "problem/cone_kinds.hpp"
@@ -82,7 +83,7 @@ const delassus_problem& PreparedProblem::raw() const {
     return implementation_->raw;
 }
 
-void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<double> b) {
+void PreparedProblem::set_right_hand_side(Array<double> a, Array<double> b) {
     auto& self = *implementation_;
     if (a.size() != self.problem.a.size() || b.size() != self.problem.b.size())
         throw InputError(fmt::format("the right-hand side has {} and {} entries; the problem has n = {} and m = {}",
@@ -90,8 +91,8 @@ void PreparedProblem::set_right_hand_side(std::vector<double> a, std::vector<dou
     if (!all_finite(a) || !all_finite(b)) throw InputError("the right-hand side holds a value that is not finite");
     self.problem.a = std::move(a);
     self.problem.b = std::move(b);
-    self.raw.a = self.problem.a.data();
-    self.raw.b = self.problem.b.data();
+    self.raw.a = std::as_const(self.problem.a).data();
+    self.raw.b = std::as_const(self.problem.b).data();
     if (self.meter) self.meter->renew();
 }
 
@@ -281,12 +282,13 @@ void PreparedProblem::Implementation::point_to_arrays() {
         first_row += cones[c].rows;
     }
     put_side_by_side(cones, parameters);
+    const Problem& shown = problem;  // const: what is borrowed stays where it is
     raw.law = static_cast<std::int32_t>(problem.law);
     raw.H = raw_of(problem.H);
     raw.D = raw_of(problem.D);
     raw.E = raw_of(problem.E);
-    raw.a = problem.a.data();
-    raw.b = problem.b.data();
+    raw.a = shown.a.data();
+    raw.b = shown.b.data();
     raw.cone_count = static_cast<std::int32_t>(cones.size());
     raw.h_block_count = static_cast<std::int32_t>(blocks.start.size()) - 1;
     raw.cone_stride = sizeof(delassus_cone);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <span>
 #include <string_view>
 
 #include "delassus/error.hpp"
@@ -42,7 +43,7 @@ SparseMatrix read_matrix_or(const fs::path& file, std::int32_t rows, std::int32_
     return present(file) ? parse_matrix_market(read_file(file), file.string(), rows, columns) : std::move(if_absent);
 }
 
-bool needs_file(const std::vector<double>& vector) {
+bool needs_file(std::span<const double> vector) {
     if (vector.size() > static_cast<std::size_t>(most_rows_without_file)) return true;
     for (const double value : vector) {
         if (value != 0.0 || std::signbit(value)) return true;

@@ -59,10 +59,11 @@ private:
 class DELASSUS_API Hash {
 public:
     void add(const void* data, std::size_t bytes);
-    template <class Number>
-    void add(const std::vector<Number>& numbers) {
+    /// A std::vector or an Array of numbers.
+    template <class Numbers>
+    void add(const Numbers& numbers) {
         add_size(numbers.size());
-        add(numbers.data(), numbers.size() * sizeof(Number));
+        add(numbers.data(), numbers.size() * sizeof(typename Numbers::value_type));
     }
     void add_size(std::uint64_t value) { add(&value, sizeof value); }
     [[nodiscard]] std::uint64_t value() const { return state_; }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "delassus/error.hpp"
 #include "delassus/problem.hpp"
@@ -51,7 +52,7 @@ private:
         throw InputError(fmt::format("The problem \"{}\" is not valid: {}", problem_.name, sentence));
     }
 
-    void vector(const std::vector<double>& v, const char* name) const {
+    void vector(std::span<const double> v, const char* name) const {
         if (v.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
             refuse("{} has {} entries; at most 2147483646 are possible.", name, v.size());
         }

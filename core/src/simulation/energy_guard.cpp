@@ -13,7 +13,7 @@ bool any_damping(const MultibodySystem& mechanics, const State& state) {
     MatrixAssembler assembler;
     assembler.begin(mechanics.n(), mechanics.n());
     mechanics.add_damping(state, 1.0, Tangent::Symmetric, assembler);
-    const std::vector<double>& entries = assembler.finish().value;
+    const auto& entries = assembler.finish().value;
     return std::any_of(entries.begin(), entries.end(), [](double entry) { return entry != 0.0; });
 }
 

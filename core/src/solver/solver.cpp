@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <span>
 
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
@@ -29,7 +30,7 @@ RoundingOfBalance rounding_of_balance(const Problem& problem, const Solution& so
     problem.D.transpose_multiply_add(1.0, solution.lambda.data(), impulse.data());
     SparseMatrix absolute = problem.H;
     std::vector<double> sizes = solution.x;
-    const auto make_absolute = [](std::vector<double>& values) {
+    const auto make_absolute = [](std::span<double> values) {
         for (double& value : values) value = std::abs(value);
     };
     make_absolute(absolute.value);
@@ -41,7 +42,7 @@ RoundingOfBalance rounding_of_balance(const Problem& problem, const Solution& so
     make_absolute(sizes);
     absolute.transpose_multiply_add(1.0, sizes.data(), reactions.data());
     for (std::size_t i = 0; i < n; ++i) magnitude[i] += reactions[i];
-    const auto norm = [](const std::vector<double>& values) {
+    const auto norm = [](std::span<const double> values) {
         double sum = 0.0;
         for (const double value : values) sum += value * value;
         return std::sqrt(sum);
