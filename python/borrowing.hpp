@@ -57,9 +57,9 @@ public:
     }
 
 private:
-    /// Whether nobody can write to the memory of the array: it owns it, or the arrays it is a view of lead to the
-    /// owner, and each is read-only, as large, or of no use to anybody else, and so can be made read-only. Memory of
-    /// other owners than NumPy's (of PyTorch, of a file) may change.
+    /// Whether nobody can write to the memory of the array: it owns it, or it is a view, through others perhaps, of an
+    /// array that is read-only or that nobody else refers to; and so can be made read-only. Memory of other owners than
+    /// NumPy's (of PyTorch, of a file) may change.
     bool make_read_only(const py::array& array) {
         std::vector<py::array> writeable;
         for (py::array view = array;;) {
@@ -73,7 +73,7 @@ private:
             }
             const auto owner = py::reinterpret_borrow<py::array>(base);
             // The view's reference, base and owner are three.
-            if (owner.writeable() && owner.nbytes() != view.nbytes() && Py_REFCNT(owner.ptr()) > 3) return false;
+            if (owner.writeable() && Py_REFCNT(owner.ptr()) > 3) return false;
             view = owner;
         }
         for (const py::array& view : writeable) {

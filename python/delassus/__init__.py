@@ -59,10 +59,12 @@ def _rows(matrix: Optional[Matrix], name: str):
         matrix = _reals(matrix, name)
         if matrix.ndim != 2:
             raise InputError(f"{name} has {matrix.ndim} dimensions; it must be a matrix")
-    rows = scipy.sparse.csr_matrix(matrix)  # the same arrays where it is one already
+    rows = scipy.sparse.csr_matrix(matrix)  # new views of the same arrays where it is one already
     if not rows.has_canonical_format:
         rows = rows.copy()  # the user's matrix stays as it is
         rows.sum_duplicates()
+    elif scipy.sparse.issparse(matrix) and matrix.format == "csr" and len(matrix.data) == len(rows.data):
+        rows = matrix  # its own arrays, which can become read-only
     return rows.indptr, rows.indices, _reals(rows.data, name), rows.shape
 
 
@@ -85,9 +87,8 @@ class Problem(_delassus.Problem):
 
     Nothing is copied where the types fit: a and b contiguous arrays of float64, matrices in CSR with values of float64,
     indices of int32, and columns ascending without repetition. Solvers then read the very memory of the arrays, so
-    those become read-only, as do the arrays that they are views of: writing to one raises NumPy's ValueError. What does
-    not fit is converted once, and what others could still write to (a view of a part of an array in use, memory of
-    PyTorch or of a file) is copied; both stay as they are. Raises InputError, with one sentence, where shapes, indices
+    those become read-only: writing to one raises NumPy's ValueError. What does not fit is converted once, and what others
+    could still write to (a view of an array in use, memory of PyTorch or of a file) is copied; both stay as they are. Raises InputError, with one sentence, where shapes, indices
     or values are wrong; the arrays are then as before.
     """
 

@@ -29,7 +29,7 @@ def parts(data):
 
 
 def addresses_in_solver(problem):
-    result = delassus.solve(problem, "shows_addresses", plugin_path=os.environ["DELASSUS_TEST_PLUGINS"])
+    result = delassus.solve(problem, os.environ["DELASSUS_TEST_PLUGIN"])
     words = result.message.split()
     return dict(zip(words[::2], map(int, words[1::2])))
 
@@ -126,12 +126,23 @@ class ReadOnly(unittest.TestCase):
         np.testing.assert_array_equal(problem.H.toarray(), arrays()["H"].toarray())
         np.testing.assert_array_equal(problem.a, arrays()["a"])
 
-    def test_whole_views_and_their_owners(self):
+    def test_views_of_arrays_in_use_are_copied(self):
         data, square = arrays(), np.arange(6.0).reshape(2, 3)
         problem = delassus.Problem(**{**data, "a": square.reshape(-1)})
-        self.assertEqual(addresses_in_solver(problem)["a"], square.ctypes.data)
-        with self.assertRaisesRegex(ValueError, "read-only"):
-            square[0, 0] = 1.0
+        square[0, 0] = 7.0
+        self.assertEqual(problem.a[0], 0.0)
+        other = arrays()
+        values = other["H"].data[:]
+        again = delassus.Problem(**other)
+        values[:] = 7.0
+        np.testing.assert_array_equal(again.H.toarray(), arrays()["H"].toarray())
+
+    def test_a_matrix_with_spare_memory(self):
+        data, D = arrays(), arrays()["D"]
+        D.data, D.indices = np.r_[D.data, 9.0, 9.0], np.r_[D.indices, 9, 9].astype(np.int32)
+        problem = delassus.Problem(**{**data, "D": D})
+        D.data[0] = 5.0
+        np.testing.assert_array_equal(problem.D.toarray(), np.eye(6))
 
     def test_parts_of_arrays_in_use_are_copied(self):
         data, state = arrays(), np.arange(12.0)
