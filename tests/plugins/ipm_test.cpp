@@ -57,7 +57,7 @@ TEST(Ipm, ReachesTheLastDigitsOfADegenerateContact) {
     Problem problem = point_on_plane(1.0, 4.0, 2.0, 0.5, Law::Associated);
     problem.H = diagonal_matrix({1.0, 1.0, 1.0, 1.0, 1.0, 1.0});
     problem.D = identity(6);
-    problem.a.insert(problem.a.end(), {0.0, 0.0, 0.0});
+    problem.a.resize(6);
     problem.b.assign(6, 0.0);
     problem.cones.push_back(Cone::friction(0.5));
     const auto [solution, report] = solve(problem, 1e-12);
