@@ -168,7 +168,7 @@ bool Linearization::add_friction(const Cone& cone, std::int32_t row, std::int32_
         if (rho * speed > near) C.row(0).tail(rows - 1) += mu / speed * velocity.tail(rows - 1).transpose();
     }
     const ActiveUnit::Vector z = force - rho * moved_velocity;
-    const double normal = z[0], tangential = z.tail(rows - 1).norm();
+    const double normal = z[0], tangential = rows == 3 ? std::hypot(z[1], z[2]) : std::abs(z[1]);
     const double sticks = tangential - mu * normal, opens = normal + mu * tangential;
     const bool degenerate = std::min(std::abs(sticks), std::abs(opens)) <= near;
     ActiveUnit unit{row, number, ActiveUnit::Matrix::Identity(rows, rows), {}, ActiveUnit::Vector::Zero(rows)};
