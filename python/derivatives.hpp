@@ -87,6 +87,11 @@ inline void bind_derivatives(py::module_& module) {
              })
         .def("moved",
              [](const Linearization& self, const Reals& v) { return array_of(self.moved(eigen_of(v, self.m(), "u"))); })
+        .def("velocities",
+             [](const Linearization& self, const Reals& x, const Reals& lambda) {
+                 return array_of(Vector(self.rows_times(eigen_of(x, self.n(), "x")) +
+                                        self.compliance_times(eigen_of(lambda, self.m(), "lam"), false)));
+             })
         .def("by_mu",
              [](const Linearization& self, const Reals& mu) {
                  const auto cones = static_cast<std::int32_t>(self.problem().cones.size());

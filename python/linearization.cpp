@@ -33,6 +33,16 @@ Linearization::Linearization(const PreparedProblem& problem, const std::vector<d
     }
 }
 
+bool Linearization::has_small_blocks() const {
+    constexpr std::int32_t most_rows = 64;
+    const Structure structure = problem_->structure();
+    if (structure != Structure::Definite) return structure <= Structure::Blocks;
+    const delassus_problem& raw = problem_->raw();
+    for (std::int32_t b = 0; b < raw.h_block_count; ++b)
+        if (raw.h_block_start[b + 1] - raw.h_block_start[b] > most_rows) return false;
+    return true;
+}
+
 bool Linearization::factorize(double compliance) {
     invert_blocks();
     number_active_rows();
@@ -205,8 +215,7 @@ void Linearization::invert_blocks() {
         for (std::int32_t i = 0; i < size; ++i) {
             const std::int32_t row = raw.h_block_index[begin + i];
             for (auto k = H.row_start[row]; k < H.row_start[row + 1]; ++k) {
-                const auto* found = std::find(raw.h_block_index + begin, raw.h_block_index + begin + size, H.column[k]);
-                block(i, found - (raw.h_block_index + begin)) = H.value[k];
+                block(i, place_[H.column[k]].row) = H.value[k];
             }
         }
         inverse_.push_back(size == 1 ? block.cwiseInverse() : Eigen::MatrixXd(block.inverse()));

@@ -42,11 +42,8 @@ public:
 
     [[nodiscard]] const std::vector<std::int32_t>& degenerate() const { return degenerate_; }
     [[nodiscard]] const std::vector<double>& local() const { return local_; }
-    /// Whether factorize() can: H is reduced, diagonal or of small blocks.
-    [[nodiscard]] bool has_small_blocks() const {
-        const Structure structure = problem_->structure();
-        return structure == Structure::Reduced || structure == Structure::Diagonal || structure == Structure::Blocks;
-    }
+    /// Whether factorize() can: H is reduced, diagonal, or definite of blocks whose inverses are small.
+    [[nodiscard]] bool has_small_blocks() const;
 
     /// Factors the system with more compliance on its diagonal; false where it is singular to working precision.
     bool factorize(double compliance);

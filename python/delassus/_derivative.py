@@ -14,7 +14,7 @@ derivative there and C that of û by u, the implicit function theorem gives
 
 (Facchinei and Pang 2003, sections 4.5 and 5.1, for the method; the projection onto a cone of friction is that of
 core/src/sdk, cut into three cases). One factor of this matrix serves derivatives along directions, and its transpose
-gradients. J, C and, where H is diagonal, of small blocks or absent, the factor are those of python/derivatives.hpp: it
+gradients. J, C and, where H is definite of small blocks, diagonal or absent, the factor are those of python/derivatives.hpp: it
 eliminates dx and the rows of open contacts, whose J is zero, and factors I − J + ρ J C (D H⁻¹ Dᵀ + E) of the others.
 Any other H is factored together with all rows by SuperLU.
 """
@@ -43,13 +43,13 @@ class Derivative:
     """
 
     def __init__(self, problem, result):
-        self._problem, self._H, self._D, self._E = problem, problem.H, problem.D, problem.E
+        self._problem = problem
         self._x, self._lam = np.array(result.x), np.array(result.lam)
         tolerance = max(1e-9, 10.0 * result.errors["natural"])
         self._blocks = _delassus._Linearization(problem, result.lam, result.u, result.law == "coulomb", tolerance)
         self.degenerate: List[int] = self._blocks.degenerate
         small = self._blocks.has_small_blocks
-        self._factor = self._blocks if small else _Whole(self._H, self._D, self._E, self._blocks)
+        self._factor = self._blocks if small else _Whole(problem.H, problem.D, problem.E, self._blocks)
         self.unique: bool = self._factor.factorize(0.0)
         if not self.unique:
             local = self._blocks.local
@@ -80,7 +80,7 @@ class Derivative:
         if mu is not None:
             second += self._blocks.by_mu(_vector(mu, len(self._problem.cones), "mu"))
         dx, dlam = self._factor.solve(first, second)
-        return dx, dlam, self._D @ dx + self._E @ dlam + change
+        return dx, dlam, self._blocks.velocities(dx, dlam) + change
 
     def vjp(self, *, x: Optional[Any] = None, lam: Optional[Any] = None, u: Optional[Any] = None) -> Dict[str, Any]:
         """The gradient of a function of the solution by the data, from its gradient by x (n), lam (m) and u (m).
@@ -95,7 +95,8 @@ class Derivative:
             to_x, to_lam = self._blocks.gradient_start(to_x, to_lam, to_u)
         p, q = self._factor.solve_transposed(to_x, to_lam)
         w, mu, H, D, E = self._blocks.gradient_parts(p, q, to_u, self._x, self._lam)
-        return {"a": p, "b": w, "mu": mu, "H": _like(self._H, H), "D": _like(self._D, D), "E": _like(self._E, E)}
+        return {"a": p, "b": w, "mu": mu, "H": _like(self._problem._H, H), "D": _like(self._problem._D, D),
+                "E": _like(self._problem._E, E)}
 
 
 class _Whole:
@@ -145,8 +146,9 @@ def _matrix(values, shape: Tuple[int, int], name: str):
 
 
 def _like(pattern, data):
-    """A matrix with the places of another one, which it may not change."""
-    result = sparse.csr_matrix(pattern.shape)
-    result.data, result.indices, result.indptr = data, pattern.indices, pattern.indptr
+    """A matrix with the places of another one, which it may not change; pattern: (data, indices, indptr, shape)."""
+    _, indices, indptr, shape = pattern
+    result = sparse.csr_matrix(shape)
+    result.data, result.indices, result.indptr = data, indices, indptr
     result.has_canonical_format = True
     return result

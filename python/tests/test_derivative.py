@@ -162,7 +162,7 @@ class Derivatives(unittest.TestCase):
             for arguments in (data, turned):
                 problem = delassus.Problem(**arguments)
                 found.append((problem, delassus.derivative(problem, delassus.solve(problem, tolerance=1e-13))))
-            self.assertEqual([problem.structure for problem, _ in found], ["blocks", "definite"])
+            self.assertEqual([problem.structure for problem, _ in found], ["block-diagonal", "sparse definite"])
             blocks, whole = (derivative.vjp(lam=weights, u=weights) for _, derivative in found)
             np.testing.assert_allclose(turn.T @ whole["a"], blocks["a"], atol=1e-8)
             np.testing.assert_allclose(whole["b"], blocks["b"], atol=1e-8)
