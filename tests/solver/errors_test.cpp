@@ -187,7 +187,7 @@ TEST(Identity, TellsPatternsFromValues) {
 Problem masses_with_rows(const std::vector<Triplet>& entries, std::vector<Cone> cones) {
     Problem problem = tests::tied_masses();
     problem.b.clear();
-    for (const Cone& cone : cones) problem.b.insert(problem.b.end(), static_cast<std::size_t>(cone.rows), 0.5);
+    for (const Cone& cone : cones) problem.b.resize(problem.b.size() + static_cast<std::size_t>(cone.rows), 0.5);
     problem.D = SparseMatrix::from_triplets(problem.m(), 2, entries);
     problem.cones = std::move(cones);
     return problem;
