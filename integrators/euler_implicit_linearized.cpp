@@ -130,6 +130,7 @@ private:
         coulomb_ = solver.law() == Law::Coulomb;
         assemble_unilateral(state, h);
 
+        const ErrorOfStep told(solver);
         estimate_error(state, solver);
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
@@ -153,6 +154,18 @@ private:
         state = end_;
         report.multipliers = multipliers_;
     }
+
+    /// What the solver is told of the method's error is this method's memory, and holds for one step.
+    class ErrorOfStep {
+    public:
+        explicit ErrorOfStep(StepSolver& solver) : solver_(solver) {}
+        ~ErrorOfStep() { solver_.method_error = {}; }
+        ErrorOfStep(const ErrorOfStep&) = delete;
+        ErrorOfStep& operator=(const ErrorOfStep&) = delete;
+
+    private:
+        StepSolver& solver_;
+    };
 
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
     void estimate_error(const State& state, StepSolver& solver) {
