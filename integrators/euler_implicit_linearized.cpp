@@ -130,8 +130,7 @@ private:
         coulomb_ = solver.law() == Law::Coulomb;
         assemble_unilateral(state, h);
 
-        const ErrorOfStep told(solver);
-        estimate_error(state, solver);
+        const ErrorOfStep told(solver, estimated_error(state));
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
@@ -155,10 +154,12 @@ private:
         report.multipliers = multipliers_;
     }
 
-    /// What the solver is told of the method's error is this method's memory, and holds for one step.
+    /// Tells the solver this method's error, for one step: the values are in this method's memory.
     class ErrorOfStep {
     public:
-        explicit ErrorOfStep(StepSolver& solver) : solver_(solver) {}
+        ErrorOfStep(StepSolver& solver, std::span<const double> error) : solver_(solver) {
+            solver_.method_error = error;
+        }
         ~ErrorOfStep() { solver_.method_error = {}; }
         ErrorOfStep(const ErrorOfStep&) = delete;
         ErrorOfStep& operator=(const ErrorOfStep&) = delete;
@@ -168,11 +169,10 @@ private:
     };
 
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
-    void estimate_error(const State& state, StepSolver& solver) {
-        solver.method_error = {};
-        if (follows_sliding_) return;
+    std::span<const double> estimated_error(const State& state) {
+        if (follows_sliding_) return {};
         error_.note(state.v);
-        solver.method_error = error_.known();
+        return error_.known();
     }
 
     void note_left(std::span<const double> left) {

@@ -50,11 +50,8 @@ public:
         if (set_.control) {
             control_ = std::make_unique<AdaptiveStepping>(system_, *timestepper_, *set_.control);
         } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
-            constexpr double shortest = 1e-6;  // as in the runs of scenes
             control_ = std::make_unique<AdaptiveStepping>(
-                system_, *timestepper_,
-                StepControl{
-                    .absolute = limit, .initial = set_.step, .smallest = shortest * set_.step, .largest = set_.step},
+                system_, *timestepper_, control_within(limit, set_.step),
                 fmt::format("{} cannot follow the motion there; take an implicit method, or euler_implicit_linearized, "
                             "which is less exact and may go on",
                             set_.integrator));
@@ -120,10 +117,7 @@ private:
                 return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
             };
             if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
-            const SolverEffort& effort = solver_->effort();
-            if (effort.worst_miss > 100.0)  // as in the runs of scenes
-                throw StepFailure(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used",
-                                              effort.unsolved, effort.worst_miss));
+            require_usable(solver_->effort());
             measure(next, record);
         } catch (const Unsupported& error) {
             undo(memory, control);
@@ -167,45 +161,21 @@ private:
         }
         const FixedStep step = fixed_step(state.t, set_.end, set_.step);
         if (control_) {
-            for (record.parts = 0; state.t < step.end; ++record.parts) {
-                AdaptiveStepReport part = control_->step(state, step.end, *solver_);
-                part.step.follow(taken.step);
-                std::swap(taken.step, part.step);
-                taken.rejected += part.rejected;
-            }
+            const Parts parts = step_within_error(*control_, state, step.end, *solver_, taken.step);
+            record.parts = parts.taken;
+            taken.rejected = parts.rejected;
         } else {
+            const auto take = [this](State& moved, double h, StepReport& report) {
+                timestepper_->step(moved, h, *solver_, report);
+            };
             try {
-                timestepper_->step(state, step.h, *solver_, taken.step);
+                take(state, step.h, taken.step);
             } catch (const StepTooLong& failure) {
-                advance_in_parts(state, step.h, taken.step, record, memory, failure);
+                record.parts = step_in_parts(*timestepper_, take, state_, memory, step.h, state, taken.step, failure);
             }
         }
         taken.h = step.h;
         state.t = step.end;
-    }
-
-    // Twice as many parts until the method can take them all.
-    void advance_in_parts(State& state, double h, StepReport& report, StepRecord& record,
-                          const std::vector<double>& memory, const StepTooLong& failure) {
-        constexpr std::int64_t most = 64;
-        for (std::int64_t parts = 2; parts <= most; parts *= 2) {
-            state = state_;
-            timestepper_->restart();
-            timestepper_->load(memory);
-            report.clear();
-            try {
-                for (std::int64_t i = 0; i < parts; ++i) {
-                    StepReport part = timestepper_->step(state, h / static_cast<double>(parts), *solver_);
-                    part.follow(report);
-                    std::swap(report, part);
-                }
-            } catch (const StepTooLong&) {
-                continue;
-            }
-            record.parts = parts;
-            return;
-        }
-        throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
     }
 
     void undo(const std::vector<double>& memory, const std::vector<double>& control) {

@@ -196,11 +196,6 @@ private:
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A state that is shown, by steps that are as long as their errors allow.
     void advance_ahead(State& state, double end, StepReport& report);
-    /// A fixed step in parts, whose sizes follow from their errors.
-    void advance_within_error(State& state, double end, StepReport& report);
-    /// A fixed step that the timestepper could not take, in parts. Throws StepFailure where that does not help.
-    void advance_in_parts(State& state, AdaptiveStepReport& report, const std::vector<double>& memory,
-                          const StepTooLong& failure);
     /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
     void add_unilateral_forces(std::vector<double>& force) const;
     /// The timestepper and what controls its steps.

@@ -40,14 +40,6 @@ void require_sleeping(const SceneSystem& system) {
                                   system.integrator, fmt::join(able, ", ")));
 }
 
-/// Throws StepFailure if a solve missed its tolerance by orders. Within two the run goes on, and says at its end that
-/// it is not solved.
-void require_usable(const SolverEffort& effort) {
-    if (effort.worst_miss > 100.0)
-        throw StepFailure(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used", effort.unsolved,
-                                      effort.worst_miss));
-}
-
 /// Throws Unsupported if the solver that the scene names does not know the law of its friction: said here, as the first
 /// contact may come late.
 void require_law(const SceneSystem& system, const Registry& registry, Law law) {
@@ -214,17 +206,14 @@ void Simulation::make_method() {
     if (system_->control) {
         control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
     } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
-        // So short a part can pass a jump of velocities: it errs by its size times the jump.
-        constexpr double shortest = 1e-6;
-        const double step = system_->step;
         control_ = std::make_unique<AdaptiveStepping>(
-            dynamics(), *timestepper_,
-            StepControl{.absolute = limit, .initial = step, .smallest = shortest * step, .largest = step},
+            dynamics(), *timestepper_, control_within(limit, system_->step),
             fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
                         "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
                         system_->integrator));
         if (timestepper_->has_extension() && system_->system->foreseeable())
-            ahead_ = std::make_unique<LookAhead>(dynamics(), *system_->system, step, shortest * step);
+            ahead_ =
+                std::make_unique<LookAhead>(dynamics(), *system_->system, system_->step, shortest_part * system_->step);
     }
 }
 
@@ -286,12 +275,14 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     if (ahead_) {
         advance_ahead(state, step.end, report.step);
     } else if (control_) {
-        advance_within_error(state, step.end, report.step);
+        record_.parts = step_within_error(*control_, state, step.end, *solver_, report.step).taken;
     } else {
         try {
             take_step(state, report.h, report.step);
         } catch (const StepTooLong& failure) {
-            advance_in_parts(state, report, memory, failure);
+            const auto take = [this](State& moved, double h, StepReport& part) { take_step(moved, h, part); };
+            record_.parts =
+                step_in_parts(*timestepper_, take, now_.state, memory, report.h, state, report.step, failure);
         }
     }
     state.t = step.end;
@@ -317,50 +308,12 @@ void Simulation::advance_ahead(State& state, double end, StepReport& report) {
         state = now_.state;
         timestepper_->restart();
         control_->set_largest(system_->step);
-        advance_within_error(state, end, report);
+        record_.parts = step_within_error(*control_, state, end, *solver_, report).taken;
         state.t = end;
         ahead_->begin(state);
         system_->system->follow(bodies_at(state, next_bodies_));
     }
     report.multipliers.clear();
-}
-
-void Simulation::advance_within_error(State& state, double end, StepReport& report) {
-    report.clear();
-    for (record_.parts = 0; state.t < end; ++record_.parts) {
-        AdaptiveStepReport part = control_->step(state, end, *solver_);
-        part.step.follow(report);
-        std::swap(report, part.step);
-    }
-}
-
-// Twice as many parts until the method can take them all.
-void Simulation::advance_in_parts(State& state, AdaptiveStepReport& report, const std::vector<double>& memory,
-                                  const StepTooLong& failure) {
-    constexpr std::int64_t most = 64;
-    // Where rounding makes more of the linear model's error than this, nobody knows whether parts are short enough.
-    constexpr double most_rounding = 0.1;
-    for (std::int64_t parts = 2; parts <= most; parts *= 2) {
-        state = now_.state;
-        timestepper_->restart();
-        timestepper_->load(memory);
-        const double h = report.h / static_cast<double>(parts);
-        StepReport part;
-        report.step.clear();
-        try {
-            for (std::int64_t i = 0; i < parts; ++i) {
-                take_step(state, h, part);
-                if (part.linearization_rounding > most_rounding) throw StepTooLong(failure.what());
-                part.follow(report.step);
-                std::swap(report.step, part);
-            }
-        } catch (const StepTooLong&) {
-            continue;
-        }
-        record_.parts = parts;
-        return;
-    }
-    throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
 }
 
 void Simulation::measure(const State& state, std::int64_t step) {

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "simulation/fixed_step.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace delassus {
+
+Parts step_within_error(AdaptiveStepping& control, State& state, double end, StepSolver& solver, StepReport& report) {
+    report.clear();
+    Parts parts;
+    for (; state.t < end; ++parts.taken) {
+        AdaptiveStepReport part = control.step(state, end, solver);
+        part.step.follow(report);
+        std::swap(report, part.step);
+        parts.rejected += part.rejected;
+    }
+    return parts;
+}
+
+std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const State& begin,
+                           const std::vector<double>& memory, double h, State& state, StepReport& report,
+                           const StepTooLong& failure) {
+    constexpr std::int64_t most = 64;
+    // Where rounding makes more of the linear model's error than this, nobody knows whether parts are short enough.
+    constexpr double most_rounding = 0.1;
+    for (std::int64_t parts = 2; parts <= most; parts *= 2) {
+        state = begin;
+        timestepper.restart();
+        timestepper.load(memory);
+        StepReport part;
+        report.clear();
+        try {
+            for (std::int64_t i = 0; i < parts; ++i) {
+                take(state, h / static_cast<double>(parts), part);
+                if (part.linearization_rounding > most_rounding) throw StepTooLong(failure.what());
+                part.follow(report);
+                std::swap(report, part);
+            }
+        } catch (const StepTooLong&) {
+            continue;
+        }
+        return parts;
+    }
+    throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
+}
+
+void require_usable(const SolverEffort& effort) {
+    if (effort.worst_miss > 100.0)
+        throw StepFailure(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used", effort.unsolved,
+                                      effort.worst_miss));
+}
+
+}  // namespace delassus
