@@ -72,7 +72,7 @@ struct StepSolver::Implementation {
         : registry(known), config(std::move(chosen)), settings(config.settings()) {
         if (config.name.empty()) config.name = auto_name;
         if (config.name == auto_name) config.options.try_emplace("simulation", "true");
-        // A second thread has not been seen to pay in steps (docs/decisions.md): who wants it says so.
+        // A second thread has not been seen to pay in steps (docs/decisions, D020): who wants it says so.
         if (!config.threads) settings.team = ThreadTeam::for_threads(1);
     }
 
