@@ -50,6 +50,7 @@ find_package(CLI11 2.1 REQUIRED)
 find_package(Threads REQUIRED)
 
 find_program(CCACHE_PROGRAM ccache)
+delassus_dependency(ccache CCACHE_PROGRAM)
 if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
 endif()
