@@ -32,8 +32,3 @@ function(delassus_add_solver_plugin name)
     COMMAND delassus::command plugins describe "$<TARGET_FILE:${name}>" --sidecar
     VERBATIM)
 endfunction()
-
-# delassus_skip_plugin(NAME REASON): called by a plugin's CMakeLists.txt when what it needs is not there.
-function(delassus_skip_plugin name reason)
-  set_property(GLOBAL APPEND PROPERTY DELASSUS_PLUGINS_SKIPPED "${name}: ${reason}")
-endfunction()

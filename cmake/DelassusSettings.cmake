@@ -42,6 +42,9 @@ if(DELASSUS_COVERAGE)
 endif()
 
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+if(POLICY CMP0167)
+  cmake_policy(SET CMP0167 NEW)  # Boost's own configuration file, which all releases have
+endif()
 find_package(Boost 1.71 REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
 find_package(yaml-cpp 0.7 REQUIRED)
@@ -50,6 +53,7 @@ find_package(CLI11 2.1 REQUIRED)
 find_package(Threads REQUIRED)
 
 find_program(CCACHE_PROGRAM ccache)
+delassus_dependency(ccache CCACHE_PROGRAM)
 if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
 endif()

@@ -85,7 +85,10 @@ int list(const PluginsArguments& arguments) {
         return exit_solved;
     }
     if (arguments.json) {
-        Json json = {{"plugins", Json::array()}, {"rejected", Json::array()}, {"not_built", Json::array()}};
+        Json json = {{"plugins", Json::array()},
+                     {"rejected", Json::array()},
+                     {"not_built", Json::array()},
+                     {"left_out", Json::array()}};
         for (const auto& plugin : registry.plugins()) {
             Json row = parse_ordered_json(sidecar_text(plugin));
             row["path"] = plugin.library.string();
@@ -95,6 +98,8 @@ int list(const PluginsArguments& arguments) {
             json["rejected"].push_back({{"path", row.path.string()}, {"reason", row.reason}});
         for (const auto& row : registry.unbuilt())
             json["not_built"].push_back({{"name", row.name}, {"reason", row.reason}});
+        for (const auto& row : registry.missing_parts())
+            json["left_out"].push_back({{"name", row.name}, {"reason", row.reason}});
         fmt::print("{}\n", json_text(json, 2));
         return exit_solved;
     }
@@ -107,6 +112,8 @@ int list(const PluginsArguments& arguments) {
     if (registry.plugins().empty()) fmt::print("no plugins were found in {}\n", registry.folders().back().string());
     if (!registry.unbuilt().empty()) fmt::print("\nNot built here:\n");
     for (const auto& row : registry.unbuilt()) fmt::print("{:<10} {}\n", row.name, row.reason);
+    if (!registry.missing_parts().empty()) fmt::print("\nLeft out here:\n");
+    for (const auto& row : registry.missing_parts()) fmt::print("{}\n", row.reason);
     if (!registry.rejected().empty()) fmt::print("\nRejected:\n");
     for (const auto& row : registry.rejected()) fmt::print("{}: {}\n", row.path.string(), row.reason);
     return exit_solved;

@@ -49,6 +49,11 @@ struct UnbuiltPlugin {
     std::string name, reason;
 };
 
+/// A library that the build did not find, and what goes without it; the solvers that need it are UnbuiltPlugins.
+struct MissingPart {
+    std::string name, reason;
+};
+
 /// The plugins that can be chosen by name. Folders are searched in order, the first plugin of a name wins:
 /// the folders given, then those of DELASSUS_PLUGIN_PATH (separated by colons), then the plugin folder beside
 /// libdelassus. Never the working directory. Reads sidecars only; nothing is loaded before it is chosen.
@@ -64,6 +69,7 @@ public:
     [[nodiscard]] const std::vector<PluginInfo>& plugins() const { return plugins_; }
     [[nodiscard]] const std::vector<RejectedPlugin>& rejected() const { return rejected_; }
     [[nodiscard]] const std::vector<UnbuiltPlugin>& unbuilt() const { return unbuilt_; }
+    [[nodiscard]] const std::vector<MissingPart>& missing_parts() const { return missing_parts_; }
     [[nodiscard]] const std::vector<std::filesystem::path>& folders() const { return folders_; }
 
     /// Throws InputError naming the nearest and all names if there is none.
@@ -84,6 +90,7 @@ private:
     std::vector<std::shared_ptr<const Plugin>> own_;  // those of add()
     std::vector<RejectedPlugin> rejected_;
     std::vector<UnbuiltPlugin> unbuilt_;
+    std::vector<MissingPart> missing_parts_;
 };
 
 }  // namespace delassus

@@ -14,7 +14,6 @@
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
-#include "support/json.hpp"
 #include "support/library_location.hpp"
 #include "support/nearest_name.hpp"
 
@@ -41,12 +40,13 @@ Registry::Registry(std::vector<fs::path> folders) : folders_(std::move(folders))
     for (const auto& folder : folders_) scan(folder);
     std::sort(plugins_.begin(), plugins_.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
 
+    // Written by cmake/DelassusSummary.cmake.
     std::ifstream left_out(folders_.back() / "not-built.list");
-    std::ostringstream text;
-    text << left_out.rdbuf();
-    const auto json = try_parse_ordered_json(text.str());
-    if (!json.is_array()) return;
-    for (const auto& row : json) unbuilt_.push_back({row.value("name", ""), row.value("reason", "")});
+    for (std::string kind, name, reason;
+         std::getline(left_out, kind, '\t') && std::getline(left_out, name, '\t') && std::getline(left_out, reason);) {
+        if (kind == "solver") unbuilt_.push_back({name, reason});
+        if (kind == "part") missing_parts_.push_back({name, reason});
+    }
 }
 
 void Registry::scan(const fs::path& folder) {
