@@ -38,7 +38,7 @@ class BuildByCMake(build_ext):
         package = Path(self.build_lib).resolve() / "delassus"
         shutil.rmtree(package, ignore_errors=True)
         with tempfile.TemporaryDirectory() as stage:
-            for component in ("library", "plugins", "command", "python"):
+            for component in ("library", "plugins", "importers", "command", "python"):
                 call("cmake", "--install", BUILD, "--prefix", stage, "--component", component)
             (python,) = (file.parent for file in Path(stage).rglob("delassus/__init__.py"))
             (library,) = {file.parent for file in Path(stage).rglob("libdelassus.so.*")}
@@ -58,4 +58,5 @@ class BuildByCMake(build_ext):
 setup(name="delassus", version=re.search(r"project\(delassus VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1],
       description="Saddle-point and cone-complementarity problems with solvers as plugins", license="BSD-3-Clause",
       python_requires=">=3.9", install_requires=["numpy", "scipy"], packages=[], py_modules=[],
+      scripts=["python/scripts/delassus"],
       ext_modules=[Extension("delassus._delassus", sources=[])], cmdclass={"build_ext": BuildByCMake})

@@ -23,7 +23,7 @@ install(DIRECTORY core/include/delassus DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} 
 install(FILES "${PROJECT_BINARY_DIR}/core/generated/delassus/version.hpp" tools/generate/include/delassus/generate.hpp
   tools/generate/include/delassus/generate_partitioned.hpp
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/delassus COMPONENT development)
-install(DIRECTORY examples/plugin examples/embed examples/system examples/engines examples/dump DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
+install(DIRECTORY examples/plugin examples/plugin-c examples/plugin-rust examples/embed examples/system examples/engines examples/dump DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         COMPONENT development)
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development
@@ -39,9 +39,33 @@ install(FILES "${PROJECT_BINARY_DIR}/delassusConfig.cmake" "${PROJECT_BINARY_DIR
               cmake/DelassusPlugin.cmake cmake/delassus_plugin.map
         DESTINATION ${package_directory} COMPONENT development)
 
-# delassus.pc finds its folders from its own place, so that an install tree can be moved.
+# pkg-config: delassus.pc for delassus::delassus, delassus-sdk.pc for delassus::sdk, delassus-<module>.pc for each other library.
+# They find their folders from their own place, so that an install tree can be moved.
 set(pkgconfig_directory ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH pkgconfig_to_prefix "/prefix/${pkgconfig_directory}" /prefix)
 string(REGEX REPLACE "/$" "" pkgconfig_to_prefix "${pkgconfig_to_prefix}")
-configure_file(cmake/delassus.pc.in delassus.pc @ONLY)
-install(FILES "${PROJECT_BINARY_DIR}/delassus.pc" DESTINATION ${pkgconfig_directory} COMPONENT development)
+
+# delassus_pkgconfig(<name> <what> <requires> <libs>)
+function(delassus_pkgconfig pc_name pc_what pc_requires pc_libs)
+  configure_file(cmake/delassus.pc.in "${PROJECT_BINARY_DIR}/${pc_name}.pc" @ONLY)
+  install(FILES "${PROJECT_BINARY_DIR}/${pc_name}.pc" DESTINATION ${pkgconfig_directory} COMPONENT development)
+endfunction()
+
+delassus_pkgconfig(delassus-sdk "headers for authors of solvers" "eigen3 >= 3.4" "")
+get_property(libraries GLOBAL PROPERTY DELASSUS_LIBRARIES)
+foreach(library IN LISTS libraries)
+  get_target_property(links ${library} INTERFACE_LINK_LIBRARIES)
+  set(requires "")
+  foreach(other IN LISTS links)
+    if(other IN_LIST libraries)
+      string(REPLACE "_" "-" other "${other}")
+      list(APPEND requires "${other} = ${PROJECT_VERSION}")
+    endif()
+  endforeach()
+  if(NOT requires)
+    set(requires "eigen3 >= 3.4")  # the headers of the SDK lie in the same folder
+  endif()
+  list(JOIN requires ", " requires)
+  string(REPLACE "_" "-" name "${library}")
+  delassus_pkgconfig(${name} "lib${library}" "${requires}" "-L\${libdir} -l${library}")
+endforeach()

@@ -46,6 +46,7 @@ endfunction()
 
 # delassus_install_library(<target>): a shared library; who links against it wants the package of development files too.
 function(delassus_install_library target)
+  set_property(GLOBAL APPEND PROPERTY DELASSUS_LIBRARIES ${target})
   install(TARGETS ${target} EXPORT delassusCoreTargets
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
 endfunction()

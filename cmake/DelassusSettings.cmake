@@ -15,6 +15,7 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_BINDIR}"
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/${CMAKE_INSTALL_LIBDIR}")
 set(DELASSUS_MODULE_DIRECTORY "${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/delassus")
 set(DELASSUS_PLUGIN_DIRECTORY "${DELASSUS_MODULE_DIRECTORY}/plugins")
+set(DELASSUS_PLUGIN_DESTINATION "${CMAKE_INSTALL_LIBDIR}/delassus/plugins")  # below the prefix
 
 add_library(delassus_settings INTERFACE)
 target_compile_options(delassus_settings INTERFACE -Wall -Wextra -Wshadow -Wpedantic -Wconversion -Wno-sign-conversion)

@@ -194,9 +194,9 @@ private:
     Accelerations accelerations_;
     std::int32_t n_, m_;
     std::vector<Cone> cones_;
-    bool known_ = false;
+    bool known_ = false, stepped_ = false;
     Last last_;
-    State begin_;  // of the last step
+    State begin_;  // of the last step, since stepped_
     Vector v_begin_, a_begin_, lambda_begin_;
     std::array<Stage, 3> stages_;
     std::array<StageValues, 3> other_guess_;
@@ -534,6 +534,7 @@ void RadauIIA::finish(State& state, double h, StepSolver& solver, StepReport& re
     }
     require_finite(state, end, h, "radau_iia");
     begin_ = state;
+    stepped_ = true;
     multipliers_.assign(last_.lambda[2].begin(), last_.lambda[2].end());
     report.multipliers = multipliers_;
     known_ = true;
@@ -547,7 +548,7 @@ void RadauIIA::finish(State& state, double h, StepSolver& solver, StepReport& re
 
 void RadauIIA::extend(ContinuousExtension& way) const {
     way.degree = 0;
-    if (!known_ || begin_.q.empty()) return;
+    if (!known_ || !stepped_) return;
     way.degree = 3;
     way.begin = begin_;
     way.end = last_.end;

@@ -9,10 +9,12 @@
 #include "scenes.hpp"
 #include "solver_classes.hpp"
 #include "solvers.hpp"
+#include "support/standard_descriptors.hpp"
 #include "system_runs.hpp"
 #include "views.hpp"
 
 PYBIND11_MODULE(_delassus, module) {
+    delassus::open_standard_descriptors();
     module.doc() = "The border between Delassus and Python; use the package delassus.";
     module.attr("version") = DELASSUS_VERSION;
     delassus::python::bind_errors(module);

@@ -22,6 +22,7 @@
 #include "delassus/registry.hpp"
 #include "delassus/solver_config.hpp"
 #include "guards.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::python {
 
@@ -170,6 +171,11 @@ inline py::dict qualification(SharedProblem& problem, const Registry& registry) 
     return result;
 }
 
+inline std::optional<bool> optimized_of(const PluginInfo& info) {
+    if (info.build == DELASSUS_BUILD_UNKNOWN) return std::nullopt;
+    return info.build == DELASSUS_BUILD_OPTIMIZED;
+}
+
 inline py::list plugins(const Registry& registry) {
     constexpr const char* types[] = {"boolean", "integer", "real", "choice", "text"};
     py::list result;
@@ -191,6 +197,19 @@ inline py::list plugins(const Registry& registry) {
         plugin["capabilities"] = capability_names(info.capabilities);
         plugin["options"] = options;
         plugin["library"] = info.library.string();
+        plugin["optimized"] = optimized_of(info);
+        result.append(plugin);
+    }
+    return result;
+}
+
+inline py::list rejected(const Registry& registry) {
+    py::list result;
+    for (const RejectedPlugin& row : registry.rejected()) {
+        py::dict plugin;
+        plugin["name"] = row.name;
+        plugin["path"] = row.path.string();
+        plugin["reason"] = row.reason;
         result.append(plugin);
     }
     return result;
@@ -214,6 +233,7 @@ inline void bind_problems(py::module_& module) {
              }),
              "folders"_a = std::vector<std::string>{})
         .def("plugins", &plugins)
+        .def("rejected", &rejected)
         .def("_add", [](Registry& registry, std::shared_ptr<Plugin> plugin) { registry.add(std::move(plugin)); })
         .def("unbuilt", [](const Registry& registry) {
             std::map<std::string, std::string> reasons;
@@ -307,6 +327,20 @@ inline void bind_problems(py::module_& module) {
                 result[py::str(std::string(measure.name))] = found.*measure.value;
             return result;
         });
+    module.def(
+        "fill_folder",
+        [](const std::string& path, const std::string& kind, const std::vector<std::string>& names) {
+            OutputFolder folder(path, kind);
+            for (const auto& name : names) {
+                if (name.ends_with('/')) {
+                    folder.add_folder(name.substr(0, name.size() - 1));
+                } else {
+                    folder.add(name);
+                }
+            }
+            folder.keep();
+        },
+        "Makes room for these names in a folder that a command of this kind fills; folders end in a slash.");
 }
 
 }  // namespace delassus::python

@@ -6,6 +6,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -137,11 +138,18 @@ inline py::list stages_of(const SolveResult& result) {
     return stages;
 }
 
+/// What a solver that failed left is no answer, so that the error of it says nothing.
 inline std::string text_of(const SolveResult& result) {
     const SolveReport& report = result.report;
-    return fmt::format("<delassus.Result: {} with {}: {} after {} iterations, {:.3g} s, natural error {:.2e}{}{}>",
+    const bool failed = report.status == Status::Error || report.status == Status::NumericalFailure;
+    const std::string error =
+        failed ? "no answer"
+        : report.error.balance > std::max(report.error.natural, report.tolerance)
+            ? fmt::format("natural error {:.2e}, balance error {:.2e}", report.error.natural, report.error.balance)
+            : fmt::format("natural error {:.2e}", report.error.natural);
+    return fmt::format("<delassus.Result: {} with {}: {} after {} iterations, {:.3g} s, {}{}{}>",
                        report.problem.empty() ? "problem" : report.problem, report.solver, name_of(report.status),
-                       report.iterations, report.seconds_setup + report.seconds_solve, report.error.natural,
+                       report.iterations, report.seconds_setup + report.seconds_solve, error,
                        report.message.empty() ? "" : ": ", report.message);
 }
 
@@ -201,6 +209,9 @@ inline void bind_solvers(py::module_& module) {
              "name"_a, "options"_a)
         .def_property_readonly("name", [](const SharedSolver& self) { return self.solver->info().name; })
         .def_property_readonly("version", [](const SharedSolver& self) { return self.solver->info().version; })
+        .def_property_readonly(
+            "optimized", [](const SharedSolver& self) { return optimized_of(self.solver->info()); },
+            "Whether the compiler optimised the plugin; None where it does not say.")
         .def(
             "refusal",
             [](SharedSolver& self, SharedProblem& problem) {

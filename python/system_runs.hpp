@@ -86,7 +86,7 @@ public:
     }
 
     [[nodiscard]] bool finished() const {
-        return set_.end - state_.t <= (set_.control ? 0.0 : rounding_of_step * set_.step);
+        return set_.control ? state_.t >= set_.end : has_ended(state_.t, set_.end, set_.step);
     }
     [[nodiscard]] const State& state() const { return state_; }
     [[nodiscard]] const StepRecord& record() const { return record_; }

@@ -52,8 +52,9 @@ public:
         if (rod_) C[0] = (x * x + y * y - length * length) / (2.0 * length);
     }
     void add_constraint_jacobian(const State& state, std::int32_t row, MatrixAssembler& D) const override {
+        const double* q = state.q.data();
         for (std::int32_t i = 0; i < 2; ++i) {
-            const double slope = (state.q[i + 2] - state.q[i]) / length;
+            const double slope = (q[i + 2] - q[i]) / length;
             D.add(row, i, -slope);
             D.add(row, i + 2, slope);
         }
@@ -71,10 +72,11 @@ public:
     }
 
     double energy(const State& state) const override {
-        const double square = state.q[0] * state.q[0] + state.q[1] * state.q[1];
+        const double *q = state.q.data(), *v = state.v.data();
+        const double square = q[0] * q[0] + q[1] * q[1];
         double result = stiffness * (0.5 * square + 0.25 * square * square);
-        for (std::int32_t i = 0; i < 4; ++i) result += 0.5 * mass(i) * state.v[i] * state.v[i];
-        for (const std::int32_t i : {1, 3}) result += mass(i) * gravity * state.q[i];
+        for (std::int32_t i = 0; i < 4; ++i) result += 0.5 * mass(i) * v[i] * v[i];
+        for (const std::int32_t i : {1, 3}) result += mass(i) * gravity * q[i];
         return result;
     }
 

@@ -82,10 +82,10 @@ void SemismoothNewton::iterate(sdk::ScaledRun& run) {
         const double error_before = error();
         if (follow_law(run, std::min(path_goal, 0.01 * error_before)) == Result::Stopped) return;
         map_.set_law(1.0);
-        if (error() > error_before) move_to(before);
+        if (!(error() <= error_before)) move_to(before);
         tau_ = std::min(first_tau, error());
         if (solve_law(run, 0.0, last) == Result::Stopped) return;
-        if (error() > 0.5 * error_before) break;
+        if (!(error() <= 0.5 * error_before)) break;
     }
     run.stall(at_rounding() ? "rounding ends the gain" : "the error no longer falls");
 }
@@ -129,6 +129,7 @@ SemismoothNewton::Result SemismoothNewton::solve_law(sdk::ScaledRun& run, double
     shrinkage_ = 10.0;
     previous_tau_ = 0.0;
     while (error() > goal) {
+        if (!std::isfinite(error())) return Result::Failed;
         if (error() <= threshold) {
             if (const Result result = newton(run, goal); result != Result::Failed) return result;
             if (at_rounding()) return Result::Failed;

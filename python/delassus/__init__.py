@@ -36,7 +36,12 @@ __version__: str = _delassus.version
 __all__ = ["Benchmark", "Comparison", "Cone", "Derivative", "DynamicalSystem", "Error", "FreeSpin", "InputError",
            "PluginError", "Problem", "Result", "Scene", "SceneBuilder", "Simulation", "SolveRequest", "Solver", "State",
            "StepFailure", "StepRecord", "Trajectory", "Unilateral", "Unsupported", "View", "bench", "compare",
-           "derivative", "plugins", "read", "register", "simulate", "solve", "timesteppers", "unbuilt"]
+           "derivative", "plugins", "read", "register", "rejected", "simulate", "solve", "timesteppers", "unbuilt"]
+
+
+def __dir__() -> list:
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]
+
 
 Matrix = Any  #: a scipy.sparse matrix, or a dense array with two dimensions
 
@@ -159,6 +164,17 @@ def _matrix(parts) -> scipy.sparse.csr_matrix:
     return matrix
 
 
+def _start(start: Any) -> Tuple[np.ndarray, np.ndarray]:
+    """x and λ of what solve() takes as start."""
+    if isinstance(start, _delassus.Result):
+        return start.x, start.lam
+    pair = isinstance(start, (tuple, list)) or getattr(start, "ndim", 0) == 2
+    if not pair or len(start) != 2:
+        what = f"{len(start)} entries" if pair else f"the type {type(start).__name__}"
+        raise InputError(f"start has {what}; it must be a Result or (x, λ), a pair of arrays with n and m entries")
+    return _reals(start[0], "the start's x"), _reals(start[1], "the start's λ")
+
+
 class Solver(_delassus.Solver):
     """A solver that is kept between solves: what it analysed and factorised is used again where the problem allows.
 
@@ -180,10 +196,7 @@ class Solver(_delassus.Solver):
               start: Union[Result, Tuple[Any, Any], None] = None, curve: bool = False) -> Result:
         """Solve. Not converging is a status of the result; see solve() for the arguments."""
         if start is not None:
-            if isinstance(start, _delassus.Result):
-                start = (start.x, start.lam)
-            x, lam = start
-            start = (_reals(x, "the start's x"), _reals(lam, "the start's λ"))
+            start = _start(start)
         return self._solve(problem, tolerance, max_iterations, time_limit, law, start, curve)
 
     def __repr__(self) -> str:
@@ -287,8 +300,14 @@ def read(path: Path) -> Problem:
 
 
 def plugins(plugin_path: Sequence[Path] = ()) -> list:
-    """The installed solvers: dicts of name, version, description, licence, capabilities, options and library."""
+    """The installed solvers: dicts of name, version, description, licence, capabilities, options, library, and
+    optimized: whether the compiler optimised it, None where the plugin does not say. rejected() has the others."""
     return _registry(_folders(plugin_path)).plugins()
+
+
+def rejected(plugin_path: Sequence[Path] = ()) -> list:
+    """Plugins, and files meant to be one, that cannot be used: dicts of name ('' for a folder), path and reason."""
+    return _registry(_folders(plugin_path)).rejected()
 
 
 def unbuilt() -> dict:

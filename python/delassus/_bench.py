@@ -15,7 +15,7 @@ import numpy as np
 from ._builder import SceneBuilder
 from ._command import run_command
 from ._compare import COLUMNS, Comparison
-from ._delassus import InputError, Problem
+from ._delassus import InputError, Problem, fill_folder
 from ._plugins import folders
 from ._view import View
 from ._yaml import yaml_of
@@ -69,7 +69,7 @@ def bench(suite: Any, output: Optional[Union[str, "os.PathLike[str]"]] = None, o
     with tempfile.TemporaryDirectory(prefix="delassus-bench-") as scratch:
         folder = Path(scratch) / "results" if output is None else Path(output)
         if isinstance(suite, Mapping):
-            folder.mkdir(parents=True, exist_ok=True)
+            fill_folder(str(folder), "bench", ["suite.yaml"])
             file = folder / "suite.yaml"
             file.write_text(yaml_of(_with_files(suite, folder)) + "\n", encoding="utf-8")
             suite = file
@@ -98,13 +98,13 @@ def _with_files(suite: Mapping, folder: Path) -> dict:
         if isinstance(value, Problem):
             made[0] += 1
             path = folder / "given" / f"{value.name or 'problem'}-{made[0]}".replace("/", "_")
-            path.parent.mkdir(exist_ok=True)
+            fill_folder(str(folder), "bench", ["given/", f"given/{path.name}"])
             value.write(path)
             return {"path": str(path.resolve()), "name": value.name or f"problem {made[0]}"}
         if isinstance(value, SceneBuilder):
             made[0] += 1
             path = folder / "given" / f"scene-{made[0]}.yaml"
-            path.parent.mkdir(exist_ok=True)
+            fill_folder(str(folder), "bench", ["given/", f"given/{path.name}"])
             value.write(path)
             return {"path": str(path.resolve()), "name": str(value.get("title", f"scene {made[0]}"))}
         if isinstance(value, Mapping):

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import multiprocessing
 import os
 import signal
 import time
+import warnings
 from html import escape
 from typing import Any, Mapping, Optional, Sequence, Union
 
 import numpy as np
+
+from ._files import write_whole
 
 #: Columns of a comparison, in their order; 'curve' comes besides.
 COLUMNS = ("problem", "n", "m", "law", "solver", "tolerance", "status", "solved", "natural", "balance", "iterations",
@@ -37,10 +41,11 @@ class Comparison(list):
 
     def to_csv(self, path: Union[str, "os.PathLike[str]"]) -> None:
         """Write the columns as CSV (RFC 4180), without the curves."""
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, self.columns, extrasaction="ignore")
-            writer.writeheader()
-            writer.writerows(self)
+        text = io.StringIO()
+        writer = csv.DictWriter(text, self.columns, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(self)
+        write_whole(path, text.getvalue())
 
     def plot(self, axes: Any = None) -> Any:
         """Error against time of each run, with matplotlib, on axes or on new ones; returns the axes."""
@@ -145,7 +150,8 @@ def compare(problems: Any, solvers: Sequence[Any], tolerance: float = 1e-6, law:
     if not time_limit > 0.0:
         raise InputError(f"time_limit is {time_limit}; it must be positive")
     for name in solvers:
-        Solver(name, plugin_path=plugin_path)  # an unknown name or option is said before anything runs
+        if Solver(name, plugin_path=plugin_path).optimized is False:  # an unknown name or option is said here, too
+            warnings.warn(f"{name} was built without optimisation: its times say little", stacklevel=2)
     context = multiprocessing.get_context("fork")
     settings = dict(tolerance=tolerance, law=law, time_limit=None if math.isinf(time_limit) else time_limit)
     result = Comparison()

@@ -12,7 +12,7 @@ def write_whole(path: Union[str, "os.PathLike[str]"], text: str) -> None:
     path = os.fspath(path)
     handle, part = tempfile.mkstemp(dir=os.path.dirname(path) or ".", prefix=".delassus-")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
             file.write(text)
         mask = os.umask(0)
         os.umask(mask)

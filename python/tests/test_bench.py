@@ -100,6 +100,18 @@ class Runs(unittest.TestCase):
             self.assertEqual((len(first), len(again), lines), (2, 1, 2))
             self.assertEqual((output / "results.jsonl").read_text().count('"kind":"solve"'), 2)
 
+    def test_a_folder_of_the_users_is_left_alone(self):
+        with tempfile.TemporaryDirectory() as folder:
+            mine = Path(folder) / "suite.yaml"
+            mine.write_text("mine")
+            given = dict(solvers=["pgs"], scenes=[], timesteppers=[], problems=[problem()])
+            with self.assertRaisesRegex(delassus.InputError, "holds suite.yaml, which delassus did not write"):
+                delassus.bench(suite(**given), output=folder)
+            with self.assertRaisesRegex(delassus.InputError, "did not write it"):
+                problem().write(mine)
+            self.assertEqual([path.name for path in Path(folder).iterdir()], ["suite.yaml"])
+            self.assertEqual(mine.read_text(), "mine")
+
     def test_files_and_relative_paths(self):
         before = os.getcwd()
         os.chdir(SOURCE / "examples")

@@ -7,9 +7,11 @@ import io
 import os
 import re
 import unittest
+import warnings
 from pathlib import Path
 
 import delassus
+import numpy as np
 from delassus import _delassus
 
 SOURCE = Path(os.environ["DELASSUS_SOURCE_DIR"])
@@ -19,7 +21,8 @@ class Documents(unittest.TestCase):
     def run_blocks(self, page, count):
         blocks = re.findall(r"^```python\n(.*?)^```", (SOURCE / page).read_text(encoding="utf-8"), re.M | re.S)
         self.assertEqual(len(blocks), count)
-        names, printed = {}, io.StringIO()
+        self.names = names = {}
+        printed = io.StringIO()
         before = os.getcwd()
         os.chdir(SOURCE)
         try:
@@ -32,6 +35,19 @@ class Documents(unittest.TestCase):
 
     def test_python_page(self):
         self.assertTrue(self.run_blocks("docs/python.md", 9).startswith("solved"))
+        # The page's solver where a projection may divide by zero: contacts that open straight up, that open sideways, that
+        # touch without a load, and that press without a tangential load.
+        for a, solution in (((1, 0, 0), (0, 0, 0)), ((1, 0.1, -0.2), (0, 0, 0)), ((0, 0, 0), (0, 0, 0)),
+                            ((-1, 0, 0), (1, 0, 0))):
+            for mu in (0.0, 0.3):
+                for law in ("associated", "coulomb"):
+                    problem = delassus.Problem(2 * np.eye(3), np.eye(3), np.array(a, float), np.zeros(3),
+                                               [delassus.Cone.friction(mu)], law=law)
+                    with warnings.catch_warnings():
+                        warnings.simplefilter("error")
+                        result = delassus.solve(problem, "sweeps", tolerance=1e-10, max_iterations=1000)
+                    self.assertTrue(result.solved, (a, mu, law, result))
+                    np.testing.assert_allclose(result.lam, solution, atol=1e-8)
 
     def test_readme(self):
         self.assertTrue(self.run_blocks("README.md", 1).startswith("solved"))
@@ -39,6 +55,12 @@ class Documents(unittest.TestCase):
     def test_the_page_names_every_public_name(self):
         page = (SOURCE / "docs" / "python.md").read_text(encoding="utf-8")
         self.assertEqual([name for name in delassus.__all__ if name not in page and name != "StepRecord"], [])
+
+    def test_the_package_shows_what_is_ours(self):
+        self.assertEqual(sorted(name for name in dir(delassus) if not name.startswith("_")), sorted(delassus.__all__))
+        self.assertLessEqual({"__all__", "__doc__", "__file__", "__version__"}, set(dir(delassus)))
+        for name in delassus.__all__:
+            self.assertTrue(getattr(delassus, name).__module__.startswith("delassus"), name)
 
 
 class Stubs(unittest.TestCase):

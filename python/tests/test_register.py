@@ -30,9 +30,11 @@ class Thirty:
     def project(self, cone, lam):
         if cone.kind == "friction":
             normal, tangential = lam[0], np.linalg.norm(lam[1:])
+            if cone.mu * tangential <= -normal:
+                return np.zeros(len(lam))
             if tangential <= cone.mu * normal:
                 return lam
-            normal = max(0.0, (normal + cone.mu * tangential) / (1 + cone.mu**2))
+            normal = (normal + cone.mu * tangential) / (1 + cone.mu**2)
             return np.r_[normal, lam[1:] * cone.mu * normal / tangential]
         if cone.kind == "box":
             return np.clip(lam, cone.lo, cone.hi)
@@ -127,6 +129,27 @@ class Registered(unittest.TestCase):
         contact = delassus.Problem(np.eye(1), np.eye(1), [1.0], [0.0], [Cone.nonnegative()])
         with self.assertRaises(delassus.Unsupported):
             delassus.solve(contact, "raiser")
+
+    def test_a_contact_that_opens_straight_up(self):
+        for mu in (0.0, 0.3):
+            problem = delassus.Problem(2 * np.eye(3), np.eye(3), [1.0, 0.0, 0.0], np.zeros(3), [Cone.friction(mu)])
+            result = delassus.solve(problem, "thirty", max_iterations=100)
+            self.assertTrue(result.solved, result)
+            np.testing.assert_array_equal(result.lam, 0.0)
+
+    def test_a_failed_solve_shows_no_error(self):
+        nan = type("Nan", (), {"solve": lambda self, problem, request: (np.full(3, np.nan), np.full(3, np.nan))})
+        delassus.register(nan)
+        problem = delassus.Problem(2 * np.eye(3), np.eye(3), [1.0, 0.0, 0.0], np.zeros(3), [Cone.friction(0.3)])
+        for name, status in (("nan", "numerical_failure"), ("raiser_of_contacts", "error")):
+            if name != "nan":
+                delassus.register(type("Raiser_of_contacts", (), {"solve": Raiser.solve}))
+            result = delassus.solve(problem, name)
+            self.assertEqual(result.status, status)
+            self.assertNotIn("natural error", repr(result))
+            self.assertIn("no answer", repr(result))
+        liar = delassus.solve(problem, "liar")  # x = 0: u = 0, and only the momentum is not balanced
+        self.assertIn("balance error", repr(liar))
 
     def test_works_in_a_scene(self):
         scene = ("step: 0.01\nend: 0.5\nmaterials: {m: {friction: 0.3}}\nbodies:\n"

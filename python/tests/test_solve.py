@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import tempfile
 import threading
 import time
 import unittest
@@ -137,6 +138,28 @@ class Results(unittest.TestCase):
         self.assertEqual(found["pgs"]["options"]["omega"]["type"], "real")
         self.assertIn("friction", found["pgs"]["capabilities"])
         self.assertFalse(set(found) & set(delassus.unbuilt()))
+        self.assertTrue(all(plugin["optimized"] in (True, False, None) for plugin in found.values()))
+
+    def test_a_rejected_plugin_is_listed_and_explained(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "mine.so").write_bytes(b"no library")
+            self.assertEqual([(row["name"], Path(row["path"]).name) for row in delassus.rejected([folder])],
+                             [("mine", "mine.so")])
+            for attempt in (lambda: delassus.solve(self.pile, "mine", plugin_path=[folder]),
+                            lambda: delassus.Solver("mine", plugin_path=[folder]),
+                            lambda: delassus.compare(self.pile, ["mine"], plugin_path=[folder])):
+                with self.assertRaisesRegex(delassus.InputError, "mine.so: it has no sidecar"):
+                    attempt()
+
+    def test_a_start_is_a_result_or_a_pair(self):
+        x, lam = np.zeros(self.pile.n), np.zeros(self.pile.m)
+        for start in (np.zeros(5), x, 3.0, "x", [], (x,), (x, lam, lam), {"x": x, "lam": lam}, iter((x, lam))):
+            with self.assertRaisesRegex(delassus.InputError, "a Result or"):
+                delassus.solve(self.pile, "apgd", start=start)
+        with self.assertRaisesRegex(delassus.InputError, "the problem has n"):
+            delassus.solve(self.pile, "apgd", start=(np.zeros(5), lam))
+        for start in ((x, lam), [x, lam], (list(x), list(lam))):
+            self.assertTrue(delassus.solve(self.pile, "apgd", tolerance=1e-2, start=start).solved)
 
 
 class KeptSolvers(unittest.TestCase):

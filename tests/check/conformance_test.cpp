@@ -152,9 +152,24 @@ TEST(Conformance, FindsTheOneRuleThatIsBroken) {
     expect_failure(analyzes, "reuse/right_hand_sides", "new analysis");
     expect_failure(analyzes, "reuse/values", "new analysis");
     EXPECT_EQ(analyzes.count(Verdict::Failed), 2u) << failures_of(analyzes);
+    expect_only_failure(run_conformance(test::fixture("remembers")), "instances/memory", "for the second time");
+    expect_failure(run_conformance(test::fixture("divides_by_zero")), "known/apex_friction_reduced", "not finite");
     expect_failure(run_conformance(test::fixture("shares_state")), "instances/interleaved", "false_claim");
     expect_failure(run_conformance(test::fixture("writes_beyond")), "progress/iterates", "beyond the ends of λ");
     EXPECT_TRUE(run_conformance(test::fixture("newer_minor")).passed());
+}
+
+TEST(Conformance, WarnsOfAPluginBuiltWithoutOptimisation) {
+    const auto report = run_conformance(test::fixture("unoptimized"));
+    EXPECT_TRUE(report.passed()) << failures_of(report);
+    EXPECT_EQ(report.count(Verdict::Warning), 1u);
+    ASSERT_NE(result_of(report, "identity/build"), nullptr);
+    EXPECT_EQ(result_of(report, "identity/build")->verdict, Verdict::Warning);
+    EXPECT_EQ(nlohmann::json::parse(to_json(report)).at("passed"), true);
+    EXPECT_NE(to_json(report).find("\"warning\""), std::string::npos);
+    const auto silent = run_conformance(test::fixture("minimal"));
+    EXPECT_EQ(result_of(silent, "identity/build")->verdict, Verdict::Skipped);
+    EXPECT_NE(result_of(silent, "identity/build")->detail.find("DELASSUS_BUILD"), std::string::npos);
 }
 
 TEST(Conformance, FindsLeaks) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Finding plugins by their sidecars, and loading none before it is chosen.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -117,6 +118,109 @@ TEST(Discovery, SaysWhatIsWrongWithASidecar) {
     for (const auto& [file, words] : cases)
         EXPECT_NE(reason_of(registry, path / file).find(words), std::string::npos)
             << file << ": " << reason_of(registry, path / file);
+}
+
+TEST(Discovery, OneLibraryHasOneSidecar) {
+    const test::TemporaryFolder folder;
+    install("sweeps", folder.path());
+    write_sidecar(folder.path(), "a_copy", sidecar_of("sweeps"));
+    write_sidecar(folder.path(), "z_copy", sidecar_of("sweeps"));
+    const Registry registry({folder.path()});
+    EXPECT_EQ(registry.find("sweeps").version, "1.0") << "its own sidecar counts";
+    for (const char* copy : {"a_copy.json", "z_copy.json"}) {
+        const auto reason = reason_of(registry, folder.path() / copy);
+        EXPECT_NE(reason.find("its library sweeps.so has another sidecar, sweeps.json"), std::string::npos) << reason;
+    }
+}
+
+// Whoever names a rejected plugin reads why it was rejected, by the name of the plugin or of its file.
+TEST(Discovery, SaysWhyAPluginThatIsNamedWasRejected) {
+    const test::TemporaryFolder folder;
+    const auto& path = folder.path();
+    fs::copy_file(fixture("direct"), path / "direct.so");
+    auto json = sidecar_of("sweeps");
+    json["abi"] = {99, 0};
+    json["name"] = "of_tomorrow";
+    fs::copy_file(fixture("sweeps"), path / "sweeps.so");
+    write_sidecar(path, "sweeps", json);
+    json = sidecar_of("minimal");
+    write_sidecar(path, "minimal", json);
+    std::ofstream(path / "malformed.json") << "{";
+    const Registry registry({path});
+    const std::pair<const char*, const char*> cases[] = {{"direct", "no sidecar"},
+                                                         {"sweeps", "version 99.0"},
+                                                         {"of_tomorrow", "version 99.0"},
+                                                         {"minimal", "its library minimal.so is missing"},
+                                                         {"malformed", "not a valid sidecar"}};
+    const auto scene = path / "scene.yaml", config = path / "config.yaml";
+    for (const auto& [name, words] : cases) {
+        SCOPED_TRACE(name);
+        try {
+            static_cast<void>(registry.find(name));
+            FAIL() << "it was found";
+        } catch (const InputError& error) {
+            const std::string sentence = error.what();
+            EXPECT_NE(sentence.find(fmt::format("the plugin \"{}\" was rejected", name)), std::string::npos)
+                << sentence;
+            EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
+        }
+        std::ofstream(config) << "solver: " << name << "\nplugin_path: [" << path.string() << "]\n";
+        std::ofstream(scene) << "step: 0.01\nend: 0.1\nsolver: " << name
+                             << "\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
+        const std::string problem = std::string(DELASSUS_SOURCE_DIR) + "/examples/problems/chain";
+        for (const std::vector<std::string>& arguments :
+             {std::vector<std::string>{"solve", problem, "--solver", name, "--plugin-path", path},
+              {"solve", problem, "--config", config},
+              {"compare", problem, "--solvers", name, "--plugin-path", path, "-o", path / "out"},
+              {"plugins", "info", name, "--plugin-path", path},
+              {"plugins", "check", name, "--plugin-path", path},
+              {"plan", scene, "--plugin-path", path},
+              {"run", scene, "--plugin-path", path, "-o", path / "run"}}) {
+            const auto result = run_command(arguments);
+            EXPECT_EQ(result.exit_code, 2) << arguments[0];
+            EXPECT_NE(result.err.find(words), std::string::npos) << arguments[0] << ": " << result.err;
+        }
+    }
+    const PluginPath environment("relative/folder");
+    const auto result = run_command({"plugins", "info", "elsewhere"});
+    EXPECT_NE(result.err.find("the folder relative/folder was not searched"), std::string::npos) << result.err;
+}
+
+TEST(Discovery, ShowsWhatWasBuiltWithoutOptimisation) {
+    const test::TemporaryFolder folder;
+    const auto library = folder.path() / "unoptimized.so";
+    fs::copy_file(fixture("unoptimized"), library);
+    const std::string words = "built without optimisation";
+    const auto described = run_command({"plugins", "describe", library, "--sidecar"});
+    EXPECT_EQ(described.exit_code, 0) << described.err;
+    EXPECT_NE(described.err.find("warning: unoptimized was " + words), std::string::npos) << described.err;
+    EXPECT_EQ(nlohmann::json::parse(test::content_of(folder.path() / "unoptimized.json")).at("optimized"), false);
+    const std::string path = folder.path().string();
+    EXPECT_NE(run_command({"plugins", "list", "--plugin-path", path}).out.find(words), std::string::npos);
+    EXPECT_NE(run_command({"plugins", "info", "unoptimized", "--plugin-path", path}).out.find(words),
+              std::string::npos);
+
+    // By name, by path without a sidecar, and as a stage of another solver.
+    const std::string problem = std::string(DELASSUS_SOURCE_DIR) + "/examples/problems/box_stack";
+    for (const std::string& solver : {std::string("unoptimized"), fixture("unoptimized").string(),
+                                      std::string("apgd(finish=unoptimized,finish_at=1e-2)")}) {
+        const auto out = folder.path() / "out";
+        const auto compared = run_command({"compare", problem, "--solvers", solver, "--plugin-path", path, "-o", out,
+                                           "--tolerance", "1e-3", "--repeats", "1"});
+        EXPECT_EQ(compared.exit_code, 0) << compared.err;
+        EXPECT_NE(compared.err.find("warning: unoptimized was " + words), std::string::npos) << compared.err;
+        EXPECT_NE(compared.out.find("unoptimized was " + words), std::string::npos) << compared.out;
+        EXPECT_NE(test::content_of(out / "results.json").find("unoptimized was " + words), std::string::npos);
+    }
+    const auto quiet = run_command({"compare", problem, "--solvers", "apgd", "-o", folder.path() / "quiet"});
+    EXPECT_EQ(quiet.err.find(words), std::string::npos) << quiet.err;
+    std::ofstream(folder.path() / "suite.yaml") << "problems: [" << problem
+                                                << "]\nsolvers: [unoptimized]\ntolerances: [1e-3]\nrepeats: 1\n"
+                                                   "references: none\n";
+    const auto bench = run_command(
+        {"bench", "run", folder.path() / "suite.yaml", "--plugin-path", path, "-o", folder.path() / "bench"});
+    EXPECT_EQ(bench.exit_code, 0) << bench.err;
+    EXPECT_NE(bench.err.find("warning: unoptimized was " + words), std::string::npos) << bench.err;
 }
 
 TEST(Discovery, RefusesToLoadByAStaleSidecar) {

@@ -38,6 +38,9 @@ TEST(Isolated, KnowsFailureAndSkip) {
     const auto skipped = run([]() -> std::string { throw Skip("another reason"); });
     EXPECT_EQ(skipped.verdict, Verdict::Skipped);
     EXPECT_EQ(skipped.detail, "another reason");
+    const auto warning = run([]() -> std::string { throw Warning("a third reason"); });
+    EXPECT_EQ(warning.verdict, Verdict::Warning);
+    EXPECT_EQ(warning.detail, "a third reason");
     const auto number = run([]() -> std::string { throw 42; });
     EXPECT_EQ(number.verdict, Verdict::Failed);
     EXPECT_NE(number.detail.find("exception"), std::string::npos);

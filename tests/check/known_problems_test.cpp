@@ -71,6 +71,31 @@ TEST(KnownProblems, AreWhatTheirNamesSay) {
             }
 }
 
+/// From zero the first step ends at −u, here −r, of which the second block's tangential part alone is not zero, to the
+/// bit.
+TEST(KnownProblems, ApexBlocksBeginOnTheAxis) {
+    int seen = 0;
+    for (const auto& known : known_problems()) {
+        if (!known.problem.name.starts_with("apex_friction")) continue;
+        SCOPED_TRACE(known.problem.name);
+        const Problem& problem = known.problem;
+        std::vector<double> r = problem.b;
+        if (problem.n() > 0) {
+            std::vector<double> velocity = problem.a;
+            for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] /= problem.H.value[i];
+            problem.D.multiply_add(1.0, velocity.data(), r.data());
+        }
+        ASSERT_EQ(r.size(), 12u);
+        for (std::size_t block = 0; block < 4; ++block)
+            for (std::size_t i = 1; i < 3; ++i) EXPECT_EQ(r[3 * block + i] == 0.0, block != 1 || i != 1);
+        EXPECT_GT(r[0], 0.0);
+        EXPECT_EQ(r[6], 0.0);
+        EXPECT_LT(r[9], 0.0);
+        ++seen;
+    }
+    EXPECT_EQ(seen, 4);
+}
+
 TEST(KnownProblems, NewValuesKeepThePattern) {
     for (const auto& known : known_problems()) {
         if (known.problem.H.entries() + known.problem.E.entries() == 0) continue;

@@ -2,6 +2,7 @@
 // Misbehaving plugins through libdelassus: each gets its sentence, and the process goes on.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -33,8 +34,8 @@ std::string refusal_of(const std::string& name) {
 
 TEST(Load, RefusesBrokenHandshakesWithASentence) {
     const std::pair<const char*, std::vector<const char*>> cases[] = {
-        {"wrong_abi", {"99.4", "this is version 2.4"}},
-        {"before_release", {"built for version 1.0", "this is version 2.4"}},
+        {"wrong_abi", {"99.5", "this is version 2.5"}},
+        {"before_release", {"built for version 1.0", "this is version 2.5"}},
         {"wrong_magic", {"magic number"}},
         {"small_descriptor", {"24 bytes"}},
         {"bad_name", {"../Bad Name", "not a word"}},
@@ -81,6 +82,18 @@ TEST(Load, TakesOtherMinorVersions) {
 TEST(Load, ReadsNothingBehindAnOlderDescriptor) {
     EXPECT_EQ(Plugin::load(fixture("older_minor"))->descriptor().accepts, nullptr);
     EXPECT_NE(Plugin::load(fixture("newer_minor"))->descriptor().accepts, nullptr);
+}
+
+TEST(Load, KnowsWhetherAPluginWasOptimised) {
+    EXPECT_EQ(Plugin::load(fixture("unoptimized"))->info().build, DELASSUS_BUILD_UNOPTIMIZED);
+    EXPECT_EQ(Plugin::load(fixture("older_minor"))->info().build, DELASSUS_BUILD_UNKNOWN);
+    EXPECT_EQ(Plugin::load(fixture("minimal"))->info().build, DELASSUS_BUILD_UNKNOWN);
+#if defined(__OPTIMIZE__)
+    EXPECT_EQ(Plugin::load(fixture("sweeps"))->info().build, DELASSUS_BUILD_OPTIMIZED);
+#endif
+    const auto names = unoptimized_plugins();
+    EXPECT_NE(std::find(names.begin(), names.end(), "unoptimized"), names.end());
+    EXPECT_EQ(std::find(names.begin(), names.end(), "minimal"), names.end());
 }
 
 TEST(Load, RefusesADescriptorShorterThanThatOfVersion20) {

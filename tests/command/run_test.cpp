@@ -110,7 +110,7 @@ TEST(Run, LeavesForeignFilesAlone) {
     std::ofstream(scratch / "thesis.tex") << "x";
     const auto result = run_command("run " + scene("pendulum") + " --end 0.01 -o " + scratch.path().string());
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_NE(result.err.find("holds thesis.tex, which no run wrote"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("holds thesis.tex, which delassus did not write"), std::string::npos) << result.err;
     EXPECT_TRUE(std::filesystem::exists(scratch / "thesis.tex"));
 }
 

@@ -51,6 +51,50 @@ TEST(SolveCommand, ExitCodesTellWhatHappened) {
     EXPECT_EQ(run_command("solve " + stack + " --solver ./no-such-library.so").exit_code, 2);
 }
 
+TEST(SolveCommand, TakesOptionsBehindTheName) {
+    const std::string base = "solve " + example("box_stack") + " --tolerance 1e-4 --json --solver ";
+    const auto options = [&](const std::string& arguments) {
+        const auto result = run_command(base + arguments);
+        EXPECT_EQ(result.exit_code, 0) << result.err;
+        return Json::parse(result.out)["options"];
+    };
+    EXPECT_EQ(options("'pgs(omega=1.2)'"), (Json{{"omega", "1.2"}}));
+    EXPECT_EQ(options("'ssn(follow_law=false)' --law coulomb"), (Json{{"follow_law", "false"}}));
+    EXPECT_EQ(options("'pgs(omega=1.2,variant=symmetric)' --set omega=1.1"),
+              (Json{{"omega", "1.1"}, {"variant", "symmetric"}}));
+    const auto wrong = run_command(base + "'pgs(omga=1.2)'");
+    EXPECT_EQ(wrong.exit_code, 2);
+    EXPECT_NE(wrong.err.find("did you mean \"omega\"?"), std::string::npos) << wrong.err;
+}
+
+TEST(Command, NamesTheNearestCommandAndOption) {
+    const std::string stack = example("box_stack");
+    const std::pair<std::string, std::string> cases[] = {
+        {"runn scene.yaml", "`delassus` has no command \"runn\"; did you mean \"run\"?"},
+        {"Solve " + stack, "`delassus` has no command \"Solve\"; did you mean \"solve\"?"},
+        {"xyzzyplugh", "`delassus` has no command \"xyzzyplugh\"; there are solve, run, "},
+        {"plugins", "`delassus plugins` needs a command: list, info, check, describe"},
+        {"plugins lst", "`delassus plugins` has no command \"lst\"; did you mean \"list\"?"},
+        {"bench rnu quick", "`delassus bench` has no command \"rnu\"; did you mean \"run\"?"},
+        {"--versoin", "`delassus` has no option \"--versoin\"; did you mean \"--version\"?"},
+        {"solve " + stack + " --tolerence 1e-4",
+         "`delassus solve` has no option \"--tolerence\"; did you mean \"--tolerance\"?"},
+        {"solve " + stack + " --tolerence=1e-4",
+         "`delassus solve` has no option \"--tolerence\"; did you mean \"--tolerance\"?"},
+        {"solve --tolerence 1e-4 " + stack,
+         "`delassus solve` has no option \"--tolerence\"; did you mean \"--tolerance\"?"},
+        {"compare --solver pgs " + stack, "`delassus compare` has no option \"--solver\"; did you mean \"--solvers\"?"},
+        {"plugins list --jsno", "`delassus plugins list` has no option \"--jsno\"; did you mean \"--json\"?"},
+        {"solve " + stack + " two", "`delassus solve` has no use for \"two\""},
+    };
+    for (const auto& [arguments, sentence] : cases) {
+        const auto result = run_command(arguments);
+        EXPECT_EQ(result.exit_code, 2) << arguments;
+        EXPECT_NE(result.err.find("delassus: " + sentence), std::string::npos) << arguments << ": " << result.err;
+    }
+    EXPECT_EQ(run_command("nothing").err.find("worker"), std::string::npos) << "what is hidden stays hidden";
+}
+
 TEST(SolveCommand, EveryLevelHasHelp) {
     for (const char* level : {"", "solve", "compare", "plugins", "plugins list", "plugins info", "plugins check",
                               "convert", "inspect", "generate"}) {

@@ -117,12 +117,13 @@ TEST_F(View, BadInputIsExplained) {
     refused(scratch.path().string(), "holds no trajectory.h5");
     const auto folder = run_of("pendulum", "--end 0.01");
     refused(folder.string() + " --frames 1", "--frames must be at least 2");
-    std::ofstream(folder / "scene.html") << "earlier";
+    ASSERT_EQ(run_command("view " + folder.string()).exit_code, 0);
+    const std::string earlier = text_of(folder / "scene.html");
     std::ofstream(folder / "trajectory.h5", std::ios::trunc) << "not HDF5";
     refused(folder.string(), "cannot be opened");
     // The earlier page is whole, and nothing is beside it.
-    EXPECT_EQ(text_of(folder / "scene.html"), "earlier");
-    EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 7);
+    EXPECT_EQ(text_of(folder / "scene.html"), earlier);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 8);
     std::ofstream(folder / "report.json") << "{}";
     refused(folder.string(), "is not the report of a run");
     EXPECT_EQ(run_command("view").exit_code, 2);

@@ -39,6 +39,7 @@ protected:
         fs::create_directory(disk_);
         run("generate sphere_pile INPUT/pile --set contacts=60");
         run("generate box_stack INPUT/small --set boxes=1");
+        if (GetParam().needs_hdf5) run("convert INPUT/pile INPUT/pile.h5");
         std::ofstream(input_ / "suite.yaml") << "title: T\nproblems: [pile]\nsolvers: [apgd]\ntolerances: [1e-3]\n"
                                                 "repeats: 1\nreferences: {time_limit: 1}\n";
     }
@@ -109,6 +110,12 @@ INSTANTIATE_TEST_SUITE_P(
                "convert INPUT/pile DISK/p.hdf5 --law coulomb",
                true},
         Writer{"new_hdf5", {}, "convert INPUT/pile DISK/p.hdf5 --law coulomb", true},
+        Writer{"one_file", {"convert INPUT/small DISK/p.h5"}, "convert INPUT/pile DISK/p.h5", true},
+        Writer{"new_one_file", {}, "convert INPUT/pile DISK/p.h5", true},
+        Writer{"pile_in_one_file", {}, "generate pile DISK/p.h5 --set contacts=2000", true},
+        Writer{"solution_in_one_file", {}, "solve INPUT/pile.h5 --solver apgd --solution DISK/s.h5", true},
+        Writer{"new_run", {}, run_pendulum + "DISK/run", true}, Writer{"new_comparison", {}, compare_pile},
+        Writer{"equilibrium", {}, "equilibrium " + example_scene("lees_frame") + " -o DISK/e"},
         Writer{"convert", {"convert INPUT/small DISK/p --law coulomb"}, "convert INPUT/pile DISK/p --law coulomb"},
         Writer{"solution",
                {"solve INPUT/small --solver apgd --solution DISK/s"},

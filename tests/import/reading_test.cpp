@@ -45,6 +45,27 @@ TEST(Import, RefusesWhatIsNoModel) {
     EXPECT_NE(refusal("a.xml", "<mujoco/>", settings).find("must be positive"), std::string::npos);
 }
 
+std::string nested(const std::string& root, const std::string& tag, int depth) {
+    std::string text = "<" + root + ">";
+    for (int k = 0; k < depth; ++k) text += "<" + tag + " name=\"a>b\">";
+    for (int k = 0; k < depth; ++k) text += "</" + tag + ">";
+    return text + "</" + root + ">";
+}
+
+// The stack of a library's parser ends somewhere.
+TEST(Import, BoundsHowDeepElementsAreNested) {
+    for (const auto& [root, tag] : {std::pair{"robot", "link"}, {"sdf", "model"}, {"mujoco", "body"}})
+        EXPECT_EQ(refusal("deep.xml", nested(root, tag, 100000)),
+                  "deep.xml: its elements are nested more than 1000 deep");
+    const auto flat = refusal(
+        "flat.xml", "<?xml version=\"1.0\"?><!-- <a><b> --><robot name='r'>" + [] {
+            std::string all;
+            for (int k = 0; k < 3000; ++k) all += "<gazebo x='</'/>";
+            return all;
+        }() + "<![CDATA[<a><a>]]></robot>");
+    EXPECT_EQ(flat.find("nested"), std::string::npos) << flat;
+}
+
 TEST(Import, DoesNotWriteOverTheModel) {
     const ScratchFolder folder;
     const auto model = (folder / "model.urdf").string();
@@ -58,6 +79,16 @@ TEST(Import, DoesNotWriteOverTheModel) {
 }
 
 #ifdef DELASSUS_HAS_URDF
+// As urdfdom itself does, link by link.
+TEST(ImportUrdf, AChainOnWhichTheLibraryFailsIsRefused) {
+    std::string links, hinges;
+    for (int k = 0; k < 100000; ++k) {
+        links += link_of(std::to_string(k));
+        if (k > 0) hinges += hinge_of(std::to_string(k - 1), std::to_string(k));
+    }
+    EXPECT_EQ(refusal("long.urdf", urdf_of(links + hinges)), "long.urdf is damaged: liburdfdom fails on it.");
+}
+
 TEST(ImportUrdf, RefusesWithOneSentence) {
     ImportSettings settings;
     settings.keyframe = "home";
@@ -197,6 +228,19 @@ TEST(ImportMjcf, ListsWhatAFreeJointHas) {
         "</body>");
     EXPECT_EQ(items(import_model(folder / "a.xml", folder / "s.yaml").lost),
               (std::vector<std::string>(4, "joint \"f\"")));
+}
+
+TEST(ImportMjcf, LowersAFrictionThatScenesDoNotHave) {
+    const ScratchFolder folder;
+    std::ofstream(folder / "a.xml") << mjcf_of(
+        "<geom type='plane' size='1 1 1' friction='1e15'/><body pos='0 0 1'><freejoint/>"
+        "<geom type='sphere' size='0.1' friction='1e15'/></body>");
+    const auto imported = import_model(folder / "a.xml", folder / "s.yaml");
+    EXPECT_NE(std::ranges::find_if(
+                  imported.lost,
+                  [](const NotCarriedOver& one) { return one.why.find("it becomes 10000") != std::string::npos; }),
+              imported.lost.end());
+    EXPECT_NO_THROW(static_cast<void>(parse_scene(imported.yaml, "s.yaml")));
 }
 
 TEST(ImportMjcf, MakesAChainOfABodyWithSeveralJoints) {

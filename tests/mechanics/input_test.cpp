@@ -147,6 +147,10 @@ TEST(Refusals, OfMotorsSpringsAndMaterials) {
         system.add_spring(spring);
     });
     expect_refused("the friction coefficient is -0.1", [](auto& system) { system.add_material({-0.1, 0.0}); });
+    expect_refused("the friction coefficient is 10000000000; it must be at least 0 and at most 10000",
+                   [](auto& system) {
+                       system.add_material({1e10, 0.0});
+                   });
     expect_refused("the restitution is 1.5", [](auto& system) { system.add_material({0.1, 1.5}); });
     expect_refused("a shape has the material 0; there are 0", [](auto& system) { system.add_shape({}, 0); });
     expect_refused("has no mass and no element gives it any", [](auto& system) {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -116,6 +117,111 @@ TEST_F(MeshFile, WrongSurfacesAreToldInOneSentence) {
     EXPECT_EQ(told("text.xyzw", "no mesh\n").rfind("text.xyzw: no mesh can be read: ", 0), 0U);
     EXPECT_EQ(told("scaled.obj", tetrahedron(0, 0), -1.0), "the scale of a mesh is -1; it must be positive");
     EXPECT_EQ(refusal([] { static_cast<void>(read_surface_mesh("none.obj")); }), "none.obj: there is no such file");
+}
+
+/// A cube of this size about (at, at, −at) m, its faces as lists of corners.
+struct Cube {
+    double size, at;
+
+    static constexpr int faces[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
+                                        {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+    [[nodiscard]] std::string corner(int k) const {
+        const auto x = [&](int bit, double middle) { return middle + ((k >> bit & 1) != 0 ? 0.5 : -0.5) * size; };
+        return fmt::format("{:.17g} {:.17g} {:.17g}", x(2, at), x(1, at), x(0, -at));
+    }
+    [[nodiscard]] std::string obj() const {
+        std::string text = "# a cube\r\n";
+        for (int k = 0; k < 8; ++k) text += fmt::format("v  {}\r\n", corner(k));
+        for (const auto& f : faces) text += fmt::format("f {} {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1, f[3] + 1);
+        return text;
+    }
+    [[nodiscard]] std::string ply(const std::string& last = "3 1 5 7 3") const {
+        std::string text =
+            "ply\nformat ascii 1.0\nelement vertex 8\nproperty uchar red\nproperty double x\nproperty double "
+            "y\nproperty "
+            "double z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n";
+        for (int k = 0; k < 8; ++k) text += fmt::format("7 {}\n", corner(k));
+        for (int k = 0; k < 5; ++k)
+            text += fmt::format("4 {} {} {} {}\n", faces[k][0], faces[k][1], faces[k][2], faces[k][3]);
+        return text + last + "\n";
+    }
+    [[nodiscard]] std::string stl() const {
+        std::string text = "solid s\n";
+        for (const auto& f : faces)
+            for (const auto& t : {std::array{f[0], f[1], f[2]}, std::array{f[0], f[2], f[3]}}) {
+                text += "facet normal 0 0 0\nouter loop\n";
+                for (const int k : t) text += "  vertex " + corner(k) + "\n";
+                text += "endloop\nendfacet\n";
+            }
+        return text + "endsolid s\n";
+    }
+    [[nodiscard]] std::string off() const {
+        std::string text = "OFF\n8 6 0\n";
+        for (int k = 0; k < 8; ++k) text += corner(k) + "\n";
+        for (const auto& f : faces) text += fmt::format("4 {} {} {} {}\n", f[0], f[1], f[2], f[3]);
+        return text;
+    }
+    /// Six times the volume, about a corner.
+    [[nodiscard]] static double volume(const Mesh& mesh) {
+        Mesh moved = mesh;
+        for (auto& vertex : moved.vertices)
+            for (std::size_t i = 0; i < 3; ++i) vertex[i] -= mesh.vertices[0][i];
+        return mesh_files_test::volume(moved);
+    }
+};
+
+TEST_F(MeshFile, ASmallBodyFarFromTheOriginKeepsItsShape) {
+    for (const double at : {0.0, 1.0, 1234.567, 4.0e6}) {
+        const Cube cube{0.01, at};
+        for (const auto& [name, text] :
+             {std::pair{"c.obj", cube.obj()}, {"c.ply", cube.ply("4 1 5 7 3")}, {"c.STL", cube.stl()}}) {
+            const auto parts = read_surface_mesh(write(name, text));
+            ASSERT_EQ(parts.size(), 1U) << name;
+            EXPECT_EQ(parts[0].vertices.size(), 8U) << name;
+            // The text's own digits: 17 of the coordinates.
+            EXPECT_NEAR(Cube::volume(parts[0]) / 1e-6, 1.0, 1e-6 + 1e-15 * at / cube.size) << name << " at " << at;
+            double middle = 0.0;
+            for (const auto& vertex : parts[0].vertices) middle += vertex[1] / 8.0;
+            EXPECT_NEAR(middle, at, 1e-9 + 1e-15 * at) << name;
+        }
+    }
+}
+
+TEST_F(MeshFile, LostDigitsAreTold) {
+    const auto told = [&](const std::string& name, const std::string& text) {
+        const auto file = write(name, text);
+        return refusal([&] { static_cast<void>(read_surface_mesh(file)); });
+    };
+    EXPECT_EQ(told("near.off", Cube{0.01, 1.0}.off()), "taken");
+    const std::string far = told("far.off", Cube{1.0, 4000.0}.off());
+    EXPECT_NE(far.find("single precision, with an error of 2.4e-04 m"), std::string::npos) << far;
+    // Two bodies in one file, far from each other.
+    const std::string two = told("two.obj", tetrahedron(0, 0) + tetrahedron(100000, 4));
+    EXPECT_EQ(two.rfind("two.obj, part 1: a surface of size", 0), 0U) << two;
+}
+
+TEST_F(MeshFile, NumbersAreCheckedBeforeTheyAreUsed) {
+    const auto told = [&](const std::string& name, const std::string& text) {
+        const auto file = write(name, text);
+        return refusal([&] { static_cast<void>(read_surface_mesh(file)); });
+    };
+    const Cube cube{1.0, 0.0};
+    EXPECT_EQ(told("beyond.ply", cube.ply("4 1 5 333 3")).find("beyond.ply: triangle "), 0U)
+        << told("beyond.ply", cube.ply("4 1 5 333 3"));
+    EXPECT_NE(told("beyond.ply", cube.ply("4 1 5 333 3")).find("has the vertex 334, and there are "),
+              std::string::npos);
+    EXPECT_NE(told("below.ply", cube.ply("4 1 5 -7 3")), "taken");
+    std::string obj = cube.obj();
+    obj.replace(obj.rfind("8"), 1, "999");
+    EXPECT_NE(told("beyond.obj", obj), "taken");
+    std::string nan = cube.obj();
+    const auto place = nan.find("0.5 0.5 0.5");
+    nan.replace(place, 3, "nan");
+    const auto line = 1 + std::count(nan.begin(), nan.begin() + static_cast<std::ptrdiff_t>(place), '\n');
+    EXPECT_EQ(told("nan.obj", nan), "nan.obj, line " + std::to_string(line) + ": the vertex is not finite");
+    std::string infinite = cube.stl();
+    infinite.replace(infinite.find("0.5"), 3, "1e999");
+    EXPECT_NE(told("infinite.stl", infinite).find("not finite"), std::string::npos);
 }
 
 #endif

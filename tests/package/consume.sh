@@ -16,14 +16,46 @@ grep -q '^quick: ' "$scratch/suites"
 grep -q "$prefix.*quick.yaml" "$scratch/suites"
 
 # Only what is installed may be used from here on.
-cp -r "$source/examples/plugin" "$source/examples/embed" "$source/examples/system" "$source/examples/problems/box_stack" "$scratch"
-cmake -S "$scratch/plugin" -B "$scratch/plugin/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
-cmake --build "$scratch/plugin/build"
-test -s "$scratch/plugin/build/uzawa.json"
-test "$(nm -D --defined-only "$scratch/plugin/build/uzawa.so" | grep -vc ' A ')" = 1
-"$command" plugins check "$scratch/plugin/build/uzawa.so"
-"$command" solve "$scratch/box_stack" --solver "$scratch/plugin/build/uzawa.so" --tolerance 1e-4
-DELASSUS_PLUGIN_PATH=$scratch/plugin/build "$command" solve "$scratch/box_stack" --solver uzawa --tolerance 1e-4
+cp -r "$source/examples/plugin" "$source/examples/plugin-c" "$source/examples/plugin-rust" "$source/examples/embed" \
+    "$source/examples/system" "$source/examples/problems/box_stack" "$scratch"
+
+# The README's lines for a plugin, with no word on optimisation; whoever chooses one gets it.
+build_plugin() { # FOLDER [cmake argument…]
+    cmake -S "$scratch/plugin" -B "$1" -DCMAKE_PREFIX_PATH="$prefix" "${@:2}" >/dev/null
+    cmake --build "$1"
+}
+optimized() { [ "$(grep -c '"optimized": true' "$1/uzawa.json")" = 1 ]; }
+plugin=$scratch/plugin/build
+build_plugin "$plugin" ${flags:+-DCMAKE_CXX_FLAGS="$flags"}
+optimized "$plugin" || { echo "the plugin was built without optimisation" >&2; exit 1; }
+test "$(nm -D --defined-only "$plugin/uzawa.so" | grep -vc ' A ')" = 1
+"$command" plugins check "$plugin/uzawa.so"
+"$command" solve "$scratch/box_stack" --solver "$plugin/uzawa.so" --tolerance 1e-4
+DELASSUS_PLUGIN_PATH=$plugin "$command" solve "$scratch/box_stack" --solver uzawa --tolerance 1e-4
+if [ -z "$flags" ]; then
+    echo 'set(CMAKE_CXX_FLAGS_INIT -O0)' >"$scratch/toolchain.cmake"
+    build_plugin "$scratch/chosen/type" -DCMAKE_BUILD_TYPE=Debug
+    build_plugin "$scratch/chosen/flags" -DCMAKE_CXX_FLAGS=-O0
+    build_plugin "$scratch/chosen/toolchain" -DCMAKE_TOOLCHAIN_FILE="$scratch/toolchain.cmake"
+    if command -v ninja >/dev/null; then
+        build_plugin "$scratch/chosen/configurations" -G 'Ninja Multi-Config' -DCMAKE_LIBRARY_OUTPUT_DIRECTORY_DEBUG="$scratch/chosen/configurations"
+    fi
+    for folder in "$scratch"/chosen/*; do
+        if optimized "$folder"; then echo "$folder: the choice was overruled" >&2; exit 1; fi
+    done
+    "$command" plugins check "$scratch/chosen/type/uzawa.so" >"$scratch/checked"
+    grep 'WARNING.*identity/build' "$scratch/checked"
+    "$command" compare "$scratch/box_stack" --solvers uzawa --plugin-path "$scratch/chosen/type" --tolerance 1e-2 --repeats 1 \
+        -o "$scratch/warned" 2>&1 | grep 'warning: uzawa was built without optimisation'
+fi
+cmake -S "$scratch/plugin-c" -B "$scratch/plugin-c/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_C_FLAGS="$flags" >/dev/null
+cmake --build "$scratch/plugin-c/build"
+"$command" plugins check "$scratch/plugin-c/build/dense_c.so" | tail -1
+cmake --install "$plugin" --prefix "$scratch/elsewhere"
+installed=$(dirname "$(find "$scratch/elsewhere" -name uzawa.so)")
+test -s "$installed/uzawa.json"
+[ "${installed#"$scratch/elsewhere/"}" = "$(cd "$prefix" && dirname "$(find lib* -path '*/delassus/plugins/apgd.so')")" ]
+DELASSUS_PLUGIN_PATH=$installed "$command" plugins info uzawa
 
 cmake -S "$scratch/embed" -B "$scratch/embed/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
 cmake --build "$scratch/embed/build"
@@ -52,8 +84,38 @@ for engine in dart:dart:libdart-dev bullet:bullet-float64:libbullet-dev; do
     for solver in auto ssn; do "$scratch/engines/$folder/build/scenes" "$solver"; done
 done
 
+if ! command -v pkg-config >/dev/null; then
+    echo "$prefix: used as strangers would, but for pkg-config, which was not found"
+    exit 0
+fi
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name delassus.pc)")
 export PKG_CONFIG_PATH
+# Plugins by hand: the lines of docs/writing-a-plugin.md.
+awk '/^```/ { inside = ($0 == "```sh"); next } inside' "$source/docs/writing-a-plugin.md" >"$scratch/lines"
+mkdir "$scratch/by-hand"
+cp "$scratch/plugin/uzawa.cpp" "$scratch/plugin-c/dense.c" "$scratch/plugin-rust/dense.rs" "$scratch/by-hand"
+built=0
+while IFS= read -r line <&3; do
+    if [[ $line == rustc* ]] && ! command -v rustc >/dev/null; then
+        echo "skipped: rustc was not found"
+        break
+    fi
+    echo "== $line"
+    (cd "$scratch/by-hand" && PATH=$prefix/bin:$PATH eval "$line")
+    built=$((built + 1))
+done 3<"$scratch/lines"
+[ "$built" -ge 5 ] || { echo "docs/writing-a-plugin.md has lost its lines" >&2; exit 1; }
+for library in "$scratch"/by-hand/*.so; do
+    grep -q '"optimized": true' "${library%.so}.json"
+    if [ -z "$flags" ]; then "$command" plugins check "$library" | tail -1; fi
+done
+# Every library of the CMake package has its module.
+for module in delassus delassus-sdk $(cd "$prefix" && find lib* -name 'libdelassus_*.so' | sed 's|.*/lib||; s|\.so$||; s|_|-|g'); do
+    pkg-config --exists --print-errors "$module"
+done
+g++ -std=c++20 $flags "$scratch/system/system.cpp" $(pkg-config --cflags --libs delassus-dynamics) \
+    -Wl,-rpath,"$(pkg-config --variable=libdir delassus)" -o "$scratch/system-pc"
+"$scratch/system-pc" newmark cholmod
 cc -std=c99 -pedantic "$source/examples/dump/dump.c" $(pkg-config --cflags delassus) -lm -o "$scratch/dump"
 "$scratch/dump" "$scratch/two_blocks"
 "$command" compare "$scratch/two_blocks" --solvers pgs,ssn -o "$scratch/compared"

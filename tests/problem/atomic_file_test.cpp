@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <fstream>
 
 #include "delassus/error.hpp"
@@ -81,24 +80,22 @@ TEST(AtomicFile, RefusesFoldersAndMissingParents) {
                     "there is no folder|none");
 }
 
-constexpr std::array<std::string_view, 1> own = {"own"};
-
 TEST(AtomicFolder, AppearsOnCommitOnly) {
     const ScratchFolder scratch;
     {
-        AtomicFolder folder(scratch / "out", own);
+        AtomicFolder folder(scratch / "out", "test");
         write_plainly(folder.path() / "own", "1");
         EXPECT_FALSE(fs::exists(scratch / "out"));
         folder.commit();
     }
     EXPECT_EQ(text_of(scratch / "out/own"), "1");
     {
-        AtomicFolder folder(scratch / "out/", own);  // abandoned
+        AtomicFolder folder(scratch / "out/", "test");  // abandoned
         write_plainly(folder.path() / "own", "2");
     }
     EXPECT_EQ(text_of(scratch / "out/own"), "1");
     {
-        AtomicFolder folder(scratch / "out/", own);
+        AtomicFolder folder(scratch / "out/", "test");
         write_plainly(folder.path() / "own", "3");
         folder.commit();
     }
@@ -109,13 +106,14 @@ TEST(AtomicFolder, AppearsOnCommitOnly) {
 TEST(AtomicFolder, NeverReplacesWhatIsNotItsOwn) {
     const ScratchFolder scratch;
     fs::create_directory(scratch / "out");
-    EXPECT_NO_THROW(AtomicFolder(scratch / "out", own));  // empty
+    EXPECT_NO_THROW(AtomicFolder(scratch / "out", "test"));  // empty
     write_plainly(scratch / "out/thesis.tex", "years of work");
-    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "out", own); }), "thesis.tex|would be lost");
+    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "out", "test"); }),
+                    "thesis.tex|did not write");
     write_plainly(scratch / "file", "");
-    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "file", own); }), "not a folder");
+    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "file", "test"); }), "did not write it");
     fs::create_directories(scratch / "deep/own");
-    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "deep", own); }), "own|would be lost");
+    expect_sentence(sentence_of<InputError>([&] { AtomicFolder(scratch / "deep", "test"); }), "own|did not write");
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(ProblemFolder, ReplacesOnlyProblemFolders) {
     write_problem(reduced, scratch / "p");
     EXPECT_FALSE(fs::exists(scratch / "p/H.mtx"));
     expect_same(reduced, read_problem(scratch / "p"));
-    expect_sentence(sentence_of<InputError>([&] { write_solution({{}, {1.0}}, "", scratch / "p"); }), "would be lost");
+    expect_sentence(sentence_of<InputError>([&] { write_solution({{}, {1.0}}, "", scratch / "p"); }), "as \"problem\"");
     Problem invalid = awkward();
     invalid.b[0] = infinity;
     EXPECT_THROW(write_problem(invalid, scratch / "p"), InputError);
@@ -185,6 +185,8 @@ const Malformed malformed[] = {
     {"JsonRunNoObject", "problem.json", json(sizes, "[7]"), "cones[0]|object"},
     {"JsonMuNegative", "problem.json", json(sizes, R"([{"kind": "friction", "count": 1, "mu": -1}])"),
      "mu|-1|at least 0"},
+    {"JsonMuHuge", "problem.json", json(sizes, R"([{"kind": "friction", "count": 1, "mu": 1e10}])"),
+     "mu|10000000000|at most 10000"},
     {"JsonMuList", "problem.json", json(sizes, R"([{"kind": "friction", "count": 1, "mu": [1, 2]}])"), "mu|2 numbers"},
     {"JsonMuNull", "problem.json", json(sizes, R"([{"kind": "friction", "count": 1, "mu": null}])"), "mu|null"},
     {"JsonDimension", "problem.json", json(sizes, R"([{"kind": "friction", "count": 1, "mu": 1, "dimension": 4}])"),

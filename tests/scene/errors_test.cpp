@@ -78,6 +78,10 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 4: the \"axis\" of \"orientation\" must be a vector that is not zero"},
         Case{"NegativeFriction", head + "materials:\n  ice: {friction: -0.1}\n" + bodies,
              "s.yaml, line 4: \"friction\" is -0.1; it must not be negative"},
+        Case{"HugeFriction", head + "materials:\n  ice: {friction: 1e10}\n" + bodies,
+             "s.yaml, line 4: \"friction\" is 10000000000; it must be at least 0 and at most 10000: beyond that, "
+             "errors within "
+             "any tolerance hide the velocity along the normal"},
         Case{"Restitution", head + "materials:\n  gum: {restitution: 1.5}\n" + bodies,
              "s.yaml, line 4: \"restitution\" is 1.5; it must be from 0 to 1"},
         Case{"MissingMaterial",

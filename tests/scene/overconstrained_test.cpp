@@ -418,10 +418,128 @@ TEST(Overconstrained, MotorsThatContradictEachOtherAreNamed) {
         run.finish();
         FAIL() << "the motors cannot both have their way";
     } catch (const StepFailure& error) {
-        EXPECT_NE(std::string(error.what()).find("contradicts them now"), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find("motor \"other\" contradicts motor \"drive\" now"), std::string::npos)
+            << error.what();
     }
-    Scene contradictory = parse_scene(scene("linear: {start: 0.5, rate: 0}"), "motors");
-    EXPECT_THROW(Simulation(contradictory.systems[0], registry()), InputError);
+    const auto refusal = [&](const std::string& second) -> std::string {
+        Scene contradictory = parse_scene(scene(second), "motors");
+        try {
+            Simulation simulation(contradictory.systems[0], registry());
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "taken";
+    };
+    for (const char* second : {"linear: {start: 0.5, rate: 0}", "linear: {start: 0, rate: 0.1}"}) {
+        const std::string told = refusal(second);
+        EXPECT_NE(told.find("\"other\""), std::string::npos) << told;
+        EXPECT_NE(told.find("\"drive\""), std::string::npos) << told;
+        EXPECT_NE(told.find(" contradicts motor "), std::string::npos) << told;
+    }
+}
+
+// ---- Everyday mechanisms that hold something twice ----
+
+struct Everyday {
+    std::string name, joints;
+    int redundant;       // rows, in maximal coordinates
+    double turn = 0.0;   // about z of the body that the world holds, at t = 0.5 s; it begins with 1 rad/s
+    double slide = 0.0;  // along z, from 1 m/s
+};
+
+void PrintTo(const Everyday& one, std::ostream* out) {
+    *out << one.name;
+}
+
+std::string on_axis(const std::string& name, const std::string& kind, double z, const std::string& more = "") {
+    return fmt::format("- {{name: {}, kind: {}, second: a, point: [0, 0, {}], axis: [0, 0, 1]{}}}\n", name, kind, z,
+                       more);
+}
+
+std::vector<Everyday> everyday() {
+    return {
+        {"two_hinges", on_axis("i", "revolute", 0.2) + on_axis("j", "revolute", 1.8), 5, 0.5},
+        {"hinge_and_bearing", on_axis("i", "revolute", 0.0) + on_axis("j", "cylindrical", 1.0), 4, 0.5},
+        {"hinge_and_ball",
+         on_axis("i", "revolute", 0.0) + "- {name: j, kind: spherical, second: a, point: [0, 0, 1]}\n", 3, 0.5},
+        {"two_rails",
+         on_axis("i", "prismatic", 0.0) +
+             "- {name: j, kind: prismatic, second: a, point: [0, 1, 0], axis: [0, 0, -1]}\n",
+         5, 0.0, 0.5},
+        {"weld_and_hinge", "- {name: i, kind: fixed, second: a, point: [0, 0, 0]}\n" + on_axis("j", "revolute", 0.0),
+         5},
+        {"two_welds",
+         "- {name: i, kind: fixed, second: a, point: [0, 0, 0]}\n"
+         "- {name: j, kind: fixed, second: a, point: [1, 0, 0]}\n",
+         6},
+        {"hinges_that_cross",
+         on_axis("i", "revolute", 0.0) + "- {name: j, kind: revolute, second: a, point: [0, 0, 0], axis: [1, 0, 0]}\n",
+         4},
+        {"one_weld", "- {name: i, kind: fixed, second: a, point: [0, 0, 0]}\n", 0},
+        {"two_motors",
+         on_axis("i", "revolute", 0.0) + "motors:\n- {name: m, joint: i, motion: {linear: {rate: 1}}}\n"
+                                         "- {name: n, joint: i, motion: {linear: {rate: 1}}}\n",
+         1, 0.5},
+        {"motors_of_two_hinges",
+         on_axis("i", "revolute", 0.0) + on_axis("j", "revolute", 1.0) +
+             "motors:\n- {name: m, joint: i, motion: {linear: {rate: 1}}}\n"
+             "- {name: n, joint: j, motion: {linear: {rate: 1}}}\n",
+         6, 0.5},
+        {"slide_and_planar",
+         on_axis("i", "prismatic", 0.0) + "- {name: j, kind: planar, second: a, point: [0, 0, 0], axis: [0, 1, 0]}\n",
+         3, 0.0, 0.5}};
+}
+
+class HeldTwice : public testing::TestWithParam<std::tuple<Everyday, std::string>> {};
+
+TEST_P(HeldTwice, MovesAsHeldOnce) {
+    const auto& [one, coordinates] = GetParam();
+    const std::string text = fmt::format(
+        "gravity: [0, 0, 0]\nstep: 0.01\nend: 0.5\n{}bodies:\n- {{name: a, mass: 2, inertia: {{xx: 0.1, yy: 0.2, zz: "
+        "0.25}}, position: [0.5, 0, 1], velocity: [0, {}, {}], angular_velocity: [0, 0, {}]}}\njoints:\n{}",
+        coordinates.empty() ? "" : "coordinates: " + coordinates + "\n", one.turn, 2.0 * one.slide, 2.0 * one.turn,
+        one.joints);
+    Scene planned = parse_scene(text, "twice");
+    const auto plan = make_plan(planned, registry()).at(0);
+    const bool said = std::any_of(plan.left_out.begin(), plan.left_out.end(), [](const PlanLine& line) {
+        return line.reason.find("reactions are not unique: of ") != std::string::npos;
+    });
+    EXPECT_EQ(said, one.redundant > 0);
+    Running run(parse_scene(text, "twice"));
+    EXPECT_EQ(left_out(run), one.redundant);
+    EXPECT_EQ(run.system().joints_with_rows_left_out().empty(), one.redundant == 0);
+    finish(run, [] {});
+    const Vector3d at(0.5 * std::cos(one.turn), 0.5 * std::sin(one.turn), 1.0 + one.slide);
+    EXPECT_LT((position(run, "a") - at).norm(), 1e-7);
+    const auto q = run.pose("a").orientation;
+    EXPECT_NEAR(2.0 * std::atan2(q[3], q[0]), one.turn, 1e-7);
+}
+
+INSTANTIATE_TEST_SUITE_P(Overconstrained, HeldTwice,
+                         testing::Combine(testing::ValuesIn(everyday()), testing::Values("", "joint", "maximal")),
+                         [](const auto& one) {
+                             const auto& coordinates = std::get<1>(one.param);
+                             return std::get<0>(one.param).name + (coordinates.empty() ? "" : "_" + coordinates);
+                         });
+
+TEST(Overconstrained, TwoMotorsThatContradictEachOtherAreBothNamed) {
+    for (const char* coordinates : {"", "coordinates: joint\n", "coordinates: maximal\n"}) {
+        Scene scene = parse_scene(
+            std::string(coordinates) +
+                "step: 0.01\nend: 1\nbodies:\n- {name: a, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}}\njoints:\n" +
+                on_axis("i", "revolute", 0.0) +
+                "motors:\n- {name: up, joint: i, motion: {linear: {rate: 1}}}\n"
+                "- {name: down, joint: i, motion: {linear: {rate: -2}}}\n",
+            "motors");
+        try {
+            Simulation simulation(scene.systems[0], registry());
+            FAIL() << "both cannot have their way";
+        } catch (const InputError& error) {
+            const std::string told = error.what();
+            EXPECT_NE(told.find("motor \"up\""), std::string::npos) << told;
+            EXPECT_NE(told.find("motor \"down\""), std::string::npos) << told;
+        }
+    }
 }
 
 TEST(Overconstrained, ConsistentStartsKeepTheirBits) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The example scenes against what their heads say is known.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "delassus/error.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::tests::physics_test {
@@ -198,6 +200,42 @@ TEST(ExampleScene, PileStaysInItsBoxAndComesToRest) {
     EXPECT_LT(speeds / moving, 0.05);
     EXPECT_LT(run.simulation.totals().worst_penetration, 2e-4);
     EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+}
+
+// Two bodies that squeeze a third between them leave it no velocity, and reactions grow without bound.
+TEST(Physics, WhatIsPressedThroughTheFloorEndsTheRun) {
+    for (const double rate : {-5.0, -0.05}) {
+        for (const char* shape : {"sphere: {radius: 0.1}", "box: {size: [0.2, 0.2, 0.2]}"}) {
+            Running run(parse_scene(
+                fmt::format(
+                    "step: 0.001\nend: 0.5\nmaterials: {{m: {{friction: 0.5, restitution: 0}}}}\nbodies:\n"
+                    "  - {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                    "  - {{name: press, motion: {{translation: [0, 0, {{linear: {{start: 0.201, rate: {}}}}}]}}, "
+                    "position: [0, 0, 0.05], shapes: [{{box: {{size: [1, 1, 0.1]}}, material: m}}]}}\n"
+                    "  - {{name: b, mass: 1, position: [0, 0, 0.1], shapes: [{{{}, material: m}}]}}\n",
+                    rate, shape),
+                "press"));
+            try {
+                run.finish();
+                ADD_FAILURE() << shape << " went to " << run.pose("b").position[2];
+            } catch (const StepFailure& error) {
+                EXPECT_NEAR(run.pose("b").position[2], 0.1, 0.01) << error.what();
+            }
+        }
+    }
+}
+
+TEST(Physics, ARunOfATinyPartOfAStepTakesAStep) {
+    for (const char* end : {"1.0e-10", "1.0e-13", "1.0e-30"}) {
+        Running run(
+            parse_scene(std::string("step: 0.001\nend: ") + end +
+                            "\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}, velocity: [1, 0, 0]}]",
+                        "tiny"));
+        run.finish();
+        EXPECT_EQ(run.simulation.record().step, 1) << end;
+        EXPECT_EQ(run.simulation.state().t, std::stod(end));
+        EXPECT_NEAR(run.pose("b").position[0] / std::stod(end), 1.0, 1e-6);
+    }
 }
 
 }  // namespace

@@ -140,6 +140,41 @@ TEST(Scene, CommandLineComesFirst) {
     EXPECT_EQ(system.step, 0.5);
 }
 
+// What --set says is meant for what --solver and --integrator name, whatever the file has and in whichever form.
+TEST(Scene, SetAddsToWhatTheCommandLineNames) {
+    const std::string body = "step: 0.1\nend: 1\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
+    SceneOverrides overrides;
+    overrides.solver = "auto";
+    overrides.values = {{"solver.options.ranking", "FILE"}};
+    for (const char* file : {"", "solver: pgs\n", "solver: auto\n", "solver: {name: pgs, options: {omega: 1.2}}\n",
+                             "solver: {tolerance: 1.0e-5}\n"}) {
+        const auto solver = parse_scene(file + body, "s", overrides).systems[0].solver;
+        EXPECT_EQ(solver.name, "auto") << file;
+        EXPECT_EQ(solver.options, (OptionTexts{{"ranking", "FILE"}})) << file;
+    }
+    overrides.solver = "pgs(omega=1.5)";
+    overrides.values = {{"solver.options.order", "symmetric"}, {"solver.tolerance", "1e-4"}};
+    for (const char* file : {"solver: pgs(omega=1.2)\n", "solver: {name: pgs, options: {omega: 1.2}}\n"}) {
+        const auto solver = parse_scene(file + body, "s", overrides).systems[0].solver;
+        EXPECT_EQ(solver.options, (OptionTexts{{"omega", "1.5"}, {"order", "symmetric"}})) << file;
+        EXPECT_EQ(solver.tolerance, 1e-4) << file;
+    }
+    SceneOverrides method;
+    method.integrator = "hht";
+    method.values = {{"integrator.options.alpha", "-0.2"}};
+    for (const char* file : {"", "integrator: rk4\n", "integrator: {name: newmark, options: {beta: 0.3}}\n"}) {
+        const auto scene = parse_scene(file + body, "s", method);
+        EXPECT_EQ(scene.systems[0].integrator, "hht") << file;
+        EXPECT_EQ(scene.systems[0].integrator_options, (OptionTexts{{"alpha", "-0.2"}})) << file;
+    }
+    overrides.values = {{"systems.two.solver.options.order", "symmetric"}};
+    const auto two = parse_scene(
+        "systems:\n  one: {step: 1, end: 1, bodies: []}\n  two: {step: 1, end: 1, solver: apgd, bodies: []}\n", "s",
+        overrides);
+    EXPECT_EQ(two.systems[0].solver.options, (OptionTexts{{"omega", "1.5"}}));
+    EXPECT_EQ(two.systems[1].solver.options, (OptionTexts{{"omega", "1.5"}, {"order", "symmetric"}}));
+}
+
 TEST(Scene, AnIntegratorIsSetPieceByPieceWhereTheFileNamesNone) {
     const std::string body = "step: 0.1\nend: 1\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
     SceneOverrides overrides;
@@ -154,6 +189,41 @@ TEST(Scene, AnIntegratorIsSetPieceByPieceWhereTheFileNamesNone) {
     } catch (const InputError& error) {
         EXPECT_NE(std::string(error.what()).find("lacks the key \"name\""), std::string::npos) << error.what();
     }
+}
+
+TEST(Scene, AMeshFarFromItsOriginKeepsItsMass) {
+    const auto scene = [](double at) {
+        const std::string x = std::to_string(at), y = std::to_string(at + 0.01);
+        std::string points;
+        for (int k = 0; k < 8; ++k)
+            points += (k == 0 ? "[" : ", [") + ((k & 4) != 0 ? y : x) + ", " + ((k & 2) != 0 ? y : x) + ", " +
+                      ((k & 1) != 0 ? y : x) + "]";
+        return parse_scene(head + "bodies:\n  - {name: b, density: 1000, position: [0, 0, 0], shapes: [{position: [" +
+                               std::to_string(-at - 0.005) + ", " + std::to_string(-at - 0.005) + ", " +
+                               std::to_string(-at - 0.005) + "], convex: {points: [" + points + "]}}]}\n",
+                           "s");
+    };
+    for (const double at : {0.0, 1200.0, 100000.0}) {
+        const auto read = scene(at);
+        const auto& body = read.systems[0].bodies[0];
+        EXPECT_NEAR(body.mass / 1e-3, 1.0, 1e-8 * (1.0 + at)) << at;
+        EXPECT_NEAR(body.inertia.xx / (1e-3 * 1e-4 / 6.0), 1.0, 1e-8 * (1.0 + at)) << at;
+    }
+}
+
+TEST(Scene, AGearMayStandBeforeItsJoints) {
+    const std::string body = "mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}\n";
+    const auto scene =
+        parse_scene(head + "bodies:\n  - {name: a, " + body + "  - {name: b, position: [1, 0, 0], " + body +
+                        "joints:\n  - {name: g, kind: gear, gear_first: i, gear_second: j, gear_ratio: 2}\n"
+                        "  - {name: i, kind: revolute, second: a, point: [0, 0, 0], axis: [0, 0, 1]}\n"
+                        "  - {name: j, kind: revolute, second: b, point: [1, 0, 0], axis: [0, 0, 1]}\n",
+                    "s");
+    const auto& joints = scene.systems[0].joints;
+    ASSERT_EQ(joints.size(), 3u);
+    EXPECT_EQ(joints[2].name, "g");
+    EXPECT_EQ(joints[static_cast<std::size_t>(joints[2].gear_first)].name, "i");
+    EXPECT_EQ(joints[static_cast<std::size_t>(joints[2].gear_second)].name, "j");
 }
 
 TEST(Scene, CanonicalTextKnowsAllButTheEnd) {

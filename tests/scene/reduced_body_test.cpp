@@ -108,7 +108,7 @@ TEST(ReducedScene, ATrajectoryHasThePlacesOfItsNodes) {
     std::vector<Simulation> simulations;
     simulations.emplace_back(scene.systems[0], registry());
     {
-        RunFolder output(folder, scene, arm, simulations, 1);
+        RunFolder output(folder, scene, arm, simulations);
         while (!simulations[0].finished()) {
             simulations[0].step();
             output.add_step(0);

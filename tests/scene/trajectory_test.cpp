@@ -56,8 +56,8 @@ TEST(Trajectory, HoldsStepsAndFramesAndGoesOn) {
         Scene scene = read_scene(example_scene("pendulum"), until(end));
         std::vector<Simulation> simulations;
         simulations.emplace_back(scene.systems[0], registry());
-        auto output = resume ? std::make_unique<RunFolder>(folder, scene, simulations, 5)
-                             : std::make_unique<RunFolder>(folder, scene, "text", simulations, 5);
+        auto output = resume ? std::make_unique<RunFolder>(folder, scene, simulations, RunOutput{5})
+                             : std::make_unique<RunFolder>(folder, scene, "text", simulations, RunOutput{5});
         if (!resume) energies = {simulations[0].record().energy};
         if (!resume) momenta = {simulations[0].record().momentum[2]};
         energies.resize(static_cast<std::size_t>(simulations[0].record().step) + 1);
@@ -101,8 +101,8 @@ State run_into(const std::filesystem::path& folder, const std::string& scene, co
         Scene read = parse_scene(scene, "test", until(ends[part]));
         std::vector<Simulation> simulations;
         for (auto& system : read.systems) simulations.emplace_back(system, registry());
-        auto output = part > 0 ? std::make_unique<RunFolder>(folder, read, simulations, 2)
-                               : std::make_unique<RunFolder>(folder, read, scene, simulations, 2);
+        auto output = part > 0 ? std::make_unique<RunFolder>(folder, read, simulations, RunOutput{2})
+                               : std::make_unique<RunFolder>(folder, read, scene, simulations, RunOutput{2});
         while (!simulations[0].finished()) {
             simulations[0].step();
             output->add_step(0);

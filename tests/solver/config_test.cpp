@@ -55,6 +55,36 @@ TEST(Config, ReadsTheShortForm) {
     EXPECT_THROW(static_cast<void>(parse_solver("(a=b)")), InputError);
 }
 
+TEST(Config, TakesOptionsBehindTheName) {
+    const auto solver = [](const std::string& text) { return parse_config("solver: " + text, "x").solver; };
+    EXPECT_EQ(solver("pgs(omega=1.2)").name, "pgs");
+    EXPECT_EQ(solver("pgs(omega=1.2)").options, (OptionTexts{{"omega", "1.2"}}));
+    const auto both = solver("{name: \"pgs(omega=1.2,order=symmetric)\", options: {omega: 1.5}}");
+    EXPECT_EQ(both.name, "pgs");
+    EXPECT_EQ(both.options, (OptionTexts{{"omega", "1.5"}, {"order", "symmetric"}}));
+    EXPECT_NE(refusal("solver:\n  name: pgs(omega\n").find("test.yaml, line 2"), std::string::npos);
+}
+
+TEST(Config, APathMayHaveBrackets) {
+    EXPECT_EQ(parse_solver("/home/me (old)/a(b)/mine.so").name, "/home/me (old)/a(b)/mine.so");
+    const auto chosen = parse_solver("/home/me (old)/mine.so(step=0.5)");
+    EXPECT_EQ(chosen.name, "/home/me (old)/mine.so");
+    EXPECT_EQ(chosen.options, (OptionTexts{{"step", "0.5"}}));
+    EXPECT_EQ(parse_solver("auto(ranking=/a/b.json)").name, "auto");
+}
+
+TEST(Config, ANewChoiceKeepsTheOptionsOfTheSameSolver) {
+    SolverConfig config = parse_solver("pgs(omega=1.2,order=symmetric)");
+    choose(config, "pgs(omega=1.5)");
+    EXPECT_EQ(config.options, (OptionTexts{{"omega", "1.5"}, {"order", "symmetric"}}));
+    choose(config, "apgd");
+    EXPECT_TRUE(config.options.empty());
+    SolverConfig unnamed;
+    unnamed.options = {{"ranking", "file"}};
+    choose(unnamed, "auto");
+    EXPECT_EQ(unnamed.options, (OptionTexts{{"ranking", "file"}})) << "who names none means auto";
+}
+
 TEST(Options, AreCheckedAgainstTheTable) {
     const std::vector<OptionInfo> table = {
         {"omega", DELASSUS_OPTION_REAL, "1", 0.0, 2.0, {}, "", ""},

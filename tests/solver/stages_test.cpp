@@ -168,6 +168,46 @@ TEST(Auto, RunsTheStagesOfItsRule) {
     EXPECT_EQ(report.message.substr(0, 4), "all:");
 }
 
+// The counts of a solver that is made of others are those of all of them, since it was made, whichever of them a solve
+// has needed.
+TEST(Auto, CountsAnalysesAndFactorizationsSinceItWasMade) {
+    for (const char* text : {"auto", "apgd(finish=ssn,finish_at=1e-2)", "admm"}) {
+        SCOPED_TRACE(text);
+        const PreparedProblem problem(read_problem(example("sphere_pile")));
+        Solver solver = make_solver(registry(), parse_solver(text));
+        Solution solution;
+        SolveSettings settings;
+        std::int64_t analyses = 0, factorizations = 0;
+        for (const bool warm : {false, true, false, true}) {
+            settings.warm_start = warm;
+            const auto report = solver.solve(problem, solution, settings);
+            EXPECT_EQ(report.status, Status::Solved) << report.message;
+            EXPECT_GE(report.analyses, analyses);
+            EXPECT_GE(report.factorizations, factorizations);
+            analyses = report.analyses;
+            factorizations = report.factorizations;
+        }
+        EXPECT_GT(factorizations, 0);
+        EXPECT_LE(analyses, 4) << "one pattern: one analysis by each solver";
+    }
+}
+
+// In a simulation a start that is within the tolerance needs no stage: what was counted before stays.
+TEST(Auto, KeepsItsCountsWhereTheStartIsTheAnswer) {
+    const PreparedProblem problem(read_problem(example("box_stack")));
+    Solver solver = make_solver(registry(), parse_solver("auto(simulation=true)"));
+    Solution solution;
+    SolveSettings settings;
+    settings.tolerance = 1e-6;
+    const auto first = solver.solve(problem, solution, settings);
+    ASSERT_EQ(first.status, Status::Solved) << first.message;
+    settings.warm_start = true;
+    const auto second = solver.solve(problem, solution, settings);
+    EXPECT_TRUE(second.stages.empty());
+    EXPECT_EQ(second.analyses, first.analyses);
+    EXPECT_EQ(second.factorizations, first.factorizations);
+}
+
 // A tolerance that is a goal may be missed where what is needed is met and the stage does not forbid it, and where only
 // patient stages are left and the answer is usable; another may not.
 TEST(Auto, EndsNearAToleranceThatIsAGoal) {

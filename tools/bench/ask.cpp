@@ -146,6 +146,13 @@ std::string last_line(std::string text) {
     return line.size() > 300 ? line.substr(0, 300) : line;
 }
 
+void hear_builds(const Json& line, const WorkerSettings& worker, std::string& message) {
+    for (const auto& plugin : line.at("unoptimized").get<std::vector<std::string>>()) {
+        append(message, fmt::format("{} was {}", plugin, unoptimized_build));
+        if (worker.unoptimized) worker.unoptimized(plugin);
+    }
+}
+
 void append(std::string& message, const std::string& sentence) {
     if (!message.empty()) message += "; ";
     message += sentence;

@@ -40,6 +40,10 @@ void judge_end(std::string& status, std::string& message, const ChildResult& chi
 /// Of what was written to standard error the last line of Delassus' own, or else the last line: often the cause.
 [[nodiscard]] std::string last_line(std::string text);
 
+/// Adds to the message which plugins a worker loaded that were built without optimisation, and tells the worker's
+/// settings. line: its last one.
+void hear_builds(const Json& line, const WorkerSettings& worker, std::string& message);
+
 /// Adds the sentence to the message, after a semicolon.
 void append(std::string& message, const std::string& sentence);
 

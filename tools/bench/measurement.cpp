@@ -144,6 +144,7 @@ Measurement measure(const WorkerSettings& worker, const MeasureRequest& request,
             row.libraries = line.at("libraries").get<std::vector<std::string>>();
             if (const auto printed = line.at("printed").get<std::int64_t>(); printed > 0)
                 append(row.message, fmt::format("wrote {} bytes to standard output; they were dropped", printed));
+            hear_builds(line, worker, row.message);
             return exit_limit;
         }
         return loading_limit;

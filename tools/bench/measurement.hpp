@@ -17,9 +17,11 @@ namespace delassus::bench {
 struct WorkerSettings {
     std::filesystem::path command;  ///< the delassus command, absolute
     std::vector<std::filesystem::path> plugin_path;
-    std::uint64_t memory_limit = 0;       ///< bytes of address space for each; 0 for none
-    std::function<bool()> cancelled;      ///< true: end the one that runs with what it has reached. May be empty.
-    std::uint64_t resident_limit = 0;     ///< bytes resident in each; 0 for none
+    std::uint64_t memory_limit = 0;    ///< bytes of address space for each; 0 for none
+    std::function<bool()> cancelled;   ///< true: end the one that runs with what it has reached. May be empty.
+    std::uint64_t resident_limit = 0;  ///< bytes resident in each; 0 for none
+    /// Told the name of each plugin that ran and was built without optimisation. May be empty.
+    std::function<void(const std::string& plugin)> unoptimized = {};
     std::filesystem::path launcher = {};  ///< mpirun, absolute; empty where no run has several processes
 };
 

@@ -28,6 +28,7 @@
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "process/watched_process.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus::bench {
 
@@ -78,6 +79,7 @@ Json figures_json(const std::vector<ProcessReport>& processes) {
 
 /// FNV-1a of the bytes, read in pieces.
 std::string hash_of_file(const std::string& path) {
+    require_regular_file(path);
     std::ifstream stream(path, std::ios::binary);
     if (!stream) throw InputError(path + " cannot be read");
     std::vector<char> piece(std::size_t{1} << 22);

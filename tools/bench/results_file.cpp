@@ -103,7 +103,15 @@ ResultSet read_results(const fs::path& folder) {
     return set;
 }
 
-ResultsFile::ResultsFile(const fs::path& folder) : file_(folder / file_name) {
+OutputFolder open_results(const fs::path& folder) {
+    std::vector<std::string> adopted;
+    if (const fs::path file = folder / file_name; fs::exists(file) && !read_lines(file).rows.empty())
+        adopted = {file_name,     "summary.md", "results.csv", "cells.csv", "simulations.csv",
+                   "report.html", "suite.yaml", "given",       "problems",  "references"};
+    return OutputFolder(folder, "bench", adopted);
+}
+
+ResultsFile::ResultsFile(OutputFolder& folder) : folder_(folder), file_(folder.add(file_name)) {
     if (!fs::exists(file_)) return;
     const StoredLines lines = read_lines(file_);
     for (const Json& row : lines.rows) note(row);
@@ -114,6 +122,7 @@ ResultsFile::ResultsFile(const fs::path& folder) : file_(folder / file_name) {
 
 void ResultsFile::add(const Json& row) {
     append_to_file(file_, json_text(row) + '\n');
+    folder_.keep();
     note(row);
 }
 

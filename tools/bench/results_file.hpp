@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bench/json_text.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::bench {
 
@@ -32,12 +33,15 @@ struct RunEnd {
     bool skipped = false;       ///< it was not run, as it had failed at a looser tolerance
 };
 
+/// The folder of `delassus bench run`, for writing into.
+[[nodiscard]] OutputFolder open_results(const std::filesystem::path& folder);
+
 /// Appends rows; a row is in the file when add() returns.
 class ResultsFile {
 public:
     /// Opens or creates the file, cuts an incomplete last line off, and notes what is there. Throws InputError on a
     /// file of another format or version.
-    explicit ResultsFile(const std::filesystem::path& folder);
+    explicit ResultsFile(OutputFolder& folder);
 
     [[nodiscard]] bool has(const std::string& key) const { return ends_.contains(key); }
     /// Of the last row with that key, which there must be.
@@ -47,6 +51,7 @@ public:
 private:
     void note(const Json& row);
 
+    OutputFolder& folder_;
     std::filesystem::path file_;
     std::map<std::string, RunEnd> ends_;
 };

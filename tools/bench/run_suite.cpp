@@ -264,18 +264,13 @@ RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunLis
     for (const auto& solver : plan.suite.solvers)
         if (is_library_path(solver.name) && !fs::is_regular_file(solver.name))
             throw InputError(fmt::format("there is no plugin {}", solver.name));
-    if (plan.suite.memory_limit > 0.0)
-        plan.worker.resident_limit = static_cast<std::uint64_t>(plan.suite.memory_limit * 1024.0 * 1024.0);
+    if (plan.suite.memory_limit > 0.0) plan.worker.resident_limit = bytes_of_mebibytes(plan.suite.memory_limit);
 
     const std::vector<bool> shares = sharing_solvers(registry, plan.suite);
     if (plan.suite.processes.back() > 1) plan.worker.launcher = find_launcher(plan.worker, plan.suite.processes.back());
 
-    std::error_code failure;
-    fs::create_directories(plan.output, failure);
-    if (failure)
-        throw InputError(fmt::format("the folder {} cannot be made: {}", plan.output.string(), failure.message()));
-    ResultsFile file(plan.output);
-    add_dumped_problems(plan.worker, plan.output / "problems", plan.suite);
+    ResultsFile file(*plan.output);
+    add_dumped_problems(plan.worker, *plan.output, plan.suite);
     const Tasks tasks = make_tasks(plan.suite, plan.worker, code, shares);
     const std::vector<CellTask> cells = make_cells(plan.suite, code);
     if (tasks.solves.empty() && tasks.simulations.empty() && tasks.leaving_out.empty() && cells.empty())

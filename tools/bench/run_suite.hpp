@@ -7,15 +7,16 @@
 
 #include "bench/results_file.hpp"
 #include "bench/suite.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::bench {
 
 struct RunPlan {
     Suite suite;
-    WorkerSettings worker;         ///< its resident_limit comes from the suite
-    std::filesystem::path output;  ///< folder; made if it is absent
-    std::filesystem::path cache;   ///< of references
-    std::string command;           ///< that repeats it, from the folder below
+    WorkerSettings worker;           ///< its resident_limit comes from the suite
+    OutputFolder* output = nullptr;  ///< kept with the first thing that is written
+    std::filesystem::path cache;     ///< of references
+    std::string command;             ///< that repeats it, from the folder below
     std::string folder;
 };
 

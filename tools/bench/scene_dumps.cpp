@@ -49,17 +49,16 @@ void run_scene(const WorkerSettings& worker, const SuiteDump& dump, const fs::pa
 
 }  // namespace
 
-void add_dumped_problems(const WorkerSettings& worker, const fs::path& folder, Suite& suite) {
+void add_dumped_problems(const WorkerSettings& worker, OutputFolder& output, Suite& suite) {
     for (const auto& dump : suite.dumps) {
         std::vector<std::string> parts = {read_file(dump.scene.file), std::to_string(dump.every),
                                           digits(dump.scene.end)};
         for (const auto& [key, value] : dump.scene.settings) parts.push_back(key + "=" + value);
         const std::string name = dump.scene.file.stem().string();
-        const fs::path own = folder / (name + "-" + key_of(parts).substr(0, 8));
+        output.add_folder("problems");
+        output.keep();
+        const fs::path own = output.add(fmt::format("problems/{}-{}", name, key_of(parts).substr(0, 8)));
         if (!fs::exists(own / "report.json")) {
-            std::error_code failure;
-            fs::remove_all(own, failure);
-            fs::create_directories(folder, failure);
             run_scene(worker, dump, own);
         }
         std::vector<fs::path> found;

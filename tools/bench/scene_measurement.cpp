@@ -85,6 +85,7 @@ SimulationMeasurement simulate(const WorkerSettings& worker, const SimulateReque
             return exit_limit;
         } else if (event == "done") {
             row.libraries = line.at("libraries").get<std::vector<std::string>>();
+            hear_builds(line, worker, row.message);
             done = true;
             return exit_limit;
         }

@@ -183,7 +183,7 @@ Suite read_suite(const fs::path& file, const Registry& registry) {
     const Source source(file.string());
     bool solvers_given = false;
     try {
-        const YAML::Node root = YAML::Load(suite.text);
+        const YAML::Node root = load_document(source, suite.text);
         if (root.IsNull()) throw InputError(fmt::format("{} is empty; a suite has problems or scenes", file.string()));
         read_map(
             source, root, "a suite",

@@ -23,6 +23,7 @@
 #include "problem/structure.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
+#include "support/sentence.hpp"
 
 namespace delassus::bench {
 
@@ -182,7 +183,9 @@ int answer(const std::string& request_text, const Channel& channel, const std::s
         }
         std::array<std::int64_t, 1> printed = {static_cast<std::int64_t>(guard.release())};
         run->sum(printed);
-        channel.send("done", {{"printed", printed[0]}, {"libraries", mapped_libraries()}});
+        channel.send(
+            "done",
+            {{"printed", printed[0]}, {"libraries", mapped_libraries()}, {"unoptimized", unoptimized_plugins()}});
         return 0;
     } catch (const InputError& error) {
         return fail("input", error.what());
@@ -192,7 +195,7 @@ int answer(const std::string& request_text, const Channel& channel, const std::s
         failed("out of memory");
         return 2;
     } catch (const std::exception& error) {
-        return fail("error", error.what());
+        return fail("error", sentence_of(error));
     }
 }
 

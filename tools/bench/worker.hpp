@@ -31,7 +31,8 @@
 //
 // and for all of them
 //       failed    kind ("input", "memory" or "error"), message: nothing more comes
-//       done      printed: bytes that the solver wrote to standard output; libraries: files mapped into the process
+//       done      printed: bytes that the solver wrote to standard output; libraries: files mapped into the process;
+//                 unoptimized: names of the plugins that it loaded and that were built without optimisation
 #pragma once
 
 #include <functional>

@@ -10,7 +10,8 @@
 
 namespace delassus::check {
 
-/// One check: run returns figures for the report, or throws Failure or Skip. It is called in a process of its own.
+/// One check: run returns figures for the report, or throws Failure, Warning or Skip. It is called in a process of its
+/// own.
 struct Check {
     std::string name;
     std::function<std::string(const Subject&)> run;

@@ -10,10 +10,10 @@ namespace delassus::check {
 
 /// One check of the suite.
 struct CheckResult {
-    enum class Verdict { Passed, Failed, Skipped };
-    std::string name;  ///< e.g. "known/friction_sliding"
+    enum class Verdict { Passed, Failed, Skipped, Warning };  ///< a warning is no failure
+    std::string name;                                         ///< e.g. "known/friction_sliding"
     Verdict verdict = Verdict::Failed;
-    std::string detail;  ///< why it failed or was skipped; figures where there are any
+    std::string detail;  ///< why it failed, was skipped or warns; figures where there are any
 };
 
 struct ConformanceReport {

@@ -44,6 +44,17 @@ std::string check_last_error(const Subject& subject) {
     return {};
 }
 
+std::string check_build(const Subject& subject) {
+    switch (subject.info().build) {
+        case DELASSUS_BUILD_OPTIMIZED:
+            return "with optimisation";
+        case DELASSUS_BUILD_UNOPTIMIZED:
+            throw Warning(std::string(unoptimized_build));
+        default:
+            throw Skip("its descriptor does not say whether the compiler optimised: set .build = DELASSUS_BUILD");
+    }
+}
+
 std::string check_sidecar(const Subject& subject) {
     auto path = subject.info().library;
     path.replace_extension(".json");
@@ -61,7 +72,8 @@ std::vector<Check> identity_checks() {
     return {{"identity/descriptor", check_descriptor},
             {"identity/capabilities", check_capability_bits},
             {"identity/last_error", check_last_error},
-            {"identity/sidecar", check_sidecar}};
+            {"identity/sidecar", check_sidecar},
+            {"identity/build", check_build}};
 }
 
 }  // namespace delassus::check

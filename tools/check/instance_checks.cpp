@@ -61,6 +61,38 @@ std::string check_determinism(const Subject& subject) {
     return fmt::format("{} problems, equal bits", problems.size());
 }
 
+/// What a kept solver answers depends on the problem and the request alone, not on the solves before.
+std::string check_memory(const Subject& subject) {
+    const auto problems = subject.problems();
+    for (std::size_t k = 0; k < problems.size(); ++k) {
+        const std::string& name = problems[k].problem.name;
+        const PreparedProblem problem(problems[k].problem);
+        const PreparedProblem between(problems[(k + 1) % problems.size()].problem);
+        Solver solver = subject.solver();
+        const auto solve = [&](const PreparedProblem& one, Solution& answer) {
+            return solver.solve(one, answer, settings_of(fine_tolerance));
+        };
+        Solution first, other;
+        const SolveReport before = solve(problem, first);
+        const auto expect_the_same = [&](const char* when) {
+            Solution again;
+            const SolveReport report = solve(problem, again);
+            expect(report.iterations == before.iterations && report.status == before.status,
+                   fmt::format("\"{}\" took {} iterations ({}) {}, and {} ({}) before: a solver keeps nothing from one "
+                               "solve to the next that changes the answer",
+                               name, report.iterations, name_of(report.status), when, before.iterations,
+                               name_of(before.status)));
+            expect(again.x == first.x && again.lambda == first.lambda,
+                   fmt::format("\"{}\" solved {} by the same solver has another answer in its last bits", name, when));
+        };
+        expect_the_same("for the second time");
+        expect_the_same("for the third time");
+        static_cast<void>(solve(between, other));
+        expect_the_same("after another problem");
+    }
+    return fmt::format("{} problems, four solves by one solver, equal iterations and bits", problems.size());
+}
+
 /// Solvers that are thrown away in the middle of their lives.
 std::string check_unused(const Subject& subject) {
     const PreparedProblem problem(subject.problems().front().problem);
@@ -116,11 +148,9 @@ std::string check_leaks(const Subject& subject) {
 }  // namespace
 
 std::vector<Check> instance_checks() {
-    return {{"instances/interleaved", check_interleaved},
-            {"instances/threads", check_threads},
-            {"instances/determinism", check_determinism},
-            {"instances/unused", check_unused},
-            {"instances/leaks", check_leaks}};
+    return {{"instances/interleaved", check_interleaved}, {"instances/threads", check_threads},
+            {"instances/determinism", check_determinism}, {"instances/memory", check_memory},
+            {"instances/unused", check_unused},           {"instances/leaks", check_leaks}};
 }
 
 }  // namespace delassus::check

@@ -28,13 +28,15 @@ using Verdict = CheckResult::Verdict;
 using Clock = std::chrono::steady_clock;
 
 /// What the child writes to the pipe: one letter for the verdict, then the detail.
-constexpr char passed_mark = 'P', failed_mark = 'F', skipped_mark = 'S';
+constexpr char passed_mark = 'P', failed_mark = 'F', skipped_mark = 'S', warning_mark = 'W';
 
 std::string message_of(const std::function<std::string()>& body) {
     try {
         return passed_mark + body();
     } catch (const Skip& reason) {
         return skipped_mark + std::string(reason.what());
+    } catch (const Warning& reason) {
+        return warning_mark + std::string(reason.what());
     } catch (const Failure& reason) {
         return failed_mark + std::string(reason.what());
     } catch (const Error& error) {
@@ -129,6 +131,7 @@ IsolatedOutcome judge(bool returned, double seconds, int status, const std::stri
     } else {
         outcome.verdict = message[0] == passed_mark    ? Verdict::Passed
                           : message[0] == skipped_mark ? Verdict::Skipped
+                          : message[0] == warning_mark ? Verdict::Warning
                                                        : Verdict::Failed;
         outcome.detail = message.substr(1);
     }

@@ -17,6 +17,12 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+/// Thrown by a check of what the rules allow and a person should know; what() is one sentence.
+class Warning : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
 /// Thrown by a check that failed; what() is one sentence.
 class Failure : public std::runtime_error {
 public:
@@ -36,9 +42,9 @@ struct IsolatedOutcome {
     bool returned = true;           ///< false: it was killed after the time limit
 };
 
-/// Forks; body runs in the child and returns the detail of success, or throws Skip, Failure or any other exception,
-/// which fails with its sentence. A crash, an exit and a run longer than `seconds` fail with theirs. Output of the
-/// child to standard output is caught and counted.
+/// Forks; body runs in the child and returns the detail of success, or throws Skip, Warning, Failure or any other
+/// exception, which fails with its sentence. A crash, an exit and a run longer than `seconds` fail with theirs. Output
+/// of the child to standard output is caught and counted.
 [[nodiscard]] IsolatedOutcome run_isolated(double seconds, Leave leave, const std::function<std::string()>& body);
 
 }  // namespace delassus::check

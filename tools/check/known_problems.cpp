@@ -270,27 +270,38 @@ void add_mixed(std::vector<KnownProblem>& list) {
                          {3, -1, 10, 3, 4, 2, 0, -1}, {0, 0, 0.5, -0.6, -0.8, 0, 1, 2}));
 }
 
-/// Three blocks of each kind in the table, by pairs that its own projection makes: with any z, λ = P(z) and u = λ − z
-/// fulfil −u ∈ N_Υ(λ). z is small, large, and large with a negative first row.
+/// A usual block of the kind, with its example parameters.
+Cone example_of(const sdk::ConeOperations& kind) {
+    const std::int32_t rows = kind.usual_rows;
+    Cone cone{static_cast<ConeKind>(kind.kind), rows, {}, {}, {}};
+    for (std::size_t k = 0; k < kind.named_parameters().size(); ++k) cone.parameters[k] = kind.parameters[k].example;
+    if (kind.has_bounds) {
+        cone.lo.assign(static_cast<std::size_t>(rows), -1.0);
+        cone.hi.assign(static_cast<std::size_t>(rows), 2.0);
+    }
+    return cone;
+}
+
+/// Adds λ = P(z) and u = λ − z, which fulfil −u ∈ N_Υ(λ) for any z.
+void add_pair(const sdk::ConeOperations& kind, const Cone& cone, const Numbers& z, Numbers& lambda, Numbers& u) {
+    Numbers projected = z;
+    kind.project(raw_cone(cone), projected.data());
+    for (std::size_t i = 0; i < z.size(); ++i) u.push_back(projected[i] - z[i]);
+    lambda.insert(lambda.end(), projected.begin(), projected.end());
+}
+
+/// Three blocks of each kind in the table, by pairs that its own projection makes. z is small, large, and large with a
+/// negative first row.
 void add_projected(std::vector<KnownProblem>& list) {
     for (const sdk::ConeOperations& kind : sdk::cone_table) {
         const std::int32_t rows = kind.usual_rows, m = 3 * rows;
-        Cone cone{static_cast<ConeKind>(kind.kind), rows, {}, {}, {}};
-        for (std::size_t k = 0; k < kind.named_parameters().size(); ++k)
-            cone.parameters[k] = kind.parameters[k].example;
-        if (kind.has_bounds) {
-            cone.lo.assign(static_cast<std::size_t>(rows), -1.0);
-            cone.hi.assign(static_cast<std::size_t>(rows), 2.0);
-        }
+        const Cone cone = example_of(kind);
         Numbers lambda, u;
         for (const double size : {0.5, 4.0, -4.0}) {
             Numbers z(static_cast<std::size_t>(rows), size);
             for (std::size_t i = 1; i < z.size(); ++i)
                 z[i] = (i % 2 == 0 ? -0.5 : 0.75) * size * (size == 0.5 ? 0.25 : 1.0);
-            Numbers projected = z;
-            kind.project(raw_cone(cone), projected.data());
-            for (std::size_t i = 0; i < z.size(); ++i) u.push_back(projected[i] - z[i]);
-            lambda.insert(lambda.end(), projected.begin(), projected.end());
+            add_pair(kind, cone, z, lambda, u);
         }
         const std::vector<Cone> cones(3, cone);
         const std::string name = "projected_" + std::string(kind.name);
@@ -305,6 +316,34 @@ void add_projected(std::vector<KnownProblem>& list) {
         list.push_back(known(name + "_diagonal", diagonal(masses), SparseMatrix::from_triplets(m, m, between), {},
                              cones, lambda, u));
         list.push_back(reduced(name + "_reduced", diagonal(masses), cones, lambda, u));
+    }
+}
+
+/// Where a projection divides by a length that may be zero. The blocks of a kind do not know of one another, so that
+/// already the first iterate of a solver that starts from zero projects: a point on the axis of the polar cone (a
+/// contact that opens straight up), one beside the axis, the apex itself, and one on the axis of the cone. In all but
+/// the last λ = 0 where Υ is a cone; u = 0 in the last, so that both laws have the same answer.
+void add_apex(std::vector<KnownProblem>& list) {
+    for (const sdk::ConeOperations& kind : sdk::cone_table) {
+        const std::int32_t rows = kind.usual_rows;
+        const Cone cone = example_of(kind);
+        Numbers lambda, u, masses;
+        const std::pair<double, double> points[] = {{-1.0, 0.0}, {-2.0, 0.5}, {0.0, 0.0}, {1.0, 0.0}};
+        for (const auto& [along, across] : points) {
+            Numbers z(static_cast<std::size_t>(rows), 0.0);
+            z[0] = along;
+            if (rows > 1) z[1] = across;
+            add_pair(kind, cone, z, lambda, u);
+            masses.insert(masses.end(), static_cast<std::size_t>(rows), 2.0);
+        }
+        const std::vector<Cone> cones(std::size(points), cone);
+        const auto m = static_cast<std::int32_t>(masses.size());
+        for (const Law law : {Law::Associated, Law::Coulomb}) {
+            if (law == Law::Coulomb && !kind.has_law()) continue;
+            const std::string name = "apex_" + std::string(kind.name) + (law == Law::Coulomb ? "_coulomb" : "");
+            list.push_back(known(name + "_diagonal", diagonal(masses), identity(m), {}, cones, lambda, u, law));
+            list.push_back(reduced(name + "_reduced", diagonal(masses), cones, lambda, u, law));
+        }
     }
 }
 
@@ -378,6 +417,7 @@ std::vector<KnownProblem> known_problems() {
     add_friction(list);
     add_mixed(list);
     add_projected(list);
+    add_apex(list);
     return list;
 }
 

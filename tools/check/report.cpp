@@ -10,16 +10,23 @@ namespace {
 
 using Verdict = CheckResult::Verdict;
 
-const char* word_of(Verdict verdict) {
+struct Word {
+    const char* shown;
+    const char* in_json;
+};
+
+Word word_of(Verdict verdict) {
     switch (verdict) {
         case Verdict::Passed:
-            return "passed";
+            return {"passed", "passed"};
         case Verdict::Skipped:
-            return "skipped";
+            return {"skipped", "skipped"};
+        case Verdict::Warning:
+            return {"WARNING", "warning"};
         case Verdict::Failed:
             break;
     }
-    return "FAILED";
+    return {"FAILED", "failed"};
 }
 
 }  // namespace
@@ -30,20 +37,21 @@ std::string to_json(const ConformanceReport& report) {
                                    {"passed", report.passed()},
                                    {"checks", nlohmann::ordered_json::array()}};
     for (const auto& result : report.results)
-        json["checks"].push_back({{"name", result.name},
-                                  {"verdict", result.verdict == Verdict::Failed ? "failed" : word_of(result.verdict)},
-                                  {"detail", result.detail}});
+        json["checks"].push_back(
+            {{"name", result.name}, {"verdict", word_of(result.verdict).in_json}, {"detail", result.detail}});
     // What a plugin says may not be UTF-8.
     return json_text(json, 2) + "\n";
 }
 
 void print(const ConformanceReport& report) {
     for (const auto& result : report.results)
-        fmt::print("{:<8} {:<36} {}\n", word_of(result.verdict), result.name, result.detail);
-    fmt::print("\n{} {}: {} passed, {} failed, {} skipped\n",
+        fmt::print("{:<8} {:<36} {}\n", word_of(result.verdict).shown, result.name, result.detail);
+    const std::size_t warnings = report.count(Verdict::Warning);
+    fmt::print("\n{} {}: {} passed, {} failed, {} skipped{}\n",
                report.plugin.empty() ? report.library.string() : report.plugin,
                report.passed() ? "conforms" : "does not conform", report.count(Verdict::Passed),
-               report.count(Verdict::Failed), report.count(Verdict::Skipped));
+               report.count(Verdict::Failed), report.count(Verdict::Skipped),
+               warnings > 0 ? fmt::format(", {} warning{}", warnings, warnings > 1 ? "s" : "") : "");
 }
 
 }  // namespace delassus::check

@@ -30,16 +30,17 @@ struct BenchArguments {
 };
 
 /// Writes all that is made of results.jsonl, prints the summary and the path of the page.
-void report(const fs::path& folder) {
+void report(OutputFolder& output) {
+    const fs::path& folder = output.path();
     const bench::ResultSet results = bench::read_results(folder);
     const bench::Json analysis = bench::analyse(results);
     const std::string summary = bench::summary_markdown(results, analysis);
-    std::vector<std::pair<fs::path, std::string>> files = {{folder / "summary.md", summary},
-                                                           {folder / "results.csv", bench::solves_csv(results)}};
-    if (!results.cells.empty()) files.emplace_back(folder / "cells.csv", bench::cells_csv(results));
-    if (!results.simulations.empty()) files.emplace_back(folder / "simulations.csv", bench::simulations_csv(results));
-    const auto no_page = write_report_files(std::move(files), folder / "report.html",
-                                            [&] { return bench::bench_page(results, analysis); });
+    std::vector<std::pair<std::string, std::string>> files = {{"summary.md", summary},
+                                                              {"results.csv", bench::solves_csv(results)}};
+    if (!results.cells.empty()) files.emplace_back("cells.csv", bench::cells_csv(results));
+    if (!results.simulations.empty()) files.emplace_back("simulations.csv", bench::simulations_csv(results));
+    const auto no_page =
+        write_report_files(output, files, "report.html", [&] { return bench::bench_page(results, analysis); });
     fmt::print("{}\n{}\n", summary,
                (folder / (no_page.empty() ? "report.html" : "summary.md")).lexically_normal().string());
     if (!no_page.empty()) fmt::print(stderr, "delassus: {}\n", no_page);
@@ -51,15 +52,19 @@ int run_bench(const BenchArguments& arguments) {
     bench::RunPlan plan;
     plan.suite = bench::read_suite(bench::find_suite(arguments.suite), registry);
     if (!arguments.only.empty()) bench::keep_axes(plan.suite, arguments.only);
-    plan.output =
-        !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string());
-    plan.cache =
-        fs::absolute(!arguments.cache.empty() ? arguments.cache : bench::cache_folder(plan.output / "references"));
+    OutputFolder output = bench::open_results(
+        !arguments.output.empty() ? arguments.output : fs::path("delassus-bench-" + plan.suite.file.stem().string()));
+    plan.output = &output;
+    const fs::path own_cache = output.path() / "references";
+    plan.cache = fs::absolute(!arguments.cache.empty() ? arguments.cache : bench::cache_folder(own_cache));
+    if (plan.cache == fs::absolute(own_cache)) output.add_folder("references");
     plan.worker.command = own_program();
     plan.worker.plugin_path = folders;
     plan.worker.cancelled = interrupted;
     plan.command = bench::shell_line(own_command_line());
     plan.folder = fs::current_path().string();
+    UnoptimizedPlugins unoptimized;
+    plan.worker.unoptimized = unoptimized.listener();
     install_interrupt_handler();
     bench::RunCounts counts;
     {
@@ -74,8 +79,9 @@ int run_bench(const BenchArguments& arguments) {
     for (const auto& sentence : plan.suite.left_out) fmt::print(stderr, "delassus: left out: {}\n", sentence);
     if (counts.skipped > 0)
         fmt::print(stderr, "delassus: {} runs were done before and are taken from {}\n", counts.skipped,
-                   (plan.output / "results.jsonl").string());
-    report(plan.output);
+                   (output.path() / "results.jsonl").string());
+    report(output);
+    unoptimized.warn();
     if (!counts.interrupted) return exit_solved;
     fmt::print(stderr, "delassus: interrupted; the same command goes on from there\n");
     return exit_not_converged;
@@ -128,7 +134,9 @@ void add_bench(CLI::App& program, Action& action) {
     again->add_option("folder", arguments->folder, "Folder of `delassus bench run`")->required()->type_name("DIR");
     again->callback([arguments, &action] {
         action.run = [arguments] {
-            report(arguments->folder);
+            static_cast<void>(bench::read_results(arguments->folder));
+            OutputFolder output = bench::open_results(arguments->folder);
+            report(output);
             return exit_solved;
         };
     });

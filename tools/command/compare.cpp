@@ -51,10 +51,10 @@ void check(const CompareArguments& arguments) {
 }
 
 /// Writes the three files; the sentence why there is no page, or nothing.
-std::string write_files(const bench::Comparison& comparison, const fs::path& folder) {
-    return write_report_files({{folder / "results.json", bench::json_text(comparison)},
-                               {folder / "results.csv", bench::csv_text(comparison)}},
-                              folder / "report.html", [&] { return bench::html_text(comparison); });
+std::string write_files(const bench::Comparison& comparison, OutputFolder& folder) {
+    return write_report_files(
+        folder, {{"results.json", bench::json_text(comparison)}, {"results.csv", bench::csv_text(comparison)}},
+        "report.html", [&] { return bench::html_text(comparison); });
 }
 
 int compare(const CompareArguments& arguments) {
@@ -66,12 +66,10 @@ int compare(const CompareArguments& arguments) {
     plan.solvers = bench::solvers_of(arguments.solvers, registry);
     plan.settings = arguments.settings;
     plan.settings.law = arguments.law;
-    plan.worker = {own_program(), folders, static_cast<std::uint64_t>(arguments.memory_limit * 1024.0 * 1024.0),
-                   interrupted};
-    std::error_code failure;
-    fs::create_directories(arguments.output, failure);
-    if (failure)
-        throw InputError(fmt::format("the folder {} cannot be made: {}", arguments.output.string(), failure.message()));
+    plan.worker = {own_program(), folders, bytes_of_mebibytes(arguments.memory_limit), interrupted};
+    UnoptimizedPlugins unoptimized;
+    plan.worker.unoptimized = unoptimized.listener();
+    OutputFolder output(arguments.output, "compare");
 
     install_interrupt_handler();
     std::string no_page;
@@ -91,14 +89,14 @@ int compare(const CompareArguments& arguments) {
         listener.on_sample = [&](const CurveSample& sample) { progress.sample(sample); };
         listener.on_problem = [&](const bench::Comparison& so_far) {
             progress.clear();
-            no_page = write_files(complete(so_far), arguments.output);
+            no_page = write_files(complete(so_far), output);
             if (arguments.json) return;
             fmt::print("{}\n", bench::table_text(so_far.problems.back()));
             std::fflush(stdout);
         };
         result = complete(bench::compare(plan, listener));
     }
-    no_page = write_files(result, arguments.output);
+    no_page = write_files(result, output);
     if (arguments.json) {
         fmt::print("{}", bench::json_text(result));
     } else {
@@ -106,6 +104,7 @@ int compare(const CompareArguments& arguments) {
         fmt::print("{}\n", shown.lexically_normal().string());
     }
     if (!no_page.empty()) fmt::print(stderr, "delassus: {}\n", no_page);
+    unoptimized.warn();
     if (result.interrupted) fmt::print(stderr, "delassus: interrupted; the files hold what was reached\n");
     return result.all_solved() ? exit_solved : exit_not_converged;
 }

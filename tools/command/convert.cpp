@@ -6,6 +6,7 @@
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -18,6 +19,7 @@ struct ConvertArguments {
 
 int convert(const ConvertArguments& arguments) {
     if (process_count() > 1) throw InputError("convert works in one process; start it without mpirun");
+    require_replaceable(arguments.output, "problem");
     Problem problem = read_problem(arguments.input);
     if (!arguments.law.empty()) problem.law = law_of(arguments.law);
     write_problem(problem, arguments.output);
@@ -35,7 +37,9 @@ void add_convert(CLI::App& program, Action& action) {
     command->add_option("input", arguments->input, "Problem folder, or HDF5 file (.h5, .hdf5)")
         ->required()
         ->type_name("IN");
-    command->add_option("output", arguments->output, "Problem folder, or HDF5 file (.h5, .hdf5)")
+    command
+        ->add_option("output", arguments->output,
+                     "Problem folder, or HDF5 file (.h5, .hdf5); replaced only if delassus wrote it")
         ->required()
         ->type_name("OUT");
     add_law(*command, arguments->law, "Friction law of the result (FCLib files mean coulomb)");

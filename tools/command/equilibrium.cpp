@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "command.hpp"
 #include "delassus/error.hpp"
@@ -14,9 +15,9 @@
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "scene_arguments.hpp"
-#include "support/atomic_file.hpp"
 #include "support/json.hpp"
 #include "support/json_number.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -213,44 +214,6 @@ void print_summary(const SceneSystem& system, const Equilibrium& found) {
     print_end(found);
 }
 
-constexpr std::string_view path_ending = ".path.csv";
-
-/// Makes the folder for the frames, in place of those of an earlier search.
-void make_folder(const std::filesystem::path& output, const std::filesystem::path& frames) {
-    if (std::filesystem::exists(output)) {
-        const bool earlier = std::filesystem::exists(output / "equilibrium.json");
-        if (!std::filesystem::is_directory(output) || (!earlier && !std::filesystem::is_empty(output)))
-            throw InputError(fmt::format("{} contains something else than an earlier equilibrium; name another folder",
-                                         output.string()));
-        std::filesystem::remove_all(frames);
-        for (const auto& entry : std::filesystem::directory_iterator(output)) {
-            const std::string name = entry.path().filename().string();
-            if (name.ends_with(path_ending) || name == "equilibrium.json" || name == "equilibrium.pvd")
-                std::filesystem::remove(entry.path());
-        }
-    }
-    std::filesystem::create_directories(frames);
-}
-
-/// Leaves nothing of a search that failed.
-class UnfinishedFolder {
-public:
-    UnfinishedFolder(std::filesystem::path output, std::filesystem::path frames)
-        : output_(std::move(output)), frames_(std::move(frames)) {}
-    UnfinishedFolder(const UnfinishedFolder&) = delete;
-    UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
-    ~UnfinishedFolder() {
-        if (output_.empty() || finished) return;
-        std::error_code ignored;
-        std::filesystem::remove_all(frames_, ignored);
-        std::filesystem::remove(output_, ignored);  // where it is empty
-    }
-    bool finished = false;
-
-private:
-    std::filesystem::path output_, frames_;
-};
-
 /// The system's rule ← with what the command line says. Throws InputError for arguments that do not fit.
 void set_rule(SceneSystem& system, const EquilibriumArguments& arguments) {
     EquilibriumRule rule = system.equilibrium.value_or(EquilibriumRule{});
@@ -293,11 +256,13 @@ int equilibrium(const EquilibriumArguments& arguments) {
     Scene scene = read(arguments.scene);
     const Registry registry(absolute(arguments.scene.plugin_path));
     for (SceneSystem& system : scene.systems) set_rule(system, arguments);
-    const std::filesystem::path frames = arguments.output / "vtk";
-    if (!arguments.output.empty()) make_folder(arguments.output, frames);
-    UnfinishedFolder unfinished(arguments.output, frames);
+    std::optional<OutputFolder> output;
+    if (!arguments.output.empty()) {
+        output.emplace(arguments.output, "equilibrium");
+        output->clear();
+        output->add_folder("vtk");
+    }
     install_interrupt_handler();
-    install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
     Json report = {
         {"scene", arguments.scene.file.filename().string()}, {"title", scene.title}, {"systems", Json::array()}};
@@ -310,12 +275,14 @@ int equilibrium(const EquilibriumArguments& arguments) {
     for (std::size_t i = 0; i < scene.systems.size(); ++i) {
         SceneSystem& system = scene.systems[i];
         const bool by_path = system.equilibrium->method == EquilibriumMethod::ArcLength;
-        series.emplace_back(frames, system.name, *system.system);
+        series.emplace_back(arguments.output / "vtk", system.name, *system.system);
         const auto write = [&](double time, const State& state) {
-            if (arguments.output.empty()) return;
+            if (!output) return;
             State frame = state;
             frame.t = time;
-            series[i].write(static_cast<std::int64_t>(times[i].size()), frame);
+            const auto number = static_cast<std::int64_t>(times[i].size());
+            output->add("vtk/" + series[i].file_name(number));
+            series[i].write(number, frame);
             times[i].push_back(time);
         };
         try {
@@ -341,16 +308,14 @@ int equilibrium(const EquilibriumArguments& arguments) {
         if (paths[i]) report["systems"].back()["path"] = json_of(*paths[i]);
     }
     guard.release();
-    if (!arguments.output.empty()) {
+    if (output) {
         std::vector<VtkCollectionPart> parts;
         for (std::size_t i = 0; i < series.size(); ++i) parts.push_back({&series[i], &times[i]});
-        write_vtk_collection(arguments.output / "equilibrium.pvd", "vtk", parts);
-        write_file_atomically(arguments.output / "equilibrium.json", json_text(report) + "\n");
+        write_vtk_collection(output->add("equilibrium.pvd"), "vtk", parts);
+        output->write("equilibrium.json", json_text(report) + "\n");
         for (std::size_t i = 0; i < paths.size(); ++i)
-            if (paths[i])
-                write_file_atomically(arguments.output / (scene.systems[i].name + std::string(path_ending)),
-                                      csv_of(*paths[i]));
-        unfinished.finished = true;
+            if (paths[i]) output->write(scene.systems[i].name + ".path.csv", csv_of(*paths[i]));
+        output->keep();
     }
     if (arguments.json) {
         fmt::print("{}\n", json_text(report));

@@ -12,6 +12,7 @@
 #include "delassus/problem_files.hpp"
 #include "on_all_processes.hpp"
 #include "partition_report.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -64,6 +65,7 @@ int generate_problem(const GenerateArguments& arguments) {
     }
     if (arguments.kind.empty() || arguments.output.empty())
         throw InputError("give a kind and the folder or file to write, or --list");
+    require_replaceable(arguments.output, "problem");
     std::map<std::string, double> values;
     for (const auto& setting : arguments.settings) {
         const auto [key, text] = parse_setting(setting);
@@ -85,7 +87,9 @@ void add_generate(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<GenerateArguments>();
     auto* command = program.add_subcommand("generate", "Make a problem of real mechanics from a few parameters");
     command->add_option("kind", arguments->kind, "What to make; see --list")->type_name("KIND");
-    command->add_option("output", arguments->output, "Problem folder, or HDF5 file (.h5, .hdf5 for FCLib)")
+    command
+        ->add_option("output", arguments->output,
+                     "Problem folder, or HDF5 file (.h5, .hdf5 for FCLib); replaced only if delassus wrote it")
         ->type_name("OUT");
     command->add_option("--set", arguments->settings, "Parameter of the kind")
         ->type_name("KEY=VALUE")

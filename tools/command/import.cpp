@@ -2,12 +2,16 @@
 // delassus import: a model of another program as a scene.
 #include <fmt/format.h>
 
+#include <map>
+#include <memory>
+
 #include "command.hpp"
 #include "delassus/error.hpp"
 #include "delassus/model_import.hpp"
 #include "delassus/scene.hpp"
 #include "delassus/simulation.hpp"
 #include "support/atomic_file.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -28,33 +32,21 @@ void print_items(const char* title, const std::vector<NotCarriedOver>& items) {
 /// Files that are there while the scene is looked at, and go unless it is kept.
 class FilesBeside {
 public:
-    explicit FilesBeside(const ImportArguments& arguments, const ImportedScene& imported) {
+    FilesBeside(const ImportArguments& arguments, const ImportedScene& imported) {
         const auto near = std::filesystem::absolute(arguments.output).parent_path();
         for (const auto& file : imported.files) {
             const auto path = near / file.path;
-            if (!std::filesystem::exists(path.parent_path())) {
-                std::filesystem::create_directories(path.parent_path());
-                folders_.push_back(path.parent_path());
-            }
-            const bool there = std::filesystem::exists(path);
-            write_file_atomically(path, file.content);
-            if (!there) written_.push_back(path);
+            auto& folder = folders_[path.parent_path()];
+            if (!folder) folder = std::make_unique<OutputFolder>(path.parent_path(), "import");
+            folder->write(path.filename().string(), file.content);
         }
     }
-    ~FilesBeside() {
-        std::error_code ignored;
-        for (const auto& path : written_) std::filesystem::remove(path, ignored);
-        for (const auto& path : folders_) std::filesystem::remove(path, ignored);
-    }
-    FilesBeside(const FilesBeside&) = delete;
-    FilesBeside& operator=(const FilesBeside&) = delete;
     void keep() {
-        written_.clear();
-        folders_.clear();
+        for (auto& [path, folder] : folders_) folder->keep();
     }
 
 private:
-    std::vector<std::filesystem::path> written_, folders_;
+    std::map<std::filesystem::path, std::unique_ptr<OutputFolder>> folders_;
 };
 
 int import_scene(const ImportArguments& arguments) {
@@ -62,6 +54,7 @@ int import_scene(const ImportArguments& arguments) {
     if (std::filesystem::equivalent(arguments.model, arguments.output, ignored))
         throw InputError(
             fmt::format("{}: the scene would replace the model; give another file to -o", arguments.output.string()));
+    require_replaceable(arguments.output, "scene");
     const ImportedScene imported = import_model(arguments.model, arguments.output, arguments.settings);
     const auto report = [&] {
         print_items("Not carried over", imported.lost);
@@ -84,7 +77,7 @@ int import_scene(const ImportArguments& arguments) {
         throw InputError(fmt::format("{}: the scene that this model makes would be refused: {}",
                                      arguments.model.string(), error.what()));
     }
-    write_file_atomically(arguments.output, imported.yaml);
+    write_file_atomically(arguments.output, marked_text("#", imported.yaml));
     files.keep();
     fmt::print("{}: from {} ({}): {} bodies, {} joints, {} shapes\n", arguments.output.string(),
                arguments.model.filename().string(), imported.format, imported.bodies, imported.joints, imported.shapes);
@@ -101,7 +94,9 @@ void add_import(CLI::App& program, Action& action) {
     command->add_option("model", arguments->model, "Model file; its root element tells its format")
         ->required()
         ->type_name("MODEL");
-    command->add_option("-o,--output", arguments->output, "Scene to write; meshes go to a folder beside it")
+    command
+        ->add_option("-o,--output", arguments->output,
+                     "Scene to write, replaced only if delassus wrote it so; meshes go to a folder beside it")
         ->required()
         ->type_name("SCENE");
     command->add_flag(

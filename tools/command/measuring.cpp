@@ -8,6 +8,8 @@
 #include <fstream>
 
 #include "delassus/error.hpp"
+#include "delassus/plugin_info.hpp"
+#include "process/terminal.hpp"
 #include "support/atomic_file.hpp"
 
 namespace delassus::command {
@@ -27,26 +29,32 @@ void MeasuringProgress::sample(const CurveSample& sample) {
 }
 
 void MeasuringProgress::clear() const {
-    if (shown_) fmt::print(stderr, "\r\033[K");
+    if (shown_) show_line("");
 }
 
 void MeasuringProgress::show(const std::string& figures) const {
-    if (shown_) fmt::print(stderr, "\r\033[K{}  {}", what_, figures);
+    if (shown_) show_line(fmt::format("{}  {}", what_, figures));
 }
 
-std::string write_report_files(std::vector<std::pair<std::filesystem::path, std::string>> files,
-                               const std::filesystem::path& page, const std::function<std::string()>& page_text) {
+std::string write_report_files(OutputFolder& folder, const std::vector<std::pair<std::string, std::string>>& files,
+                               const std::string& page, const std::function<std::string()>& page_text) {
+    std::vector<std::pair<std::filesystem::path, std::string>> contents;
+    for (const auto& [name, text] : files) contents.emplace_back(folder.add(name), text);
     std::string no_page;
     try {
-        files.emplace_back(page, page_text());
+        std::string text = page_text();
+        contents.emplace_back(folder.add(page), std::move(text));
     } catch (const InputError& error) {
-        no_page = fmt::format("no {} was written, because a part of the page is missing: {}", page.filename().string(),
-                              error.what());
+        no_page = fmt::format("no {} was written, because a part of the page is missing: {}", page, error.what());
     }
-    write_files_atomically(files);
-    std::error_code ignored;
-    if (!no_page.empty()) std::filesystem::remove(page, ignored);
+    write_files_atomically(contents);
+    folder.keep();
+    if (!no_page.empty()) folder.remove(page);
     return no_page;
+}
+
+void UnoptimizedPlugins::warn() const {
+    for (const auto& name : names_) fmt::print(stderr, "delassus: warning: {} was {}\n", name, unoptimized_build);
 }
 
 std::vector<std::string> own_command_line() {

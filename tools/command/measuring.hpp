@@ -5,10 +5,12 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "delassus/solver.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -31,13 +33,26 @@ private:
     std::chrono::steady_clock::time_point next_;
 };
 
-/// Writes all files of a report and the page that page_text makes, or none of them. If a part of the page is missing,
-/// it removes an older page, which would mislead, and returns the sentence that says why there is none.
-[[nodiscard]] std::string write_report_files(std::vector<std::pair<std::filesystem::path, std::string>> files,
-                                             const std::filesystem::path& page,
-                                             const std::function<std::string()>& page_text);
+/// Writes all files of a report, by their names in the folder, and the page that page_text makes, or none of them. If a
+/// part of the page is missing, it removes an older page, which would mislead, and returns the sentence that says why
+/// there is none.
+[[nodiscard]] std::string write_report_files(OutputFolder& folder,
+                                             const std::vector<std::pair<std::string, std::string>>& files,
+                                             const std::string& page, const std::function<std::string()>& page_text);
 
 /// The command line of this process, as it was given.
 [[nodiscard]] std::vector<std::string> own_command_line();
+
+/// Collects plugins that were built without optimisation, and warns of them on standard error.
+class UnoptimizedPlugins {
+public:
+    [[nodiscard]] std::function<void(const std::string&)> listener() {
+        return [this](const std::string& plugin) { names_.insert(plugin); };
+    }
+    void warn() const;
+
+private:
+    std::set<std::string> names_;
+};
 
 }  // namespace delassus::command

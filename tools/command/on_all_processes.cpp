@@ -7,6 +7,7 @@
 #include "command.hpp"
 #include "delassus/error.hpp"
 #include "process/out_of_memory.hpp"
+#include "support/sentence.hpp"
 
 namespace delassus::command {
 
@@ -29,7 +30,7 @@ int on_all_processes(const std::function<int(const std::shared_ptr<const Communi
     } catch (const std::bad_alloc&) {
         return end("out of memory while solving", exit_bad_input);
     } catch (const std::exception& error) {
-        return end(error.what(), exit_bad_input);
+        return end(sentence_of(error).c_str(), exit_bad_input);
     }
 }
 

@@ -12,6 +12,7 @@
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"
 #include "support/json.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus::command {
 
@@ -95,7 +96,7 @@ int list(const PluginsArguments& arguments) {
             json["plugins"].push_back(std::move(row));
         }
         for (const auto& row : registry.rejected())
-            json["rejected"].push_back({{"path", row.path.string()}, {"reason", row.reason}});
+            json["rejected"].push_back({{"name", row.name}, {"path", row.path.string()}, {"reason", row.reason}});
         for (const auto& row : registry.unbuilt())
             json["not_built"].push_back({{"name", row.name}, {"reason", row.reason}});
         for (const auto& row : registry.missing_parts())
@@ -104,7 +105,8 @@ int list(const PluginsArguments& arguments) {
         return exit_solved;
     }
     for (const auto& plugin : registry.plugins())
-        fmt::print("{:<10} {:<8} {}\n", plugin.name, plugin.version, plugin.description);
+        fmt::print("{:<10} {:<8} {}{}\n", plugin.name, plugin.version, plugin.description,
+                   plugin.build == DELASSUS_BUILD_UNOPTIMIZED ? " [built without optimisation]" : "");
     if (!registry.plugins().empty()) {
         const PluginInfo chooser = solver_info(registry, "auto");
         fmt::print("{:<10} {:<8} {}\n", chooser.name, chooser.version, chooser.description);
@@ -121,7 +123,6 @@ int list(const PluginsArguments& arguments) {
 
 /// Loads a library that may crash or print.
 PluginInfo info_of_library(const std::string& library) {
-    install_crash_handler(fmt::format("the plugin {}", library), exit_not_converged);
     const StdoutGuard guard;
     return Plugin::load(library)->info();
 }
@@ -147,6 +148,8 @@ int info(const PluginsArguments& arguments) {
     }
     fmt::print("{} {}: {}\n", plugin.name, plugin.version, plugin.description);
     if (!plugin.library.empty()) fmt::print("library  {}\n", plugin.library.string());
+    if (plugin.build != DELASSUS_BUILD_UNKNOWN)
+        fmt::print("build    {}\n", plugin.build == DELASSUS_BUILD_OPTIMIZED ? "with optimisation" : unoptimized_build);
     fmt::print("licence  {}\ncan      {}\n", plugin.licence, fmt::join(capability_names(plugin.capabilities), " "));
     if (!plugin.options.empty()) fmt::print("options\n");
     for (const auto& option : plugin.options)
@@ -172,10 +175,18 @@ int describe(const PluginsArguments& arguments) {
     const PluginInfo info = info_of_library(arguments.plugin);
     const auto text = sidecar_text(info);
     if (arguments.sidecar) {
-        write_file_atomically(std::filesystem::path(info.library).replace_extension(".json"), text);
+        const std::filesystem::path file = std::filesystem::path(info.library).replace_extension(".json");
+        const Json old =
+            std::filesystem::exists(file) ? try_parse_ordered_json(read_file(file)) : parse_ordered_json(text);
+        if (!old.is_object() || old.value("format", Json()) != parse_ordered_json(text).at("format"))
+            throw InputError(
+                fmt::format("{} exists and is no sidecar; remove it or give the library another name", file.string()));
+        write_file_atomically(file, text);
     } else {
         fmt::print("{}", text);
     }
+    if (info.build == DELASSUS_BUILD_UNOPTIMIZED)
+        fmt::print(stderr, "delassus: warning: {} was {}\n", info.name, unoptimized_build);
     return exit_solved;
 }
 

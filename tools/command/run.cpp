@@ -19,9 +19,10 @@
 #include "output/run_report.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
-#include "process/watched_process.hpp"
+#include "process/terminal.hpp"
 #include "scene_arguments.hpp"
 #include "simulation/run_loop.hpp"
+#include "simulation/shared_reactions.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus::command {
@@ -33,9 +34,8 @@ using Clock = std::chrono::steady_clock;
 struct RunArguments {
     SceneArguments scene;
     std::filesystem::path output, resume;
-    std::int64_t every = 1, dump = 0;
-    std::optional<std::int64_t> pictures;
-    bool contact_forces = false, json = false;
+    RunOutput files;
+    bool json = false;
 
     [[nodiscard]] bool has_folder() const { return !output.empty() || !resume.empty(); }
 };
@@ -60,12 +60,12 @@ public:
         const std::string left = rate > 0.0 ? fmt::format("{:.0f} s left", (all - now) / rate) : std::string();
         const auto& first = simulations_[0];
         const std::string size = first.system().control ? fmt::format(" of {:.1e} s", first.record().h) : std::string();
-        fmt::print(stderr, "\r  {:3.0f} %  t = {:.4g} s  {} steps{}  {} contacts  {:12}", 100.0 * part,
-                   simulations_[0].state().t, steps, size, simulations_[0].record().contacts, left);
+        show_line(fmt::format("  {:3.0f} %  t = {:.4g} s  {} steps{}  {} contacts  {:12}", 100.0 * part,
+                              simulations_[0].state().t, steps, size, simulations_[0].record().contacts, left));
         written_ = true;
     }
     void clear() {
-        if (written_) fmt::print(stderr, "\r{:78}\r", "");
+        if (written_) show_line("");
     }
 
 private:
@@ -105,11 +105,11 @@ void checkpoint(std::vector<Simulation>& simulations, RunFolder* folder) {
 
 /// Steps until the end, an interrupt or a failure.
 RunResult advance(const Communicator& run, std::vector<Simulation>& simulations, RunFolder* folder,
-                  const RunArguments& arguments) {
+                  const RunArguments& arguments, std::int64_t every) {
     Progress progress(simulations, run.rank() == 0);
     const auto stepped = [&](std::size_t system) {
         Simulation& simulation = simulations[system];
-        if (arguments.has_folder() && simulation.record().step % arguments.every == 0) simulation.gather_contacts();
+        if (arguments.has_folder() && simulation.record().step % every == 0) simulation.gather_contacts();
         if (folder != nullptr) folder->add_step(system);
         if (on_any(run, folder != nullptr && folder->checkpoint_is_due())) checkpoint(simulations, folder);
         progress.show();
@@ -152,8 +152,8 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
                        joints->body_velocities(), of_trees);
         }
         if (const auto left_out = system.system->constraint_rows() - of_trees - system.system->m(); left_out > 0)
-            fmt::print("  {} of {} rows of joints and motors left out: others imply them\n", left_out,
-                       system.system->constraint_rows());
+            fmt::print("  {} of {} rows of joints and motors left out, which others imply: {}\n", left_out,
+                       system.system->constraint_rows(), shared_reactions(*system.system));
         if (system.sleeping)
             fmt::print("  sleeping: {} bodies and nodes at the end; {} parts of problems left out\n",
                        simulation.record().sleeping, totals.resting_parts);
@@ -181,43 +181,45 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
 }
 
 void check(const RunArguments& arguments) {
-    if (arguments.every < 1) throw InputError("--every must be at least 1");
-    if (arguments.pictures.value_or(0) < 0) throw InputError("--pictures must be at least 0");
-    if (arguments.dump < 0) throw InputError("--dump-problems must be at least 1");
-    const bool resume = !arguments.resume.empty();
-    if (resume && !arguments.output.empty() && arguments.output != arguments.resume)
+    const RunOutput& files = arguments.files;
+    if (files.every.value_or(1) < 1) throw InputError("--every must be at least 1");
+    if (files.pictures.value_or(0) < 0) throw InputError("--pictures must be at least 0");
+    if (files.dump.value_or(0) < 0) throw InputError("--dump-problems must be at least 0");
+    if (!arguments.resume.empty() && !arguments.output.empty() && arguments.output != arguments.resume)
         throw InputError("--resume goes on in its own folder; leave out -o");
-    if (arguments.dump > 0 && arguments.output.empty() && !resume)
+    if (files.dump.value_or(0) > 0 && !arguments.has_folder())
         throw InputError("--dump-problems writes into the folder of -o; give one");
-    if (arguments.contact_forces && arguments.output.empty() && !resume)
+    if (files.contact_forces && !arguments.has_folder())
         throw InputError("--contact-forces writes into the folder of -o; give one");
 }
 
+[[noreturn]] void refuse_whole_problems() {
+    throw InputError("--dump-problems writes whole problems, which no process has here; start one process");
+}
+
 /// The run's folder, on process 0; on the others what it has to do with the simulations alone. Null without a folder.
+/// every: ← how many steps there are from frame to frame.
 std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArguments& arguments, const Scene& scene,
-                                       std::vector<Simulation>& simulations) {
+                                       bool shared, std::vector<Simulation>& simulations, std::int64_t& every) {
     std::unique_ptr<RunFolder> folder;
+    const bool first = run.rank() == 0, resume = !arguments.resume.empty();
+    every = arguments.files.every.value_or(1);
     together(run, [&] {
-        if (!arguments.resume.empty()) {
-            Checkpoint checkpoint = RunFolder::checkpoint_of(arguments.resume, scene);
-            if (arguments.contact_forces && !checkpoint.contact_forces)
-                throw InputError(fmt::format("the run in {} has no contact forces so far; leave out --contact-forces",
-                                             arguments.resume.string()));
-            if (run.rank() > 0)
-                for (std::size_t i = 0; i < simulations.size(); ++i)
-                    simulations[i].load(std::move(checkpoint.systems[i].simulation));
+        if (first && resume) {
+            folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.files);
+        } else if (first && !arguments.output.empty()) {
+            folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
+                                                 arguments.files);
         }
     });
+    // Process 0 keeps others away from the folder now.
     together(run, [&] {
-        if (run.rank() > 0) return;
-        if (!arguments.resume.empty()) {
-            folder =
-                std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.every, arguments.pictures);
-        } else if (!arguments.output.empty()) {
-            folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
-                                                 arguments.every, arguments.contact_forces, arguments.pictures);
-        }
-        if (folder && arguments.dump > 0) folder->dump_problems(arguments.dump);
+        if (!resume) return;
+        Checkpoint checkpoint = RunFolder::checkpoint_of(arguments.resume, scene);
+        every = arguments.files.every.value_or(checkpoint.every);
+        if (shared && arguments.files.dump.value_or(checkpoint.dump.value_or(0)) > 0) refuse_whole_problems();
+        for (std::size_t i = 0; !first && i < simulations.size(); ++i)
+            simulations[i].load(std::move(checkpoint.systems[i].simulation));
     });
     return folder;
 }
@@ -232,15 +234,14 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
     for (auto& system : scene.systems) simulations.emplace_back(system, registry);
     const bool shared = std::any_of(simulations.begin(), simulations.end(),
                                     [](const Simulation& simulation) { return simulation.shared(); });
-    if (shared && arguments.dump > 0)
-        throw InputError("--dump-problems writes whole problems, which no process has here; start one process");
-    const auto folder = open_folder(run, arguments, scene, simulations);
+    if (shared && arguments.files.dump.value_or(0) > 0) refuse_whole_problems();
+    std::int64_t every = 1;
+    const auto folder = open_folder(run, arguments, scene, shared, simulations, every);
 
     install_interrupt_handler();
     for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
-    install_crash_handler("a solver plugin", exit_not_converged);
     StdoutGuard guard;
-    const RunResult result = advance(run, simulations, folder.get(), arguments);
+    const RunResult result = advance(run, simulations, folder.get(), arguments, every);
     if (const auto bytes = guard.release(); bytes > 0 && first)
         fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
 
@@ -264,7 +265,6 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
 
 int run(const RunArguments& arguments) {
     if (process_count() == 1) return run_on(*single_process(), arguments);
-    continue_in_watched_child(fmt::format("process {} of {}", process_rank(), process_count()), exit_not_converged);
     return on_all_processes([&](const std::shared_ptr<const Communicator>& run) { return run_on(*run, arguments); });
 }
 
@@ -274,21 +274,28 @@ void add_run(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<RunArguments>();
     auto* command = program.add_subcommand("run", "Simulate a scene");
     add_scene_arguments(*command, arguments->scene);
-    command->add_option("-o,--output", arguments->output, "Folder for trajectory.h5, VTK files, checkpoint, report")
+    command
+        ->add_option("-o,--output", arguments->output,
+                     "Folder for trajectory.h5, VTK files, checkpoint, report; an earlier run in it is replaced")
         ->type_name("DIR");
-    command->add_option("--every", arguments->every, "Write the state of every N-th step [1]")->type_name("N");
+    command->add_option("--every", arguments->files.every, "Write the state of every N-th step [1]")->type_name("N");
     command
         ->add_option(
-            "--pictures", arguments->pictures,
+            "--pictures", arguments->files.pictures,
             fmt::format(
                 "Of these states, write about N, evenly in time, for ParaView too [{}, or {} MB of them]; 0: none",
                 RunFolder::default_pictures, RunFolder::default_picture_bytes / 1'000'000))
         ->type_name("N");
-    command->add_flag("--contact-forces", arguments->contact_forces,
+    command->add_flag("--contact-forces", arguments->files.contact_forces,
                       "Write the bodies and the force of each contact with the state");
-    command->add_option("--dump-problems", arguments->dump, "Write the problem of every N-th step as a problem folder")
+    command
+        ->add_option("--dump-problems", arguments->files.dump,
+                     "Write the problem of every N-th step as a problem folder; 0: none")
         ->type_name("N");
-    command->add_option("--resume", arguments->resume, "Go on with the run in this folder")->type_name("DIR");
+    command
+        ->add_option("--resume", arguments->resume,
+                     "Go on with the run in this folder, with its --every, --pictures and --dump-problems unless given")
+        ->type_name("DIR");
     command->add_flag("--json", arguments->json, "Print the report as JSON");
     command
         ->add_flag_callback(

@@ -18,8 +18,9 @@
 #include "on_all_processes.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
-#include "process/watched_process.hpp"
+#include "process/terminal.hpp"
 #include "solve_in_parts.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -41,10 +42,7 @@ struct SolveArguments {
 Config configuration(const SolveArguments& arguments) {
     Config config = arguments.config.empty() ? Config{} : read_config(arguments.config);
     auto& solver = config.solver;
-    if (!arguments.solver.empty() && arguments.solver != solver.name) {
-        solver.name = arguments.solver;
-        solver.options.clear();  // another solver's options mean nothing to this one
-    }
+    if (!arguments.solver.empty()) choose(solver, arguments.solver);
     if (solver.name.empty()) solver.name = "auto";
     for (const auto& setting : arguments.settings) {
         auto [key, text] = parse_setting(setting);
@@ -89,27 +87,18 @@ int solve_whole(const SolveArguments& arguments, const Registry& registry, const
     if (terminal) {
         settings.record_curve = true;
         settings.on_progress = [](const CurveSample& sample) {
-            fmt::print(stderr, "\r  iteration {}  {:.1f} s  natural {:.2e} ", sample.iteration, sample.seconds,
-                       sample.natural);
+            show_line(fmt::format("  iteration {}  {:.1f} s  natural {:.2e} ", sample.iteration, sample.seconds,
+                                  sample.natural));
         };
     }
     install_interrupt_handler();
-    install_crash_handler(fmt::format("the solver {}", name), exit_not_converged);
 
     StdoutGuard guard;
-    SolveReport report;
-    {
-        const Watchdog watchdog(
-            settings.time_limit + std::max(2.0, settings.time_limit),
-            fmt::format("the solver {} did not answer long after its time limit of {} s", name, settings.time_limit),
-            exit_not_converged);
-        Solver solver = make_solver(registry, config.solver);
-        report = solver.solve(problem, solution, settings);
-    }
+    SolveReport report = make_solver(registry, config.solver).solve(problem, solution, settings);
     if (const auto bytes = guard.release())
         fmt::print(stderr, "delassus: the solver {} wrote {} bytes to standard output; they were dropped\n", name,
                    bytes);
-    if (terminal) fmt::print(stderr, "\r{:60}\r", "");
+    if (terminal) show_line("");
     if (!arguments.curve) report.curve.clear();
 
     if (process_rank() == 0) {
@@ -126,10 +115,9 @@ int solve_whole(const SolveArguments& arguments, const Registry& registry, const
 
 int solve(const SolveArguments& arguments) {
     const bool several = process_count() > 1;
-    if (several)
-        continue_in_watched_child(fmt::format("process {} of {}", process_rank(), process_count()), exit_not_converged);
     const auto body = [&](const std::shared_ptr<const Communicator>& run) {
         const Config config = configuration(arguments);
+        if (!arguments.solution.empty()) require_replaceable(arguments.solution, "solution");
         const Registry registry(config.plugin_path);
         if (is_partitioned_run(registry, config.solver, arguments.problem))
             if (const auto code =
@@ -165,7 +153,7 @@ void add_solve(CLI::App& program, Action& action) {
         ->required()
         ->type_name("PROBLEM");
     command->add_option("--solver", arguments->solver, "Name of a plugin, or path of a shared library [auto]")
-        ->type_name("NAME|LIB");
+        ->type_name("SOLVER[(KEY=VALUE,…)]");
     command->add_option("--set", arguments->settings, "Option of the solver; see `delassus plugins info NAME`")
         ->type_name("KEY=VALUE")
         ->expected(1)

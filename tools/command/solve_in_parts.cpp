@@ -18,6 +18,7 @@
 #include "delassus/repartition.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
+#include "process/terminal.hpp"
 
 namespace delassus::command {
 
@@ -149,20 +150,14 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
     settings.cancelled = interrupted;
     if (terminal)
         settings.on_progress = [](const CurveSample& sample) {
-            fmt::print(stderr, "\r  iteration {}  {:.1f} s ", sample.iteration, sample.seconds);
+            show_line(fmt::format("  iteration {}  {:.1f} s ", sample.iteration, sample.seconds));
         };
     install_interrupt_handler();
-    install_crash_handler(fmt::format("process {} of {}, with the solver {},", run->rank(), run->size(), name),
-                          exit_not_converged);
 
     StdoutGuard guard;
     SolveReport report;
     SolveCost cost;
     {
-        const Watchdog watchdog(
-            settings.time_limit + std::max(2.0, settings.time_limit),
-            fmt::format("the solver {} did not answer long after its time limit of {} s", name, settings.time_limit),
-            exit_not_converged);
         PartitionedSolver solver(registry, config.solver, run);
         const std::string refusal = solver.refusal(problem, settings);
         if (!refusal.empty() && name == "auto") return std::nullopt;
@@ -172,7 +167,7 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
     if (const auto bytes = guard.release(); bytes > 0 && run->rank() == 0)
         fmt::print(stderr, "delassus: the solver {} wrote {} bytes to standard output; they were dropped\n", name,
                    bytes);
-    if (terminal) fmt::print(stderr, "\r{:60}\r", "");
+    if (terminal) show_line("");
     const auto processes = process_reports(problem, cost);
     const std::string json = to_json(report, processes);
     if (!arguments.solution.empty()) {

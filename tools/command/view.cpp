@@ -6,6 +6,7 @@
 #include "delassus/error.hpp"
 #include "output/view_page.hpp"
 #include "support/atomic_file.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::command {
 
@@ -20,9 +21,12 @@ struct ViewArguments {
 
 int view(const ViewArguments& arguments) {
     if (arguments.limits.frames < 2) throw InputError("--frames must be at least 2: the start and the end");
+    const char* own_name = "scene.html";
+    const fs::path file = arguments.output.empty() ? arguments.folder / own_name : arguments.output;
+    require_replaceable(file, "page");
     const RecordedRun run = read_run(arguments.folder, arguments.limits);
-    const fs::path file = arguments.output.empty() ? arguments.folder / "scene.html" : arguments.output;
     const std::string page = view_page(run);
+    if (arguments.output.empty()) add_to_folder_mark(arguments.folder, own_name);
     write_file_atomically(file, page);
     fmt::print("{}: {:.1f} MB\n", file.lexically_normal().string(), static_cast<double>(page.size()) / 1e6);
     for (const auto& system : run.systems) {

@@ -152,13 +152,16 @@ private:
             if (place[1] == 0) fixed(Vector3d::UnitY());
             if (place[1] == rows_ - 1) fixed(-Vector3d::UnitY());
         }
-        std::array<std::pair<std::int64_t, Place>, 12> later;
+        std::array<std::pair<std::int64_t, Place>, 12> later;  // kept in order; numbers differ
         std::size_t count = 0;
         for (const Place& neighbour : SphereLattice::neighbours_of(place)) {
             if (!lattice_.has(neighbour)) continue;
-            if (const auto other = lattice_.number_of(neighbour); other > number) later[count++] = {other, neighbour};
+            const auto other = lattice_.number_of(neighbour);
+            if (other <= number) continue;
+            std::size_t at = count++;
+            for (; at > 0 && later[at - 1].first > other; --at) later[at] = later[at - 1];
+            later[at] = {other, neighbour};
         }
-        std::sort(later.begin(), later.begin() + static_cast<std::ptrdiff_t>(count));
         for (std::size_t k = 0; k < count; ++k) {
             const Vector3d between = lattice_point(later[k].second) - lattice_point(place);
             const double length = between.norm(), theirs = radius_of(later[k].second);

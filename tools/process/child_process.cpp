@@ -295,6 +295,13 @@ ChildResult run_child(const ChildSettings& settings) {
     return Watch(settings, pid, output.read_end.get(), errors.read_end.get()).run();
 }
 
+std::uint64_t bytes_of_mebibytes(double mebibytes) {
+    const double bytes = mebibytes * 1024.0 * 1024.0;
+    constexpr double end = 18446744073709551616.0;  // 2⁶⁴
+    if (!(bytes > 0.0)) return 0;
+    return bytes < end ? static_cast<std::uint64_t>(bytes) : std::numeric_limits<std::uint64_t>::max();
+}
+
 std::vector<int> allowed_cores() {
     cpu_set_t set;
     CPU_ZERO(&set);

@@ -55,6 +55,9 @@ struct ChildResult {
 /// this process and leaves no core dump. Throws Error if it cannot be started.
 ChildResult run_child(const ChildSettings& settings);
 
+/// So many MiB in bytes, as far as a number holds them; 0 for what is no positive size.
+[[nodiscard]] std::uint64_t bytes_of_mebibytes(double mebibytes);
+
 /// The cores that this process may run on.
 [[nodiscard]] std::vector<int> allowed_cores();
 

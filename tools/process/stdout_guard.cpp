@@ -24,7 +24,8 @@ StdoutGuard::~StdoutGuard() {
 std::size_t StdoutGuard::release() {
     if (saved_ >= 0) {
         std::fflush(stdout);
-        dup2(saved_, STDOUT_FILENO);
+        // A plugin may have closed what was saved: then what is printed must fail and not go astray.
+        if (dup2(saved_, STDOUT_FILENO) < 0) close(STDOUT_FILENO);
         close(saved_);
         saved_ = -1;
         struct stat information {};

@@ -80,7 +80,7 @@ public:
     [[nodiscard]] DELASSUS_API double velocity(std::span<const double> x, std::span<const double> reference) const;
 
     /// ‖S r‖, what natural errors are relative to: with it they are errors of velocity in the norm of the masses. 1
-    /// where r = 0.
+    /// where r = 0. NaN where double precision does not hold N, the squares of S, or ‖S r‖²: no error can be measured.
     [[nodiscard]] DELASSUS_API double reference() const;
 
     /// ‖S D v‖ for velocities v (n): how large they are for the rows, in the norm of the masses that the rows feel.

@@ -14,9 +14,9 @@
 namespace delassus {
 
 /// The surface in a file, one mesh for each connected part; lengths are multiplied by scale. Polygons become triangles,
-/// and equal points one. assimp keeps coordinates in single precision. Throws InputError, naming the file, where this
-/// build has no assimp, the file is unreadable or has no triangles, or a part is not a closed surface seen
-/// counter-clockwise from outside (with the triangle or edge).
+/// and equal points one. Throws InputError, naming the file, where this build has no assimp, the file is unreadable or
+/// has no triangles, a vertex is not finite or not there, single precision costs a part more than 1e-4 of its size, or
+/// a part is not a closed surface seen counter-clockwise from outside (with the triangle or edge).
 [[nodiscard]] DELASSUS_API std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double scale = 1.0);
 
 /// Tetrahedra in their own frame, m.

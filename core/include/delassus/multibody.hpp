@@ -549,7 +549,7 @@ public:
 
     /// λ of all rows from that of those that are kept: 0 in the others.
     [[nodiscard]] std::vector<double> all_multipliers(const std::vector<double>& kept) const;
-    /// Names of the joints that have rows that are left out, ascending by joint.
+    /// Names of the joints with rows that others imply and that are left out, ascending by joint.
     [[nodiscard]] std::vector<std::string> joints_with_rows_left_out() const;
 
     /// The spheres of nodes have the numbers from shapes().size() on, in the order of add_node_contact(); after them

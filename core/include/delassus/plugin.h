@@ -36,7 +36,7 @@ extern "C" {
  * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
  * Major version 1 was never released; its cones had no stride. */
 #define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
-#define DELASSUS_ABI_MINOR 4
+#define DELASSUS_ABI_MINOR 5
 
 #if defined(_WIN32)
 #define DELASSUS_PLUGIN_EXPORT __declspec(dllexport)
@@ -282,6 +282,19 @@ typedef struct delassus_team {
 #define DELASSUS_FLAG_MPI 2u            /* starts MPI when first created */
 #define DELASSUS_FLAG_PEER 4u           /* for comparisons: works only where it is named, never as a last resort */
 
+/* Since 2.5. Whether the compiler optimised the plugin. Its times say little if not, and the host says so wherever it
+ * shows or compares them. DELASSUS_BUILD is the number of the compilation at hand. */
+#define DELASSUS_BUILD_UNKNOWN 0u
+#define DELASSUS_BUILD_OPTIMIZED 1u
+#define DELASSUS_BUILD_UNOPTIMIZED 2u
+#if defined(__OPTIMIZE__)
+#define DELASSUS_BUILD DELASSUS_BUILD_OPTIMIZED
+#elif defined(__GNUC__)
+#define DELASSUS_BUILD DELASSUS_BUILD_UNOPTIMIZED
+#else
+#define DELASSUS_BUILD DELASSUS_BUILD_UNKNOWN
+#endif
+
 typedef struct delassus_plugin_descriptor {
     uint32_t magic;       /* DELASSUS_PLUGIN_MAGIC */
     uint16_t abi_major;   /* DELASSUS_ABI_MAJOR */
@@ -330,6 +343,9 @@ typedef struct delassus_plugin_descriptor {
     int32_t (*factorize_partitioned)(void* solver, const delassus_local_problem* problem);
     int32_t (*solve_partitioned)(void* solver, const delassus_local_problem* problem, const delassus_request* request,
                                  double* x, double* lambda, delassus_outcome* outcome);
+
+    uint32_t build; /* since 2.5: DELASSUS_BUILD */
+    uint32_t reserved_2;
 } delassus_plugin_descriptor;
 
 /* The one exported symbol. */

@@ -52,14 +52,19 @@ struct OptionValue {
 struct PluginInfo {
     std::string name, version, description, licence;
     std::uint16_t abi_major = 0, abi_minor = 0;
-    std::uint32_t flags = 0;         ///< DELASSUS_FLAG_*
-    std::uint64_t capabilities = 0;  ///< DELASSUS_CAN_*
+    std::uint32_t flags = 0;                       ///< DELASSUS_FLAG_*
+    std::uint64_t capabilities = 0;                ///< DELASSUS_CAN_*
+    std::uint32_t build = DELASSUS_BUILD_UNKNOWN;  ///< DELASSUS_BUILD_*
     std::vector<OptionInfo> options;
     std::filesystem::path library;  ///< absolute path of the shared library; empty: the program's own
 
     /// The needs that this plugin does not meet.
     [[nodiscard]] std::uint64_t missing(std::uint64_t needs) const { return needs & ~capabilities; }
 };
+
+/// What a person should know of a plugin with DELASSUS_BUILD_UNOPTIMIZED.
+inline constexpr std::string_view unoptimized_build =
+    "built without optimisation (-O2, or CMAKE_BUILD_TYPE=Release): its times say little";
 
 /// The sidecar's text (JSON) for a plugin, and back. reading throws PluginError with a sentence.
 [[nodiscard]] DELASSUS_API std::string sidecar_text(const PluginInfo& info);

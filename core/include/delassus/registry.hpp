@@ -33,6 +33,9 @@ private:
     delassus_plugin_descriptor descriptor_{};
 };
 
+/// The names of the plugins that were loaded so far from libraries built without optimisation: their times say little.
+[[nodiscard]] DELASSUS_API std::vector<std::string> unoptimized_plugins();
+
 /// Whether a solver's name is the path of a shared library: it has a slash or ends in .so.
 [[nodiscard]] inline bool is_library_path(std::string_view name) {
     return name.find('/') != std::string_view::npos || name.ends_with(".so");
@@ -42,6 +45,7 @@ private:
 struct RejectedPlugin {
     std::filesystem::path path;
     std::string reason;
+    std::string name;  ///< that it would be chosen by; empty: a folder that was not searched
 };
 
 /// A solver of this project that the build left out.
@@ -72,7 +76,8 @@ public:
     [[nodiscard]] const std::vector<MissingPart>& missing_parts() const { return missing_parts_; }
     [[nodiscard]] const std::vector<std::filesystem::path>& folders() const { return folders_; }
 
-    /// Throws InputError naming the nearest and all names if there is none.
+    /// Throws InputError if there is none: with the reason where a plugin of that name was rejected or not built, else
+    /// with the nearest name or all names.
     [[nodiscard]] DELASSUS_API const PluginInfo& find(const std::string& name) const;
 
     /// Loads a plugin by name, or by path if the text has a slash or ends in .so. Throws InputError or PluginError.

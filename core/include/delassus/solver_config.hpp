@@ -36,8 +36,13 @@ struct SolverConfig {
     [[nodiscard]] DELASSUS_API SolveSettings settings() const;
 };
 
-/// Parses "name" or "name(key=value,key=value)", the form of `delassus compare --solvers`. Throws InputError.
+/// Parses "name" or "name(key=value,key=value)", the form in which command lines, configurations, suites and scenes
+/// name a solver. Throws InputError.
 [[nodiscard]] DELASSUS_API SolverConfig parse_solver(std::string_view text);
+
+/// Puts the solver of this text in place of the configuration's. The options of the one before mean nothing to another
+/// one and go; where it is the same, they stay beside those of the text. Throws InputError.
+DELASSUS_API void choose(SolverConfig& config, std::string_view text);
 
 /// What is known of a solver without loading it: of a plugin, or of "auto", whose capabilities are the union of all
 /// plugins'. Throws InputError naming the nearest and all names if there is none.

@@ -4,11 +4,10 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <fstream>
-#include <sstream>
-
 #include "config/sections.hpp"
 #include "delassus/error.hpp"
+#include "solver/judgement.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 
@@ -25,12 +24,23 @@ OptionTexts read_options(const Source& source, const YAML::Node& node) {
 
 SolverConfig read_solver(const Source& source, const YAML::Node& node) {
     SolverConfig solver;
-    if (node.IsScalar()) {  // solver: pgs
-        solver.name = node.Scalar();
-        return solver;
-    }
+    const auto named = [&](const YAML::Node& n, const std::string& text) {
+        if (text.empty()) return SolverConfig{};
+        try {
+            return parse_solver(text);
+        } catch (const InputError& error) {
+            source.refuse(n, error.what());
+        }
+    };
+    if (node.IsScalar()) return named(node, node.Scalar());  // solver: pgs, solver: pgs(omega=1.2)
+    OptionTexts of_name;
     read_map(source, node, "\"solver\"",
-             {{"name", [&](const YAML::Node& n) { solver.name = scalar(source, n, "name"); }},
+             {{"name",
+               [&](const YAML::Node& n) {
+                   const SolverConfig chosen = named(n, scalar(source, n, "name"));
+                   solver.name = chosen.name;
+                   of_name = chosen.options;
+               }},
               {"options", [&](const YAML::Node& n) { solver.options = read_options(source, n); }},
               {"tolerance",
                [&](const YAML::Node& n) { solver.tolerance = value<double>(source, n, "tolerance", "a number"); }},
@@ -59,6 +69,12 @@ SolverConfig read_solver(const Source& source, const YAML::Node& node) {
                        source.refuse(n, error.what());
                    }
                }}});
+    solver.options.merge(of_name);  // a key of "options" counts
+    try {
+        check_settings(solver.settings());
+    } catch (const InputError& error) {
+        source.refuse(node, error.what());
+    }
     return solver;
 }
 
@@ -66,7 +82,7 @@ Config parse_config(const std::string& yaml, std::string_view where) {
     const Source source(where);
     Config config;
     try {
-        const YAML::Node root = YAML::Load(yaml);
+        const YAML::Node root = load_document(source, yaml);
         if (root.IsNull()) throw InputError(fmt::format("{} is empty; it must at least hold \"solver:\"", where));
         read_map(source, root, "the configuration",
                  {{"solver",
@@ -86,12 +102,7 @@ Config parse_config(const std::string& yaml, std::string_view where) {
 }
 
 Config read_config(const std::filesystem::path& file) {
-    std::ifstream stream(file);
-    std::ostringstream text;
-    text << stream.rdbuf();
-    if (!stream || !std::filesystem::is_regular_file(file))
-        throw InputError(fmt::format("cannot read the configuration {}", file.string()));
-    Config config = parse_config(text.str(), file.string());
+    Config config = parse_config(read_file(file, most_bytes_of_text), file.string());
     for (auto& folder : config.plugin_path) folder = std::filesystem::absolute(file).parent_path() / folder;
     return config;
 }

@@ -44,6 +44,15 @@ private:
     std::vector<std::pair<YAML::Node, std::string>> elsewhere_;
 };
 
+/// The one document of the text; null if it is empty. Throws YAML::Exception, and InputError if there is another one.
+inline YAML::Node load_document(const Source& source, const std::string& text) {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1)
+        source.refuse(documents[1],
+                      "here begins a second YAML document, but a file has one; take away the line \"---\"");
+    return documents.empty() ? YAML::Node() : documents[0];
+}
+
 inline std::string scalar(const Source& source, const YAML::Node& node, std::string_view key) {
     if (!node.IsScalar()) source.refuse(node, fmt::format("\"{}\" must be a single value", key));
     return node.Scalar();

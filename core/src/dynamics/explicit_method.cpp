@@ -128,12 +128,13 @@ void ExplicitMethod::take_step(State& state, double h, StepSolver& solver, StepR
         error_v_ += h * tableau_.error.back() * last_.x;
     }
     std::swap(state, end_);
+    stepped_ = true;
 }
 
 // By powers of θ: h k_1, 3 δ − 2 h k_1 − h k_{s+1} + e, h k_1 + h k_{s+1} − 2 δ − 2 e, e with e = h Σ d_i k_i.
 void ExplicitMethod::extend(ContinuousExtension& way) const {
     way.degree = 0;
-    if (tableau_.dense.empty() || !known_ || end_.q.empty()) return;
+    if (tableau_.dense.empty() || !known_ || !stepped_) return;
     way.begin = end_;
     way.end = known_at_;
     way.degree = 4;

@@ -88,6 +88,7 @@ private:
     std::int32_t n_, m_;
     std::vector<Cone> cones_;
     bool known_ = false;
+    bool stepped_ = false;       ///< end_ and known_at_ are the ends of a step
     State known_at_;             // where `last_` was found
     LinearSolution last_;        // accelerations there
     std::vector<Vector> u_, v_;  // slopes of the stages

@@ -7,6 +7,7 @@
 
 #include "dynamics/bordered_factor.hpp"
 #include "dynamics/negative_eigenvalues.hpp"
+#include "support/pivoted_qr.hpp"
 
 namespace delassus {
 
@@ -215,9 +216,8 @@ struct LoadPath::Implementation {
     }
 
     void judge(LoadPathPoint& point, const Trial& at) {
-        const auto largest = [](const Vector& x) { return x.size() > 0 ? x.lpNorm<Eigen::Infinity>() : 0.0; };
-        point.residual = largest(at.balance);
-        point.reaction = largest(at.reaction);
+        point.residual = largest_entry(at.balance);
+        point.reaction = largest_entry(at.reaction);
         point.negative = negative_eigenvalues(stiffness, mass, shift, jacobian);
     }
 };

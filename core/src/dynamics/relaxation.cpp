@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/pivoted_qr.hpp"
+
 namespace delassus {
 
 // ---- The method ----
@@ -45,10 +47,6 @@ double Relaxation::mass_norm(const Vector& x, const State& state) const {
 }
 
 namespace {
-
-double largest(const Vector& x) {
-    return x.size() > 0 ? x.lpNorm<Eigen::Infinity>() : 0.0;
-}
 
 double largest_of(const std::vector<double>& q) {
     double value = 0.0;
@@ -126,8 +124,8 @@ RelaxationReport Relaxation::run(State& state, Vector& lambda, StepSolver& solve
         growth = std::min(1.5 * growth, 10.0);
         if (!settled) continue;
         newton_.evaluate(now.state, now, residual);
-        report.residual = largest(residual.balance);
-        report.reaction = largest(residual.reaction);
+        report.residual = largest_entry(residual.balance);
+        report.reaction = largest_entry(residual.reaction);
         state = now.state;
         lambda = now.lambda;
         return report;
@@ -160,10 +158,8 @@ double Relaxation::smallest_eigenvalue(const State& state, const Vector& lambda)
     if (m_ > 0) {
         assembler.begin(m_, n_);
         system_.add_constraint_jacobian(state, 0, assembler);
-        Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(dense(assembler.finish()).transpose());
-        qr.setThreshold(1e-10);
-        const Eigen::MatrixXd Q = qr.householderQ();
-        Z = Q.rightCols(n_ - qr.rank());
+        const PivotedQr qr(dense(assembler.finish()).transpose());
+        Z = qr.Q().rightCols(n_ - qr.rank(1e-10));
     }
     if (Z.cols() == 0) return std::numeric_limits<double>::quiet_NaN();
     const Eigen::MatrixXd ZKZ = Z.transpose() * K * Z, ZMZ = Z.transpose() * M * Z;

@@ -14,6 +14,7 @@
 #include "delassus/timestepper.hpp"
 #include "dynamics/step_tolerance.hpp"
 #include "solver/auto_solver.hpp"
+#include "solver/judgement.hpp"
 
 namespace delassus {
 
@@ -220,7 +221,8 @@ void SharedSteps::gather_bilateral(const std::vector<double>& own) {
 
 // ---- Solving ----
 
-double SharedSteps::goal_for(const PreparedPart& part, std::span<const double> own_error) const {
+double SharedSteps::goal_for(const PreparedPart& part, std::span<const double> own_error,
+                             const PartTraits& traits) const {
     const LocalMatrix& H = part.problem().H;
     const std::int64_t first = shares_.column_start[static_cast<std::size_t>(communicator_->rank())];
     double square = 0.0;
@@ -233,7 +235,7 @@ double SharedSteps::goal_for(const PreparedPart& part, std::span<const double> o
                     .reference = part.reference(),
                     .rows = static_cast<double>(part.problem().m_all()),
                     .gathered = true},
-                   part.needs());
+                   traits);
 }
 
 bool SharedSteps::solve(const Problem& local, Solution& solution, bool warm_start, const SolveSettings& settings,
@@ -259,9 +261,11 @@ bool SharedSteps::solve(const Problem& local, Solution& solution, bool warm_star
         if (!warm_start) own.x.assign(part.problem().a.size(), 0.0);
         SolveSettings of = settings;
         of.team = nullptr;
-        set_step_tolerance(config_, part.needs(), known != 0 ? std::optional(goal_for(part, own_error)) : std::nullopt,
-                           of);
-        solved = solve_part(part, own, warm_start, of, effort);
+        PartTraits traits{part.needs(), amplification_of(part.problem().cones, part.problem().law)};
+        communicator_->max(std::span(&traits.amplification, 1));
+        set_step_tolerance(config_, traits,
+                           known != 0 ? std::optional(goal_for(part, own_error, traits)) : std::nullopt, of);
+        solved = solve_part(part, own, warm_start, of, traits, effort);
     }
     spread(own.x, solution.x);
     solution.lambda.assign(static_cast<std::size_t>(local.m()), 0.0);
@@ -275,7 +279,7 @@ bool SharedSteps::solve(const Problem& local, Solution& solution, bool warm_star
 }
 
 bool SharedSteps::solve_part(const PreparedPart& part, Solution& own, bool warm_start, const SolveSettings& settings,
-                             SolverEffort& effort) {
+                             const PartTraits& traits, SolverEffort& effort) {
     constexpr double slack_of_rounding = 32.0;
     SolveReport report;
     const auto run = [&](PartitionedSolver& solver, Solution& answer) {
@@ -295,8 +299,7 @@ bool SharedSteps::solve_part(const PreparedPart& part, Solution& own, bool warm_
     };
     const auto judge = [&] {
         if (done() || !(settings.needed > 0.0) || report.status == Status::Infeasible) return;
-        report.near_goal = std::max(report.error.natural, report.error.balance) <=
-                           config_.tolerance.value_or(usable_multiple * loosest_goal(part.needs()));
+        report.near_goal = worst_of(report.error) <= config_.tolerance.value_or(usable_multiple * loosest_goal(traits));
     };
     const Solution start = own;
     run(*solver_, own);
@@ -325,8 +328,8 @@ bool SharedSteps::solve_part(const PreparedPart& part, Solution& own, bool warm_
     effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
     if (report.near_goal) ++effort.near_goal;
     if (done()) return true;
-    effort.worst_miss = std::max(effort.worst_miss, std::max(report.error.natural, report.error.balance) /
-                                                        std::max(settings.tolerance, rounding_limit_of_steps));
+    effort.worst_miss =
+        std::max(effort.worst_miss, worst_of(report.error) / std::max(settings.tolerance, rounding_limit_of_steps));
     if (effort.unsolved.empty())
         effort.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),

@@ -15,6 +15,7 @@
 #include "delassus/partitioned_solver.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/step_solver.hpp"
+#include "dynamics/step_tolerance.hpp"
 #include "partitioned/halo.hpp"
 
 namespace delassus {
@@ -81,8 +82,9 @@ private:
     /// Finds whose each cone is, and numbers the rows that fall to this process.
     void share_rows(const Problem& local);
     [[nodiscard]] bool solve_part(const PreparedPart& part, Solution& own, bool warm_start,
-                                  const SolveSettings& settings, SolverEffort& effort);
-    [[nodiscard]] double goal_for(const PreparedPart& part, std::span<const double> own_error) const;
+                                  const SolveSettings& settings, const PartTraits& traits, SolverEffort& effort);
+    [[nodiscard]] double goal_for(const PreparedPart& part, std::span<const double> own_error,
+                                  const PartTraits& traits) const;
     [[nodiscard]] bool is_own(const StepShares::Body& body) const { return body.owner == communicator_->rank(); }
     /// The entries of own columns of a local vector; and back, with those of ghosts from their owners.
     [[nodiscard]] std::vector<double> own_columns(std::span<const double> local) const;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -21,8 +22,17 @@
 #include "dynamics/step_tolerance.hpp"
 #include "problem/symmetry.hpp"
 #include "solver/auto_solver.hpp"
+#include "solver/judgement.hpp"
 
 namespace delassus {
+
+namespace {
+
+PartTraits traits_of(const PreparedProblem& part) {
+    return {part.needs(), amplification_of(part.problem().cones, part.problem().law)};
+}
+
+}  // namespace
 
 /// What is kept of a part of the problem from one step to the next.
 struct KeptPart {
@@ -137,6 +147,9 @@ struct StepSolver::Implementation {
     static bool is_rounding(const Errors& error) {
         return rows_are_rounding(error) && error.balance <= rounding_limit_of_steps;
     }
+
+    /// What the rounding of reactions that cancel one another leaves in the balance, as a share like it.
+    static double rounding_of_reactions(const Problem& problem, const Solution& solution);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -335,7 +348,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
-    set_step_tolerance(config, prepared.needs(), goal_for(prepared, columns), part_settings);
+    set_step_tolerance(config, traits_of(prepared), goal_for(prepared, columns), part_settings);
     if (share < suspicious) {
         const double least = rounding_of_motion / share;
         part_settings.tolerance = std::max(part_settings.tolerance, least);
@@ -362,23 +375,45 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         return report.status == Status::Solved || report.near_goal ||
                (config.sweeps && report.status == Status::IterationLimit);
     };
+    const auto count_rounding = [&] {
+        if (!done())
+            report.error.balance = std::max(report.error.balance, rounding_of_reactions(prepared.problem(), solution));
+    };
+    count_rounding();
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
     if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
+    count_rounding();
     // What nobody asked for ends no run.
     if (!done() && part_settings.needed > 0.0 && report.status != Status::Infeasible)
-        report.near_goal = std::max(report.error.natural, report.error.balance) <=
-                           config.tolerance.value_or(usable_multiple * loosest_goal(prepared.needs()));
+        report.near_goal =
+            worst_of(report.error) <= config.tolerance.value_or(usable_multiple * loosest_goal(traits_of(prepared)));
     result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
     if (done()) return;
     result.solved = false;
-    spent.worst_miss = std::max(spent.worst_miss, std::max(report.error.natural, report.error.balance) /
-                                                      std::max(part_settings.tolerance, rounding_limit_of_steps));
+    spent.worst_miss =
+        std::max(spent.worst_miss, worst_of(report.error) / std::max(part_settings.tolerance, rounding_limit_of_steps));
     if (spent.unsolved.empty())
         spent.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
                         report.error.natural, report.message.empty() ? "" : ": ", report.message);
+}
+
+// Beside reactions that grow without bound, as where two bodies squeeze a third, every velocity is rounding, and all
+// measures that add the two are small.
+double StepSolver::Implementation::rounding_of_reactions(const Problem& problem, const Solution& solution) {
+    sdk::Vector impulse = sdk::Vector::Zero(problem.n()), sizes = impulse;
+    const SparseMatrix& D = problem.D;
+    for (std::int32_t row = 0; row < D.rows; ++row)
+        for (auto e = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(row)]);
+             e < static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(row) + 1]); ++e) {
+            const double term = D.value[e] * solution.lambda[static_cast<std::size_t>(row)];
+            impulse[D.column[e]] += term;
+            sizes[D.column[e]] += std::abs(term);
+        }
+    const double size = std::max(impulse.norm(), sdk::VectorView(problem.a.data(), problem.n()).norm());
+    return size > 0.0 ? 0.5 * std::numeric_limits<double>::epsilon() * sizes.norm() / size : 0.0;
 }
 
 // What dry friction stops loses a share of its speed in each step that is as small as the tolerance, until the squares
@@ -486,7 +521,7 @@ std::optional<double> StepSolver::Implementation::goal_for(const PreparedProblem
                     .in_rows = part.meter().norm_in_rows(errors),
                     .reference = part.meter().reference(),
                     .rows = static_cast<double>(problem.m())},
-                   part.needs());
+                   traits_of(part));
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {

@@ -17,6 +17,7 @@ extern "C" DELASSUS_API void delassus_fclib_write(const delassus::Problem& probl
     delassus::write_in_child(name_in_messages, "HDF5", [&] {
         delassus::hdf5::require_memory();
         delassus::fclib::write_file(problem, file, name_in_messages);
+        return std::int64_t{0};
     });
 }
 

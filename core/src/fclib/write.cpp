@@ -7,6 +7,7 @@
 #include "delassus/error.hpp"
 #include "fclib/fclib.hpp"
 #include "hdf5/hdf5.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::fclib {
 namespace {
@@ -152,7 +153,17 @@ void write_vectors(const Writer& parent, const Problem& problem, const Rows& row
     if (split != b.end()) vectors.numbers(second, {split, b.end()});
 }
 
+/// Tells the file from those that other programs wrote.
+void write_mark(hid_t file, const std::string& name) {
+    const Handle type(H5Tcopy(H5T_C_S1)), space(H5Screate(H5S_SCALAR));
+    H5Tset_size(type.get(), file_mark.size());
+    const Handle attribute(H5Acreate2(file, "writer", type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT));
+    if (!attribute.valid() || H5Awrite(attribute.get(), type.get(), file_mark.data()) < 0)
+        throw InputError(fmt::format("{} cannot be written ({}).", name, last_complaint()));
+}
+
 void write_content(hid_t file, const Problem& problem, const Rows& rows, const std::string& name) {
+    write_mark(file, name);
     const std::int32_t n = problem.n();
     const std::int32_t contact = rows.contact_rows;
     const std::int32_t free = problem.m() - contact;

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "delassus/error.hpp"
+#include "support/nearest_name.hpp"
 
 namespace delassus::hdf5 {
 namespace {
@@ -278,6 +279,12 @@ std::vector<std::string> Group::members() const {
     if (H5Literate(id_.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &names) < 0)
         refuse(fmt::format(" cannot be listed ({})", last_complaint()));
     return names;
+}
+
+void Group::require_only(const std::vector<std::string_view>& known) const {
+    for (const auto& name : members())
+        if (std::find(known.begin(), known.end(), name) == known.end())
+            refuse(fmt::format("/{} has no meaning here{}", name, nearest_name_hint(name, known)));
 }
 
 std::string Group::attribute_text(const char* name) const {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -108,6 +109,8 @@ public:
 
     /// The names of the groups and datasets in it, by name.
     [[nodiscard]] std::vector<std::string> members() const;
+    /// Refuses a group or dataset in it that is none of these.
+    void require_only(const std::vector<std::string_view>& known) const;
     /// A short text of fixed or of variable length that hangs on the group; empty if there is none.
     [[nodiscard]] std::string attribute_text(const char* name) const;
     /// An integer that hangs on the group; `missing` if there is none.

@@ -209,6 +209,7 @@ void drive_joint(Joint& joint, const MotorParameters& motor, Motions& motions) {
         row.scale = -1.0;
         joint.rows.push_back(row);
     }
+    joint.motors.push_back(motor.name);
     motions.push_back(std::move(motion));
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mechanics/linkage.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Dense>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -8,6 +10,8 @@
 #include <limits>
 #include <map>
 #include <numeric>
+
+#include "support/pivoted_qr.hpp"
 
 namespace delassus::mechanics {
 
@@ -103,18 +107,19 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         grounded = grounded || own.size() < (joint.gear ? 4U : 2U);
         has_loops_ = has_loops_ || joint.gear;
         if (joint.gear) {
-            rows_.push_back({&joint, nullptr, false, joint.gear->slides.has_value()});
+            rows_.push_back({&joint, nullptr, nullptr, false, joint.gear->slides.has_value()});
         } else {
             const JointParameters& given = joint.parameters;
             reach(given.first, vector(given.point));
             reach(given.second, vector(given.kind == JointKind::Distance ? given.second_point : given.point));
         }
-        int driven = 0;
-        for (const Row& row : joint.rows) {
-            rows_.push_back({&joint, &row, is_driven(row), row.u.count == 2});
-            if (rows_.back().driven) ++driven;
+        const std::size_t own_rows = joint.rows.size() - joint.motors.size();
+        for (std::size_t i = 0; i < joint.rows.size(); ++i) {
+            const Row& row = joint.rows[i];
+            rows_.push_back(
+                {&joint, &row, i < own_rows ? nullptr : &joint.motors[i - own_rows], is_driven(row), row.u.count == 2});
         }
-        has_loops_ = has_loops_ || driven > 1;
+        has_loops_ = has_loops_ || joint.motors.size() > 1;
         for (std::int32_t i = 0; i < joint.row_count(); ++i) numbers_.push_back(joint.first_row + i);
     }
     has_loops_ = has_loops_ || own_joints.size() + 1 > members_.size() + (grounded ? 1 : 0);
@@ -124,6 +129,12 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         all_.push_back(i);
         if (!rows_[i].driven) scleronomic_.push_back(i);
     }
+}
+
+std::string Linkage::owner_of(std::size_t row) const {
+    const RowOfJoint& one = rows_[row];
+    return one.motor ? fmt::format("motor \"{}\"", *one.motor)
+                     : fmt::format("joint \"{}\"", one.joint->parameters.name);
 }
 
 // ---- Motions ----
@@ -376,12 +387,7 @@ Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& v
     const Eigen::VectorXd lengths = lengths_of_rows(A);
     A = lengths.cwiseInverse().asDiagonal() * A;
     const Eigen::VectorXd b = -value.cwiseQuotient(lengths);
-    if (rows_.size() <= most_dense_rows) {
-        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor;
-        factor.setThreshold(threshold);
-        factor.compute(Eigen::MatrixXd(A));
-        return unscaled(factor.solve(b), metric);
-    }
+    if (rows_.size() <= most_dense_rows) return unscaled(least_solution(A, b, threshold), metric);
     // Rows that repeat each other make A Aᵀ singular; a small diagonal leaves the solution within their span.
     constexpr double shift = 1e-12;
     Eigen::SparseMatrix<double> G = A * Eigen::SparseMatrix<double, Eigen::RowMajor>(A.transpose());
@@ -501,18 +507,16 @@ Linkage::Rank Linkage::rank_at(const State& state, const std::vector<std::size_t
     const Eigen::MatrixXd columns = Eigen::MatrixXd(A).transpose() * lengths.cwiseInverse().asDiagonal();
     const Eigen::HouseholderQR<Eigen::MatrixXd> first(columns.leftCols(sure));
     const Eigen::MatrixXd turned = first.householderQ().transpose() * columns.rightCols(columns.cols() - sure);
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(turned.bottomRows(columns.rows() - sure));
-    const auto count = std::min(factor.rows(), factor.cols());
-    rank.pivots.setOnes(sure + count);
-    rank.pivots.tail(count) = factor.matrixQR().diagonal().head(count).cwiseAbs();
-    if (sure == 0 && count > 0 && rank.pivots[0] > 0.0) rank.pivots /= double(rank.pivots[0]);
-    for (Eigen::Index i = 0; i < factor.cols(); ++i)
-        rank.order.push_back(others[static_cast<std::size_t>(factor.colsPermutation().indices()[i])]);
+    const PivotedQr factor(turned.bottomRows(columns.rows() - sure));
+    const Eigen::VectorXd pivots = factor.pivots();
+    rank.pivots.setOnes(sure + pivots.size());
+    rank.pivots.tail(pivots.size()) = pivots;
+    if (sure == 0 && pivots.size() > 0 && pivots[0] > 0.0) rank.pivots /= pivots[0];
+    for (const std::size_t i : factor.order()) rank.order.push_back(others[i]);
     rank.rank = static_cast<std::size_t>((rank.pivots.array() > threshold).count());
     if (motions) {
         rank.Q = first.householderQ();
-        const Eigen::MatrixXd beside = factor.householderQ();
-        rank.Q.rightCols(columns.rows() - sure) = (rank.Q.rightCols(columns.rows() - sure) * beside).eval();
+        rank.Q.rightCols(columns.rows() - sure) = (rank.Q.rightCols(columns.rows() - sure) * factor.Q()).eval();
     }
     return rank;
 }
@@ -567,6 +571,28 @@ std::vector<std::size_t> Linkage::independent_rows(const State& state) const {
 std::vector<std::size_t> Linkage::rows_by_rank(const State& state, double threshold) const {
     const Rank rank = rank_at(state, all_, threshold);
     return rank.first(rank.rank);
+}
+
+std::string Linkage::owners_of_implying(const State& state, std::size_t row,
+                                        const std::vector<std::size_t>& rows) const {
+    constexpr double counts = 1e-3;
+    std::vector<std::size_t> all = rows;
+    all.push_back(row);
+    Values values;
+    evaluate(state, all, values);
+    const auto A = scaled(values, Metric::Length);
+    const Eigen::MatrixXd columns = Eigen::MatrixXd(A).transpose() * lengths_of_rows(A).cwiseInverse().asDiagonal();
+    const auto count = static_cast<Eigen::Index>(rows.size());
+    const Eigen::VectorXd shares = least_solution(columns.leftCols(count), columns.col(count), dependent).cwiseAbs();
+    std::vector<std::string> owners, motors;
+    for (Eigen::Index i = 0; i < count; ++i) {
+        if (!(shares[i] > counts * largest_entry(shares))) continue;
+        const std::size_t other = rows[static_cast<std::size_t>(i)];
+        auto& into = rows_[other].motor ? motors : owners;
+        std::string owner = owner_of(other);
+        if (owner != owner_of(row) && (into.empty() || into.back() != owner)) into.push_back(std::move(owner));
+    }
+    return fmt::format("{}", fmt::join(motors.empty() ? owners : motors, ", "));
 }
 
 bool Linkage::better_rows(const State& state, std::vector<std::size_t>& kept) const {

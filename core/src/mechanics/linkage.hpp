@@ -25,7 +25,12 @@ public:
     [[nodiscard]] bool has_loops() const { return has_loops_; }
     /// Diameter of the joints and mass centres at t = 0, at least that of a body's inertia, m.
     [[nodiscard]] double size() const { return size_; }
-    [[nodiscard]] const std::string& joint_of(std::size_t row) const { return rows_[row].joint->parameters.name; }
+    /// The joint or motor of a row: joint "hinge".
+    [[nodiscard]] std::string owner_of(std::size_t row) const;
+    /// The owners of those rows, which are independent, on which another one depends; motors alone if there are any:
+    /// motor "first", motor "second".
+    [[nodiscard]] std::string owners_of_implying(const State& state, std::size_t row,
+                                                 const std::vector<std::size_t>& rows) const;
 
     /// These rows, which are independent, are chosen before all others. is_certain(number in the whole system).
     template <class Predicate>
@@ -84,8 +89,9 @@ private:
     struct RowOfJoint {
         const Joint* joint;
         const Row* row;
-        bool driven;  // depends on time
-        bool length;  // in m, else rad
+        const std::string* motor;  // null for a row of the joint itself
+        bool driven;               // depends on time
+        bool length;               // in m, else rad
     };
     enum class Metric { Mass, Length };
     struct Values;

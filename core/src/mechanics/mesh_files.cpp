@@ -3,13 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <string>
 
 #include "delassus/error.hpp"
+#include "mechanics/checks.hpp"
 #include "mechanics/mesh_modules.hpp"
 #include "support/module.hpp"
 
@@ -21,6 +24,43 @@ void must_be_there(const std::filesystem::path& file) {
     if (!std::filesystem::is_regular_file(file, error))
         throw InputError(fmt::format("{}: there is no such file", file.string()));
 }
+
+/// What a file says is checked before anything is computed from it. Triangles and vertices are counted from 1.
+void check_numbers(const Mesh& mesh, const std::string& who) {
+    const auto count = static_cast<std::int32_t>(mesh.vertices.size());
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+        for (const auto corner : mesh.triangles[i])
+            if (corner < 0 || corner >= count)
+                throw InputError(fmt::format("{}: triangle {} has the vertex {}, and there are {}", who, i + 1,
+                                             std::int64_t{corner} + 1, count));
+    for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
+        if (!mechanics::finite(mesh.vertices[i]))
+            throw InputError(fmt::format("{}: vertex {} is not finite", who, i + 1));
+}
+
+/// The surface in a file, and from where single precision counts: it has 24 bits of the distance from there.
+struct Surface {
+    Mesh mesh;
+    Vector3 middle{};
+
+    void check_precision(const Mesh& part, const std::string& who) const {
+        constexpr double bits = 0.5 * std::numeric_limits<float>::epsilon(), most = 1e-4;
+        Eigen::AlignedBox3d box;
+        double far = 0.0;
+        for (const auto& vertex : part.vertices) {
+            const Eigen::Vector3d place(vertex.data());
+            box.extend(place);
+            far = std::max(far, (place - Eigen::Vector3d(middle.data())).cwiseAbs().maxCoeff());
+        }
+        const double size = box.diagonal().norm();
+        if (bits * far > most * size)
+            throw InputError(fmt::format(
+                "{}: a surface of size {:.3g} m lies {:.3g} m from where its file has its origin or its middle, and is "
+                "read in single precision, with an error of {:.1e} m; move it to the origin in its file, and put the "
+                "body or the shape to that position",
+                who, size, far, bits * far));
+    }
+};
 
 /// Equal points become one; triangles without area by that are left out.
 Mesh joined(const Mesh& mesh) {
@@ -80,14 +120,17 @@ void scale_by(double scale, std::vector<Vector3>& vertices) {
         for (double& x : vertex) x *= scale;
 }
 
-Mesh read_triangles(const std::filesystem::path& file, double scale) {
+Surface read_triangles(const std::filesystem::path& file, double scale) {
     must_be_there(file);
     const auto read = reinterpret_cast<DelassusSurfaceMeshRead>(module_symbol(
         "delassus_surface_mesh", "delassus_surface_mesh_read", file.string() + " cannot be read", "assimp"));
     Mesh mesh;
-    read(file, mesh);
+    std::vector<Vector3> middle(1);
+    read(file, mesh, middle[0]);
     scale_by(scale, mesh.vertices);
-    return joined(mesh);
+    scale_by(scale, middle);
+    check_numbers(mesh, file.string());
+    return {joined(mesh), middle[0]};
 }
 
 /// Six times the volume of a tetrahedron.
@@ -138,17 +181,21 @@ void check_elements(const TetrahedralMesh& mesh, const std::string& who) {
 }  // namespace
 
 std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double scale) {
-    std::vector<Mesh> parts = parts_of(read_triangles(file, scale));
-    for (std::size_t i = 0; i < parts.size(); ++i)
-        check_closed_surface(parts[i],
-                             parts.size() == 1 ? file.string() : fmt::format("{}, part {}", file.string(), i + 1));
+    const Surface surface = read_triangles(file, scale);
+    std::vector<Mesh> parts = parts_of(surface.mesh);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const std::string who = parts.size() == 1 ? file.string() : fmt::format("{}, part {}", file.string(), i + 1);
+        check_closed_surface(parts[i], who);
+        surface.check_precision(parts[i], who);
+    }
     return parts;
 }
 
 Mesh read_terrain(const std::filesystem::path& file, double scale) {
-    Mesh mesh = read_triangles(file, scale);
-    check_terrain(mesh, file.string());
-    return mesh;
+    Surface surface = read_triangles(file, scale);
+    check_terrain(surface.mesh, file.string());
+    surface.check_precision(surface.mesh, file.string());
+    return std::move(surface.mesh);
 }
 
 TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double scale, int refinements) {
@@ -164,11 +211,12 @@ TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double 
         read(file, mesh);
         scale_by(scale, mesh.vertices);
     } else {
-        const Mesh surface = read_triangles(file, scale);
-        check_closed_surface(surface, file.string());
+        const Surface surface = read_triangles(file, scale);
+        check_closed_surface(surface.mesh, file.string());
+        surface.check_precision(surface.mesh, file.string());
         const auto fill = reinterpret_cast<DelassusVolumeMeshFill>(module_symbol(
             "delassus_volume_mesh", "delassus_volume_mesh_fill", file.string() + " cannot be read", "Netgen"));
-        fill(surface, refinements, file, mesh);
+        fill(surface.mesh, refinements, file, mesh);
     }
     check_elements(mesh, file.string());
     return mesh;

@@ -6,7 +6,9 @@
 
 extern "C" {
 /// delassus_surface_mesh_read of delassus_surface_mesh.so: all triangles of the file, points not yet joined.
-using DelassusSurfaceMeshRead = void (*)(const std::filesystem::path& file, delassus::Mesh& mesh);
+/// Coordinates are as exact as single precision is of their distance from `middle`.
+using DelassusSurfaceMeshRead = void (*)(const std::filesystem::path& file, delassus::Mesh& mesh,
+                                         delassus::Vector3& middle);
 /// delassus_volume_mesh_read and _fill of delassus_volume_mesh.so; elements are not checked.
 using DelassusVolumeMeshRead = void (*)(const std::filesystem::path& file, delassus::TetrahedralMesh& mesh);
 using DelassusVolumeMeshFill = void (*)(const delassus::Mesh& surface, int refinements,

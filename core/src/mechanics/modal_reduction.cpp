@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "mechanics/checks.hpp"
 #include "mechanics/eigenmodes.hpp"
+#include "support/pivoted_qr.hpp"
 
 namespace delassus::mechanics {
 namespace {
@@ -229,7 +229,6 @@ private:
         MatrixXd responses = with_held_rows(found.responses);
         responses.leftCols(motions.cols()) += motions;
         MatrixXd basis(mass_.size(), responses.cols() + normal_);
-        if (basis.cols() == 0) refuse(name_, "no mode is left of it; keep at least one");
         basis.leftCols(responses.cols()) = responses;
         basis.rightCols(normal_) = with_held_rows(found.modes.rightCols(normal_));
         for (int twice = 0; twice < 2; ++twice)
@@ -244,10 +243,10 @@ private:
         MatrixXd scaled = root.asDiagonal() * basis;
         for (Eigen::Index j = 0; j < scaled.cols(); ++j)
             if (const double norm = scaled.col(j).norm(); norm > 0.0) scaled.col(j) /= norm;
-        Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled);
-        qr.setThreshold(1e-10);
-        const Eigen::Index k = qr.rank();
-        MatrixXd W = qr.householderQ() * MatrixXd::Identity(scaled.rows(), k);
+        const PivotedQr qr(scaled);
+        const Eigen::Index k = qr.rank(1e-10);
+        if (k == 0) refuse(name_, "no mode is left of it; keep at least one");
+        MatrixXd W = qr.Q(k);
         W = root.cwiseInverse().asDiagonal() * W;
         MatrixXd stiffness = W.transpose() * times(structure_.K, W);
         stiffness = (0.5 * (stiffness + stiffness.transpose())).eval();

@@ -94,7 +94,8 @@ struct Gear {
 /// A joint's rows, in order; a gear has one of its own.
 struct Joint {
     JointParameters parameters;
-    std::vector<Row> rows;
+    std::vector<Row> rows;            ///< its own, then one of each motor
+    std::vector<std::string> motors;  ///< their names
     std::unique_ptr<Gear> gear;
     Angle angle;                 ///< Revolute
     Row slide;                   ///< Prismatic: the coordinate

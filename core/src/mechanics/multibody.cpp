@@ -8,6 +8,7 @@
 
 #include "mechanics/checks.hpp"
 #include "mechanics/multibody_implementation.hpp"
+#include "problem/cone_kinds.hpp"
 
 namespace delassus {
 
@@ -262,9 +263,10 @@ void MultibodySystem::add_load(const LoadParameters& load) {
 namespace {
 
 void check_material(const ContactMaterial& material) {
-    if (!(material.friction >= 0.0) || !std::isfinite(material.friction))
+    const sdk::ConeParameter& friction = operations_of(ConeKind::Friction).named_parameters()[0];
+    if (!friction.takes(material.friction))
         throw InputError(
-            fmt::format("the friction coefficient is {}; it must be finite and not negative", material.friction));
+            fmt::format("the friction coefficient is {}; it must be {}", material.friction, domain_of(friction)));
     if (!(material.restitution >= 0.0 && material.restitution <= 1.0))
         throw InputError(fmt::format("the restitution is {}; it must lie between 0 and 1", material.restitution));
 }

@@ -66,17 +66,17 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
         if (!(left.value <= assembled_position))
             throw InputError(fmt::format(
                 "the joints do not fit together at t = {:.9g} s: the bodies were moved by up to {:.3g} m and {:.3g} "
-                "rad, and \"{}\" still misses by {:.3g} of the mechanism's size of {:.3g} m (or in rad)",
+                "rad, and {} still misses by {:.3g} of the mechanism's size of {:.3g} m (or in rad)",
                 state.t, linkage.displacement(given, state).linear, linkage.displacement(given, state).angular,
-                linkage.joint_of(left.row), left.value, linkage.size()));
+                linkage.owner_of(left.row), left.value, linkage.size()));
     }
     if (!Linkage::is_rounding_of_rates(linkage.rate_residual(state, rows))) {
         const auto left = linkage.assemble_velocities(state, rows);
         if (!(left.share <= assembled_velocity))
             throw InputError(
-                fmt::format("no velocities fit the joints and motors at t = {:.9g} s: \"{}\" misses by {:.3g} of what "
+                fmt::format("no velocities fit the joints and motors at t = {:.9g} s: {} misses by {:.3g} of what "
                             "adds up in it; the mechanism cannot move that way from there",
-                            state.t, linkage.joint_of(left.row), left.share));
+                            state.t, linkage.owner_of(left.row), left.share));
     }
     const auto moved = linkage.displacement(given, state), faster = linkage.velocity_change(given, state);
     const auto before = linkage.speed(given), after = linkage.speed(state);
@@ -99,6 +99,7 @@ const Assembly& MultibodySystem::assemble() {
     auto& self = *implementation_;
     self.must_be_finished();
     self.beside_held.reset();
+    self.held_rows.clear();
     if (self.assembly) {
         keep_rows(self.first_kept_rows);
         return *self.assembly;
@@ -113,12 +114,24 @@ const Assembly& MultibodySystem::assemble() {
         if (leaves_out_rows) self.keep_of(linkage, rows);
         self.assemble(linkage, given, state, done);
         if (!leaves_out_rows) continue;
-        const auto left = linkage.residual(state, self.rows_of(linkage, false));
-        if (left.value > most_drift)
-            throw InputError(fmt::format(
-                "the joints do not fit together at t = 0: \"{}\" repeats what others do, and misses by {:.3g} of the "
-                "mechanism's size of {:.3g} m (or in rad) where they hold",
-                linkage.joint_of(left.row), left.value, linkage.size()));
+        const auto left_out = self.rows_of(linkage, false);
+        const auto others = [&](std::size_t row) {
+            return linkage.owners_of_implying(state, row, self.rows_of(linkage, true));
+        };
+        if (const auto left = linkage.residual(state, left_out); left.value > most_drift)
+            throw InputError(
+                fmt::format("the joints do not fit together at t = 0: {} contradicts {}, and misses by {:.3g} of the "
+                            "mechanism's size of {:.3g} m (or in rad) where all else holds",
+                            linkage.owner_of(left.row), others(left.row), left.value, linkage.size()));
+        // Beside all rows: in those left out, speeds that are rounding add up to rounding.
+        auto all = self.rows_of(linkage, true);
+        all.insert(all.end(), left_out.begin(), left_out.end());
+        if (const auto left = linkage.rate_residual(state, all);
+            left.share > most_drift && !Linkage::is_rounding_of_rates(left))
+            throw InputError(
+                fmt::format("no velocities fit the joints and motors at t = 0: {} contradicts {}, and misses by {:.3g} "
+                            "of the speed where all else holds",
+                            linkage.owner_of(left.row), others(left.row), left.share));
         self.redundant.push_back(std::move(linkage));
     }
     self.carry_nodes(state);
@@ -162,6 +175,7 @@ void MultibodySystem::hold_rows(const std::vector<std::int32_t>& held) {
     }
     std::sort(kept.begin(), kept.end());
     keep_rows(kept);
+    self.held_rows = held;
     self.beside_held = std::move(redundant);
 }
 
@@ -176,10 +190,11 @@ bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
         if (drifted) {
             auto needed = linkage.rows_by_rank(state, dependent_after_drift);
             if (needed.size() <= rows.size())
-                throw StepFailure(fmt::format(
-                    "\"{}\" repeated what other joints or motors do, and contradicts them now by {:.3g} of the "
-                    "mechanism's size of {:.3g} m (or in rad)",
-                    linkage.joint_of(drift.row), drift.value, linkage.size()));
+                throw StepFailure(
+                    fmt::format("{} contradicts {} now, and misses by {:.3g} of the mechanism's size of {:.3g} m (or "
+                                "in rad) where all else holds",
+                                linkage.owner_of(drift.row), linkage.owners_of_implying(state, drift.row, rows),
+                                drift.value, linkage.size()));
             rows = std::move(needed);
         } else if (step % steps_between_looks(linkage) != 0 || !linkage.better_rows(state, rows)) {
             continue;
@@ -210,7 +225,8 @@ std::vector<std::string> MultibodySystem::joints_with_rows_left_out() const {
     std::vector<std::string> names;
     for (const auto& joint : self.joints)
         for (std::int32_t i = 0; i < joint.row_count(); ++i)
-            if (self.place_of(joint, static_cast<std::size_t>(i)) < 0) {
+            if (self.place_of(joint, static_cast<std::size_t>(i)) < 0 &&
+                !std::binary_search(self.held_rows.begin(), self.held_rows.end(), joint.first_row + i)) {
                 names.push_back(joint.parameters.name);
                 break;
             }

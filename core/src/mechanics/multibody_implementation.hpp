@@ -73,6 +73,7 @@ struct MultibodySystem::Implementation {
     std::optional<Assembly> assembly;
     std::vector<std::int32_t> first_kept_rows;                   // those of assemble()
     std::vector<mechanics::Linkage> redundant;                   // those with rows that are left out
+    std::vector<std::int32_t> held_rows;                         // by other means: ascending
     std::optional<std::vector<mechanics::Linkage>> beside_held;  // likewise, where hold_rows() has been called
     std::vector<mechanics::MovingBody> moving;
     std::vector<BodyIndex> prescribed;  // bodies that move as they are told

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Elastic bodies of few modes in a multibody system (modal_body.hpp, modal_reduction.hpp, modal_attachment.hpp).
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,6 +10,7 @@
 
 #include "mechanics/checks.hpp"
 #include "mechanics/multibody_implementation.hpp"
+#include "support/pivoted_qr.hpp"
 
 namespace delassus {
 
@@ -34,14 +34,6 @@ void add_square(const MatrixXd& matrix, std::int32_t column, double factor, Matr
     const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block = matrix;
     const auto size = static_cast<std::int32_t>(block.rows());
     H.add_block(column, column, size, size, block.data(), factor);
-}
-
-/// The least x of all that make |A x − b| least.
-VectorXd least_solution(const MatrixXd& A, const VectorXd& b) {
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition(A.rows(), A.cols());
-    decomposition.setThreshold(1e-10);
-    decomposition.compute(A);
-    return decomposition.solve(b);
 }
 
 }  // namespace
@@ -282,6 +274,7 @@ void MultibodySystem::Implementation::carry_reduced(State& state) const {
                 rows += one.rows();
             }
         if (rows == 0) continue;
+        constexpr double singular = 1e-10;
         const double reach = body.model.places.colwise().norm().maxCoeff();
         const auto gather = [&](auto&& of) {
             MatrixXd all;
@@ -303,8 +296,9 @@ void MultibodySystem::Implementation::carry_reduced(State& state) const {
         /// The change of (c, ϑ, s) that takes a residual away.
         const auto change = [&](const MatrixXd& D, const VectorXd& residual) {
             VectorXd delta(6 + count);
-            delta.head<6>() = least_solution(D.leftCols<6>(), -residual);
-            delta.tail(count) = least_solution(D.rightCols(count), -residual - D.leftCols<6>() * delta.head<6>());
+            delta.head<6>() = least_solution(D.leftCols<6>(), -residual, singular);
+            delta.tail(count) =
+                least_solution(D.rightCols(count), -residual - D.leftCols<6>() * delta.head<6>(), singular);
             return delta;
         };
         constexpr int most_iterations = 20;
@@ -312,7 +306,7 @@ void MultibodySystem::Implementation::carry_reduced(State& state) const {
             place(state);
             const VectorXd C = gather([](const ModalAttachment& one, const ModalPlacement& own,
                                          const Placement& of_body) { return MatrixXd(one.value(own, of_body)); });
-            if (C.cwiseAbs().maxCoeff() <= 1e-13 * (reach + modal_at[k].x.norm())) break;
+            if (largest_entry(C) <= 1e-13 * (reach + modal_at[k].x.norm())) break;
             const VectorXd delta = change(jacobian(), C);
             double* q = state.q.data() + body.position;
             const Quaterniond turned = mechanics::rotated({q[3], q[4], q[5], q[6]}, delta.segment<3>(3));
@@ -337,7 +331,7 @@ void MultibodySystem::Implementation::carry_reduced(State& state) const {
                 return MatrixXd(result);
             });
         const VectorXd residual = D * v + rate;
-        if (residual.cwiseAbs().maxCoeff() > 1e-14 * (1.0 + reach) * speed) v += change(D, residual);
+        if (largest_entry(residual) > 1e-14 * (1.0 + reach) * speed) v += change(D, residual);
     }
 }
 

@@ -5,24 +5,17 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <string_view>
 
 #include "delassus/mesh_files.hpp"
 #include "mechanics/checks.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 namespace {
 
 constexpr std::size_t most_heights = 4'000'000;
-
-std::string whole_file(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    if (!stream) throw InputError(fmt::format("{}: there is no such file, or it cannot be read", file.string()));
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 /// A grey picture (PGM), plain (P2) or binary (P5), of 8 or 16 bits: http://netpbm.sourceforge.net/doc/pgm.html.
 class Picture {
@@ -114,7 +107,7 @@ Heights read_rows(const std::string& text, const std::string& name) {
 }  // namespace
 
 Heights read_heights(const std::filesystem::path& file) {
-    std::string bytes = whole_file(file);
+    std::string bytes = read_file(file);
     if (bytes.starts_with("P2") || bytes.starts_with("P5")) return Picture(std::move(bytes), file.string()).read();
     return read_rows(bytes, file.string());
 }

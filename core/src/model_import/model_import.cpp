@@ -9,6 +9,8 @@
 
 #include "delassus/error.hpp"
 #include "model_import/model.hpp"
+#include "problem/cone_kinds.hpp"
+#include "support/call_in_child.hpp"
 #include "support/module.hpp"
 #include "support/text_file.hpp"
 
@@ -25,28 +27,77 @@ constexpr std::array<Format, 3> formats = {
      {"robot", "URDF", "delassus_import_urdf", "delassus_import_urdf_read", "liburdfdom"},
      {"sdf", "SDF", "delassus_import_sdf", "delassus_import_sdf_read", "libsdformat"}}};
 
-/// The name of the first element: after declarations and comments.
-std::string root_of(const std::string& text) {
-    for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1)) {
-        if (text.compare(at, 4, "<!--") == 0) {
-            at = text.find("-->", at);
-            if (at == std::string::npos) break;
-            continue;
+/// Visits the tags of elements, without their brackets, in their order, until visit returns false.
+template <class Visitor>
+void for_each_tag(std::string_view text, Visitor&& visit) {
+    for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
+        const auto skip = [&](std::string_view begin, std::string_view end) {
+            if (text.compare(at, begin.size(), begin) != 0) return false;
+            at = text.find(end, at + begin.size());
+            return true;
+        };
+        if (skip("<!--", "-->") || skip("<![CDATA[", "]]>") || skip("<?", "?>") || skip("<!", ">")) continue;
+        std::size_t end = at + 1;
+        for (char quote = '\0'; end < text.size() && (quote != '\0' || text[end] != '>'); ++end) {
+            if (text[end] == quote)
+                quote = '\0';
+            else if (quote == '\0' && (text[end] == '"' || text[end] == '\''))
+                quote = text[end];
         }
-        if (at + 1 < text.size() && (text[at + 1] == '?' || text[at + 1] == '!')) continue;
-        const auto end = text.find_first_of(" \t\r\n/>", at + 1);
-        return text.substr(at + 1, end == std::string::npos ? end : end - at - 1);
+        if (!visit(text.substr(at + 1, end - at - 1))) return;
+        at = end;
     }
-    return {};
+}
+
+/// The name of the first element.
+std::string root_of(const std::string& text) {
+    std::string root;
+    for_each_tag(text, [&](std::string_view tag) {
+        root = tag.substr(0, tag.find_first_of(" \t\r\n/"));
+        return false;
+    });
+    return root;
+}
+
+// The libraries that read models take a call for each level, and use up the stack.
+void check_nesting(const std::string& text, const std::filesystem::path& file) {
+    constexpr int most = 1000;
+    int depth = 0;
+    for_each_tag(text, [&](std::string_view tag) {
+        if (tag.starts_with('/'))
+            --depth;
+        else if (!tag.ends_with('/'))
+            ++depth;
+        if (depth > most)
+            throw InputError(fmt::format("{}: its elements are nested more than {} deep", file.string(), most));
+        return true;
+    });
 }
 
 const Format& format_of(const std::filesystem::path& file) {
-    const std::string root = root_of(read_file(file));
+    const std::string text = read_file(file);
+    check_nesting(text, file);
+    const std::string root = root_of(text);
     for (const Format& one : formats)
         if (root == one.root) return one;
     throw InputError(fmt::format("{}: {}; a model is an XML file with the root <mujoco>, <robot> or <sdf>",
                                  file.string(),
                                  root.empty() ? "it has no XML element" : fmt::format("its root is <{}>", root)));
+}
+
+/// Simulators whose contacts are soft take any friction, and models use 1e15 for "never slides".
+void bound_frictions(Model& model) {
+    const double most = operations_of(ConeKind::Friction).named_parameters()[0].most;
+    const auto bound = [&](double& friction, const std::string& what) {
+        if (!(friction > most)) return;
+        model.lose(what, fmt::format("a friction of {:.6g}: it becomes {:.6g}, the largest of scenes", friction, most));
+        friction = most;
+    };
+    for (auto& material : model.materials) bound(material.friction, fmt::format("material \"{}\"", material.name));
+    for (auto& pair : model.material_pairs)
+        bound(pair.friction, fmt::format("the pair of materials \"{}\" and \"{}\"",
+                                         model.materials[static_cast<std::size_t>(pair.first)].name,
+                                         model.materials[static_cast<std::size_t>(pair.second)].name));
 }
 
 }  // namespace
@@ -122,15 +173,26 @@ ImportedScene import_model(const std::filesystem::path& file, const std::filesys
     const auto read = reinterpret_cast<ReadModel*>(
         module_symbol(format.module, format.symbol,
                       fmt::format("{}: {} cannot be imported", file.string(), format.name), format.library));
+    const auto read_into = [&](Model& model) {
+        try {
+            read(std::filesystem::absolute(file), settings, model);
+            merge_fixed(model);
+            bound_frictions(model);
+        } catch (const InputError& error) {
+            throw InputError(fmt::format("{}: {}", file.string(), error.what()));
+        }
+    };
+    // The libraries crash on some files, as on chains of very many links: a child process tries first.
+    constexpr unsigned most_seconds = 600;
+    call_in_child(file, format.library, most_seconds, [&] {
+        Model tried;
+        read_into(tried);
+        return std::string();
+    });
     Model model;
+    read_into(model);
     ImportedScene result;
     result.format = format.name;
-    try {
-        read(std::filesystem::absolute(file), settings, model);
-        merge_fixed(model);
-    } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: {}", file.string(), error.what()));
-    }
     write_scene(model, file, scene, settings, result);
     return result;
 }

@@ -260,14 +260,15 @@ private:
         const auto row_of = [&](std::size_t row, const char* between) {
             std::string text;
             for (std::size_t k = 0; k < columns; ++k)
-                text += (k == 0 ? "" : between) + number(shape.heights[row * columns + k]);
+                text.append(k == 0 ? "" : between).append(number(shape.heights[row * columns + k]));
             return text;
         };
         const auto rows = static_cast<std::size_t>(shape.rows);
         std::string all;
         if (shape.heights.size() <= most_heights) {
-            for (std::size_t row = 0; row < rows; ++row) all += (row == 0 ? "[" : ", [") + row_of(row, ", ") + "]";
-            all = "heights: [" + all + "]";
+            for (std::size_t row = 0; row < rows; ++row)
+                all += fmt::format("{}[{}]", row == 0 ? "" : ", ", row_of(row, ", "));
+            all = fmt::format("heights: [{}]", all);
         } else {
             for (std::size_t row = 0; row < rows; ++row) all += row_of(row, " ") + "\n";
             all = "file: " + quoted(file(shape.name, ".txt", all));

@@ -4,37 +4,26 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
 #include "output/system_model.hpp"
-#include "support/atomic_file.hpp"
 
 namespace delassus {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The names in a run folder. `delassus view` makes scene.html from the others.
-constexpr std::array<std::string_view, 8> own_files = {"checkpoint.json", "scene.yaml", "trajectory.h5", "scene.pvd",
-                                                       "report.json",     "vtk",        "problems",      "scene.html"};
 constexpr std::chrono::seconds between_checkpoints{5};
 
-/// Makes the folder, or empties that of an earlier run.
-void prepare(const fs::path& folder) {
+constexpr const char* kind_of_folder = "run";
+
+/// Whoever asks to go on in a folder without a run makes none.
+const fs::path& with_checkpoint(const fs::path& folder) {
+    const fs::path file = folder / "checkpoint.json";
     std::error_code error;
-    if (fs::exists(folder, error)) {
-        if (!fs::is_directory(folder, error))
-            throw InputError(fmt::format("{} is a file; -o needs a folder", folder.string()));
-        for (const auto& entry : fs::directory_iterator(folder))
-            if (std::find(own_files.begin(), own_files.end(), entry.path().filename().string()) == own_files.end())
-                throw InputError(fmt::format("{} holds {}, which no run wrote; choose another folder", folder.string(),
-                                             entry.path().filename().string()));
-        for (const auto name : own_files) fs::remove_all(folder / name, error);
-    }
-    fs::create_directories(folder / "vtk", error);
-    if (error) throw InputError(fmt::format("{} cannot be made: {}", folder.string(), error.message()));
+    if (!fs::exists(file, error)) throw InputError(fmt::format("{}: there is no such file.", file.string()));
+    return folder;
 }
 
 /// The default number of pictures of all systems.
@@ -48,37 +37,37 @@ std::int64_t worth_writing(const std::vector<VtkSeries>& series) {
 
 }  // namespace
 
-RunFolder::RunFolder(fs::path folder, const Scene& scene, const std::string& scene_text,
-                     std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces,
-                     std::optional<std::int64_t> pictures)
-    : folder_(std::move(folder)),
-      scene_(scene.canonical),
-      simulations_(simulations),
-      every_(every),
-      contact_forces_(contact_forces) {
-    prepare(folder_);
-    write_file_atomically(folder_ / "scene.yaml", scene_text);
+RunFolder::RunFolder(const fs::path& folder, const Scene& scene, const std::string& scene_text,
+                     std::vector<Simulation>& simulations, const RunOutput& output)
+    : folder_(folder, kind_of_folder), scene_(scene.canonical), simulations_(simulations) {
+    folder_.clear();
+    folder_.add_folder("vtk");
+    folder_.write("scene.yaml", scene_text);
     frame_times_.resize(simulations.size());
     picture_times_.resize(simulations.size());
-    open(scene, false, pictures);
+    open(scene, {}, output);
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         trajectory_->add_step(i, simulations_[i].record());
         add_frame(i);
     }
     checkpoint();
+    folder_.keep();
 }
 
-RunFolder::RunFolder(fs::path folder, const Scene& scene, std::vector<Simulation>& simulations, std::int64_t every,
-                     std::optional<std::int64_t> pictures)
-    : folder_(std::move(folder)), scene_(scene.canonical), simulations_(simulations), every_(every) {
-    Checkpoint checkpoint = checkpoint_of(folder_, scene);
-    contact_forces_ = checkpoint.contact_forces;
+RunFolder::RunFolder(const fs::path& folder, const Scene& scene, std::vector<Simulation>& simulations,
+                     const RunOutput& output)
+    : folder_(with_checkpoint(folder), kind_of_folder), scene_(scene.canonical), simulations_(simulations) {
+    Checkpoint checkpoint = checkpoint_of(folder, scene);
+    if (output.contact_forces && !checkpoint.contact_forces)
+        throw InputError(
+            fmt::format("the run in {} has no contact forces so far; leave out --contact-forces", folder.string()));
     for (std::size_t i = 0; i < simulations.size(); ++i) {
         frame_times_.push_back(std::move(checkpoint.systems[i].frame_times));
         picture_times_.push_back(std::move(checkpoint.systems[i].picture_times));
         simulations[i].load(std::move(checkpoint.systems[i].simulation));
     }
-    open(scene, true, pictures);
+    folder_.add_folder("vtk");
+    open(scene, std::move(checkpoint), output);
 }
 
 Checkpoint RunFolder::checkpoint_of(const fs::path& folder, const Scene& scene) {
@@ -93,29 +82,32 @@ Checkpoint RunFolder::checkpoint_of(const fs::path& folder, const Scene& scene) 
 
 RunFolder::~RunFolder() = default;
 
-void RunFolder::open(const Scene& scene, bool resume, std::optional<std::int64_t> pictures) {
+void RunFolder::open(const Scene& scene, std::optional<Checkpoint> resumed, const RunOutput& output) {
+    every_ = output.every.value_or(resumed ? resumed->every : 1);
+    contact_forces_ = resumed ? resumed->contact_forces : output.contact_forces;
+    dump_ = output.dump || !resumed ? output.dump : resumed->dump;
+    if (dump_.value_or(0) > 0) dump_problems();
     std::vector<TrajectorySystem> systems;
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         const SceneSystem& system = scene.systems[i];
         systems.push_back({system.name, system.integrator, system.solver.name, system.system->position_size(),
                            system.system->n(), system.step, trajectory_model(system), contact_forces_,
-                           simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size())});
-        series_.emplace_back(folder_ / "vtk", system.name, *system.system);
+                           simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size()),
+                           resumed ? std::move(resumed->systems[i].written) : std::vector<std::uint64_t>{}});
+        series_.emplace_back(folder_.path() / "vtk", system.name, *system.system);
     }
-    most_pictures_ = pictures.value_or(worth_writing(series_));
-    trajectory_ = open_trajectory(folder_ / "trajectory.h5", systems, resume);
+    most_pictures_ = output.pictures.value_or(resumed ? resumed->pictures : worth_writing(series_));
+    trajectory_ = open_trajectory(folder_.add("trajectory.h5"), systems, resumed.has_value());
     last_checkpoint_ = std::chrono::steady_clock::now();
 }
 
-void RunFolder::dump_problems(std::int64_t every) {
-    std::error_code error;
-    fs::create_directories(folder_ / "problems", error);
-    if (error) throw InputError(fmt::format("{}/problems cannot be made: {}", folder_.string(), error.message()));
+void RunFolder::dump_problems() {
+    folder_.add_folder("problems");
     for (auto& simulation : simulations_) {
-        simulation.solver().on_problem = [this, every, &simulation, step = std::int64_t{-1},
+        simulation.solver().on_problem = [this, &simulation, step = std::int64_t{-1},
                                           solve = 0](const Problem& problem) mutable {
             const std::int64_t now = simulation.record().step + 1;
-            if (now % every != 0 || problem.m() == 0) return;
+            if (now % *dump_ != 0 || problem.m() == 0) return;
             solve = now == step ? solve + 1 : 1;
             step = now;
             const auto name = solve == 1 ? fmt::format("{}_{:06}", simulation.system().name, now)
@@ -124,7 +116,7 @@ void RunFolder::dump_problems(std::int64_t every) {
             copy.name = name;
             copy.source = fmt::format("step {} of system {} from t = {:.17g} s, solve {}", now,
                                       simulation.system().name, simulation.state().t, solve);
-            write_problem(copy, folder_ / "problems" / name);
+            write_problem(copy, folder_.add("problems/" + name));
         };
     }
 }
@@ -150,8 +142,13 @@ void RunFolder::add_frame(std::size_t system) {
     frame_times_[system].push_back(simulation.state().t);
     if (!picture_is_due(system)) return;
     const auto number = static_cast<std::int64_t>(picture_times_[system].size());
-    series_[system].write(number, simulation.state());
-    if (contact_forces_) series_[system].write_contacts(number, simulation.state().t, contacts);
+    const VtkSeries& series = series_[system];
+    folder_.add("vtk/" + series.file_name(number));
+    series.write(number, simulation.state());
+    if (contact_forces_) {
+        folder_.add("vtk/" + series.contacts_file_name(number));
+        series.write_contacts(number, simulation.state().t, contacts);
+    }
     picture_times_[system].push_back(simulation.state().t);
 }
 
@@ -166,19 +163,19 @@ bool RunFolder::picture_is_due(std::size_t system) const {
 void RunFolder::checkpoint() {
     trajectory_->flush();
     std::vector<VtkCollectionPart> parts;
-    Checkpoint checkpoint{scene_, {}, contact_forces_};
+    Checkpoint checkpoint{scene_, {}, contact_forces_, every_, most_pictures_, dump_};
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         parts.push_back({&series_[i], &picture_times_[i], contact_forces_});
-        checkpoint.systems.push_back(
-            {simulations_[i].system().name, simulations_[i].save(), frame_times_[i], picture_times_[i]});
+        checkpoint.systems.push_back({simulations_[i].system().name, simulations_[i].save(), frame_times_[i],
+                                      picture_times_[i], trajectory_->written(i)});
     }
-    write_vtk_collection(folder_ / "scene.pvd", "vtk", parts);
-    write_checkpoint(checkpoint, folder_ / "checkpoint.json");
+    write_vtk_collection(folder_.add("scene.pvd"), "vtk", parts);
+    write_checkpoint(checkpoint, folder_.add("checkpoint.json"));
     last_checkpoint_ = std::chrono::steady_clock::now();
 }
 
-void RunFolder::write_report(const std::string& json) const {
-    write_file_atomically(folder_ / "report.json", json);
+void RunFolder::write_report(const std::string& json) {
+    folder_.write("report.json", json);
 }
 
 }  // namespace delassus

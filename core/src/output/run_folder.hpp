@@ -15,8 +15,18 @@
 #include "output/trajectory.hpp"
 #include "output/vtk_series.hpp"
 #include "simulation/checkpoint.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus {
+
+/// What shapes the output of a run. What is absent is chosen, or as it was in a run that goes on.
+struct RunOutput {
+    std::optional<std::int64_t> every{};     ///< steps from frame to frame; 1
+    std::optional<std::int64_t> pictures{};  ///< about how many frames, evenly in time, are written for ParaView too; a
+                                             ///< picture of 1000 spheres takes 1.5 MB
+    std::optional<std::int64_t> dump{};  ///< the problems with rows of every step so many apart, from step one; none
+    bool contact_forces = false;         ///< whether frames have them
+};
 
 class DELASSUS_API RunFolder {
 public:
@@ -24,25 +34,20 @@ public:
     static constexpr std::int64_t default_pictures = 200, default_picture_bytes = 200'000'000;
 
     /// Begins a new run in the folder, which must be absent, empty, or hold an earlier run, which is removed.
-    /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder. every: how many steps there are
-    /// from frame to frame. contact_forces: whether frames have them. pictures: about how many frames, evenly in time,
-    /// are written for ParaView too; a picture of 1000 spheres takes 1.5 MB.
-    RunFolder(std::filesystem::path folder, const Scene& scene, const std::string& scene_text,
-              std::vector<Simulation>& simulations, std::int64_t every, bool contact_forces = false,
-              std::optional<std::int64_t> pictures = {});
-    /// Goes on with the run in the folder, with contact forces if it has them: puts the simulations where its
-    /// checkpoint is, and cuts off what was written after it. Throws InputError if there is none or if it belongs to
-    /// another scene.
-    RunFolder(std::filesystem::path folder, const Scene& scene, std::vector<Simulation>& simulations,
-              std::int64_t every, std::optional<std::int64_t> pictures = {});
+    /// scene_text: of the file, kept as scene.yaml. The simulations outlive the folder.
+    RunFolder(const std::filesystem::path& folder, const Scene& scene, const std::string& scene_text,
+              std::vector<Simulation>& simulations, const RunOutput& output = {});
+    /// Goes on with the run in the folder: puts the simulations where its checkpoint is. What was written after it is
+    /// cut off where the first step is written; until then nothing is changed. Throws InputError if there is no
+    /// checkpoint, if it belongs to another scene, if it or the trajectory is not what was written, or if contact
+    /// forces are wanted that it does not have.
+    RunFolder(const std::filesystem::path& folder, const Scene& scene, std::vector<Simulation>& simulations,
+              const RunOutput& output = {});
     /// The checkpoint of a run folder. Throws InputError if there is none or if it belongs to another scene.
     [[nodiscard]] static Checkpoint checkpoint_of(const std::filesystem::path& folder, const Scene& scene);
     ~RunFolder();
     RunFolder(const RunFolder&) = delete;
     RunFolder& operator=(const RunFolder&) = delete;
-
-    /// Also writes the problem with rows of every `every`-th step, counted from step one.
-    void dump_problems(std::int64_t every);
 
     /// Takes note of the step that the simulation has just taken.
     void add_step(std::size_t system);
@@ -52,21 +57,21 @@ public:
     /// Everything on disk, up to the last step taken. Where bodies are shared, after Simulation::gather().
     void checkpoint();
 
-    [[nodiscard]] bool contact_forces() const { return contact_forces_; }
-
-    void write_report(const std::string& json) const;
+    void write_report(const std::string& json);
 
 private:
-    void open(const Scene& scene, bool resume, std::optional<std::int64_t> pictures);
+    void open(const Scene& scene, std::optional<Checkpoint> resumed, const RunOutput& output);
+    void dump_problems();
     void add_frame(std::size_t system);
     [[nodiscard]] bool picture_is_due(std::size_t system) const;
 
-    std::filesystem::path folder_;
+    OutputFolder folder_;
     std::string scene_;
     std::vector<Simulation>& simulations_;
-    std::int64_t every_;
+    std::int64_t every_ = 1;
     bool contact_forces_ = false;
     std::int64_t most_pictures_ = 0;
+    std::optional<std::int64_t> dump_;
     std::vector<std::vector<double>> frame_times_, picture_times_;
     std::vector<VtkSeries> series_;
     std::unique_ptr<TrajectoryWriter> trajectory_;

@@ -73,13 +73,16 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
                                                                        {"velocity", v},
                                                                        {"angular_velocity", omega}};
         }
+        const auto* joints = simulation.joint_coordinates();
+        const std::int32_t of_trees = joints ? joints->rows_saved() : 0;
         Json one = {{"name", system.name},
                     {"integrator", system.integrator},
                     {"solver_chosen", system.solver.name.empty() ? Json(nullptr) : Json(system.solver.name)},
                     {"solvers_loaded", simulation.solver().loaded()},
                     {"velocities", velocities},
                     {"constraints", system.system->constraint_rows()},
-                    {"redundant_constraints", system.system->constraint_rows() - system.system->m()},
+                    {"redundant_constraints", system.system->constraint_rows() - of_trees - system.system->m()},
+                    {"redundant_joints", system.system->joints_with_rows_left_out()},
                     {"assembly",
                      {{"displacement", json_number(simulation.assembly().displacement)},
                       {"rotation", json_number(simulation.assembly().rotation)},

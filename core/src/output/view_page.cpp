@@ -7,6 +7,7 @@
 #include "output/view_json.hpp"
 #include "support/html_page.hpp"
 #include "support/json.hpp"
+#include "support/sentence.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus {
@@ -31,7 +32,7 @@ RecordedRun read_run(const fs::path& folder, const RecordingLimits& limits) {
             run.status = json.at("status").get<std::string>();
             run.message = json.at("message").get<std::string>();
         } catch (const nlohmann::json::exception& damage) {
-            throw InputError(fmt::format("{} is not the report of a run: {}", report.string(), damage.what()));
+            throw InputError(fmt::format("{} is not the report of a run: {}", report.string(), sentence_of(damage)));
         }
     }
     run.systems = read_trajectory(file, limits);

@@ -6,6 +6,9 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <system_error>
+
+#include "support/process_record.hpp"
 
 namespace delassus {
 
@@ -13,13 +16,17 @@ namespace {
 constexpr int exit_of_a_failed_run = 3;
 }
 
-AloneAlarm::AloneAlarm(const Communicator& communicator, std::string sentence) {
+AloneAlarm::AloneAlarm(const Communicator& communicator, const std::string& sentence) {
     if (communicator.size() == 1) return;
-    thread_ = std::thread([this, &communicator, sentence = std::move(sentence)] {
-        std::unique_lock lock(mutex_);
-        if (!condition_.wait_for(lock, std::chrono::seconds(2), [this] { return done_; }))
-            fail_alone(communicator, sentence);
-    });
+    try {
+        thread_ = std::thread([this, &communicator, sentence] {
+            std::unique_lock lock(mutex_);
+            if (!condition_.wait_for(lock, std::chrono::seconds(2), [this] { return done_; }))
+                fail_alone(communicator, sentence);
+        });
+    } catch (const std::system_error&) {  // no thread can be started: nobody would notice that the others do not come
+        fail_alone(communicator, sentence);
+    }
 }
 
 AloneAlarm::~AloneAlarm() {
@@ -41,6 +48,7 @@ void fail_alone(const Communicator& communicator, const std::string& sentence) {
     fmt::print(stderr, "delassus: process {} of {} failed, so the others end too: {}\n", communicator.rank(),
                communicator.size(), sentence);
     std::fflush(stderr);
+    process_record().last_word.store(exit_of_a_failed_run);
     communicator.abort(exit_of_a_failed_run);
     std::_Exit(exit_of_a_failed_run);  // not reached
 }

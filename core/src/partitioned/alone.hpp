@@ -16,7 +16,7 @@ namespace delassus {
 /// for it somewhere else.
 class AloneAlarm {
 public:
-    AloneAlarm(const Communicator& communicator, std::string sentence);
+    AloneAlarm(const Communicator& communicator, const std::string& sentence);
     ~AloneAlarm();
     AloneAlarm(const AloneAlarm&) = delete;
     AloneAlarm& operator=(const AloneAlarm&) = delete;

@@ -7,6 +7,7 @@
 #include "delassus/error.hpp"
 #include "partitioned/mpi_module.hpp"
 #include "support/module.hpp"
+#include "support/sentence.hpp"
 
 namespace delassus {
 
@@ -53,12 +54,9 @@ void together(const Communicator& communicator, const std::function<void()>& bod
     bool failed = false;
     try {
         body();
-    } catch (const std::bad_alloc&) {
-        failed = true;
-        sentence = "out of memory";
     } catch (const std::exception& error) {
         failed = true;
-        sentence = error.what();
+        sentence = sentence_of(error);
     }
     const auto failures = communicator.all(failed ? 1 : 0);
     for (int rank = 0; rank < communicator.size(); ++rank)

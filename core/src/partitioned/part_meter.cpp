@@ -175,6 +175,8 @@ void PartMeter::renew() {
     part_.columns.fetch(*part_.communicator, v);
     std::vector<double> sums = {0.0, 0.0};
     for (std::size_t c = 0; c < scaling_.size(); ++c) {
+        const double scale = square(scaling_[c]);
+        if (!(scale > 0.0 && std::isfinite(scale))) sums[0] = std::numeric_limits<double>::quiet_NaN();
         const auto& cone = part_.cones[c];
         for (std::int64_t row = cone.first_row; row < cone.first_row + cone.rows; ++row) {
             double r = problem.b[static_cast<std::size_t>(row)];
@@ -184,7 +186,9 @@ void PartMeter::renew() {
         }
     }
     part_.communicator->sum(sums);
-    reference_ = sums[0] > 0.0 ? std::sqrt(sums[0]) : 1.0;
+    reference_ = !std::isfinite(sums[0]) ? std::numeric_limits<double>::quiet_NaN()
+                 : sums[0] > 0.0         ? std::sqrt(sums[0])
+                                         : 1.0;
     r_norm_ = std::sqrt(sums[1]);
 }
 

@@ -23,6 +23,7 @@
 #include "solver/ranking.hpp"
 #include "solver/solver_implementation.hpp"
 #include "support/finite.hpp"
+#include "support/sentence.hpp"
 
 namespace delassus {
 
@@ -36,8 +37,9 @@ constexpr double seconds_between_agreements = 0.02;
 /// The context of the progress callback on one process. All processes call it for the same iterations.
 class PartListener {
 public:
-    PartListener(const PreparedPart& problem, const SolveSettings& settings, SolveReport& report, Stopwatch& watch)
-        : problem_(problem), settings_(settings), report_(report), watch_(watch) {}
+    PartListener(const PreparedPart& problem, const SolveSettings& settings, SolveReport& report, Stopwatch& watch,
+                 ForeignCall& call)
+        : problem_(problem), settings_(settings), report_(report), watch_(watch), call_(call) {}
 
     // The border: nothing is thrown through the plugin. A process that cannot go on ends the run of all, since the
     // others wait for it.
@@ -53,9 +55,10 @@ public:
             self.watch_.stop();
             const auto answer = self.hear(iteration, x, lambda, give_up);
             self.watch_.start();
+            if (answer == DELASSUS_CONTINUE) self.call_.renew();
             return answer;
         } catch (const std::exception& error) {
-            fail_alone(self.problem_.communicator(), error.what());
+            fail_alone(self.problem_.communicator(), sentence_of(error));
         }
     }
 
@@ -101,6 +104,7 @@ private:
     const SolveSettings& settings_;
     SolveReport& report_;
     Stopwatch& watch_;
+    ForeignCall& call_;
     double next_sample_ = 0.0, last_seconds_ = 0.0;
     std::int64_t next_ = 0, last_ = 0, stride_ = 1;
     Clock::time_point next_display_ = Clock::now();
@@ -144,6 +148,13 @@ struct PartitionedSolver::Implementation {
     bool analyzed = false;
     std::uint64_t pattern_id = 0, values_id = 0;
     SolveCost cost = {};
+    SetUpCounts own_counts = {};  // of the instance, at its last solve
+
+    [[nodiscard]] SetUpCounts counts() const {
+        SetUpCounts sum = own_counts;
+        for (const auto& [key, solver] : solvers) sum += solver.implementation_->counts();
+        return sum;
+    }
 
     /// Runs a collective operation of the plugin and agrees on how it ended; a sentence of the first process on which
     /// it failed, if it did.
@@ -152,8 +163,8 @@ struct PartitionedSolver::Implementation {
         std::string sentence;
     };
     template <class Operation>
-    Ending run(Operation&& operation) {
-        const std::int32_t own = instance->guarded(operation);
+    Ending run(const char* name, Operation&& operation, double limit) {
+        const std::int32_t own = instance->guarded(name, operation, limit);
         const bool failed = own == DELASSUS_ERROR || own == DELASSUS_NUMERICAL_FAILURE;
         const std::string sentence =
             failed ? fmt::format("{}: {}", instance->info().name, instance->last_error()) : std::string();
@@ -179,15 +190,17 @@ struct PartitionedSolver::Implementation {
     }
 
     /// Renews the analysis and the factorisation as far as the problem's identity asks.
-    Ending set_up(const delassus_local_problem& raw) {
+    Ending set_up(const delassus_local_problem& raw, double limit) {
         if (analyzed && pattern_id == raw.pattern_id && values_id == raw.values_id) return {};
         if (!analyzed || pattern_id != raw.pattern_id) {
             analyzed = false;
-            auto ending = run([&] { return instance->border().analyze_partitioned(instance->get(), &raw); });
+            auto ending = run(
+                "analyze", [&] { return instance->border().analyze_partitioned(instance->get(), &raw); }, limit);
             if (ending.status != DELASSUS_SOLVED) return ending;
         }
         analyzed = false;
-        auto ending = run([&] { return instance->border().factorize_partitioned(instance->get(), &raw); });
+        auto ending = run(
+            "factorize", [&] { return instance->border().factorize_partitioned(instance->get(), &raw); }, limit);
         analyzed = ending.status == DELASSUS_SOLVED;
         pattern_id = raw.pattern_id;
         values_id = raw.values_id;
@@ -257,11 +270,11 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
     const auto& border = instance->border();
     if (border.use_team) {
         const sdk::Team team = settings.team ? settings.team->team() : sdk::Team();
-        instance->guarded([&] { return border.use_team(instance->get(), team.raw()), DELASSUS_SOLVED; });
+        instance->guarded("use_team", [&] { return border.use_team(instance->get(), team.raw()), DELASSUS_SOLVED; });
     }
     Stopwatch setup, watch;
     setup.start();
-    Ending ending = set_up(raw);
+    Ending ending = set_up(raw, limit_of_calls(settings));
     setup.stop();
     cost = {};
     cost.setup = setup.seconds();
@@ -276,17 +289,27 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
     outcome.phase_count = DELASSUS_PHASE_COUNT;
     outcome.bytes_sent = -1;
     bool given_up = false;
+    std::string message;
     if (ending.status == DELASSUS_SOLVED) {
-        PartListener listener(problem, settings, report, watch);
+        ForeignCall call(instance->who(), "in solve", limit_of_calls(settings));
+        PartListener listener(problem, settings, report, watch, call);
         const delassus_request request{
             sizeof request,      settings.warm_start ? 1 : 0, settings.tolerance, settings.max_iterations,
             settings.time_limit, &PartListener::callback,     &listener};
         watch.start();
-        ending = run([&] {
-            return border.solve_partitioned(instance->get(), &raw, &request, own.x.data(), own.lambda.data(), &outcome);
-        });
+        ending = run(
+            "solve",
+            [&] {
+                return border.solve_partitioned(instance->get(), &raw, &request, own.x.data(), own.lambda.data(),
+                                                &outcome);
+            },
+            std::numeric_limits<double>::infinity());
         watch.stop();
-        if (ending.status != DELASSUS_ERROR) report.iterations = outcome.iterations;
+        if (ending.status != DELASSUS_ERROR) {
+            report.iterations = outcome.iterations;
+            own_counts = {outcome.analyses, outcome.factorizations};
+        }
+        if (outcome.message) message = outcome.message;
         given_up = listener.given_up();
     }
     cost.bytes_sent = outcome.bytes_sent;
@@ -294,12 +317,10 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
     fit_phases(cost);
     communicator->max(seconds);
     report.seconds_solve = seconds[1];
-    report.analyses = outcome.analyses;
-    report.factorizations = outcome.factorizations;
     report.claimed_residual = outcome.residual;
     report.status = status_of(ending.status);
     if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
-    report.message = communicator->broadcast(outcome.message ? outcome.message : "");
+    report.message = communicator->broadcast(message);
     if (!ending.sentence.empty()) report.message = ending.sentence;
     if (settings.record_curve)
         report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
@@ -351,7 +372,7 @@ void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& prob
         report.stages.push_back({done.solver, done.options, done.law, ranked.stage.reason, stage.tolerance, done.status,
                                  done.message, done.iterations, done.seconds_setup + done.seconds_solve,
                                  done.error.natural});
-        const double worst = std::max(done.error.natural, done.error.balance);
+        const double worst = worst_of(done.error);
         const bool good = std::isfinite(worst) && worst < best;
         if (good || !started || done.status == Status::Solved) {
             own = std::move(next);
@@ -402,8 +423,16 @@ SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own,
     report.options = self.config.options;
     report.law = problem.problem().law;
     report.tolerance = settings.tolerance;
+    if (std::isnan(problem.reference())) {
+        refuse_to_judge(report);
+        report.error = problem.measure(own.x, own.lambda);
+        return report;
+    }
     self.ranking ? self.solve_in_stages(problem, own, settings, report)
                  : self.solve_with_plugin(problem, own, settings, report);
+    const SetUpCounts counts = self.counts();
+    report.analyses = counts.analyses;
+    report.factorizations = counts.factorizations;
 
     std::int64_t not_finite = all_finite(own.x) && all_finite(own.lambda) ? 0 : 1;
     run.max(std::span(&not_finite, 1));

@@ -2,7 +2,11 @@
 // The table of cones for what the host keeps.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <limits>
+#include <string>
 #include <string_view>
 #include <tuple>
 #include <vector>
@@ -32,6 +36,13 @@ inline const sdk::ConeOperations* find_cone_kind(std::string_view name) {
     const auto* row = std::find_if(sdk::cone_table.begin(), sdk::cone_table.end(),
                                    [&](const sdk::ConeOperations& kind) { return kind.name == name; });
     return row == sdk::cone_table.end() ? nullptr : row;
+}
+
+/// What a parameter must be, in words that follow "it must be".
+[[nodiscard]] inline std::string domain_of(const sdk::ConeParameter& parameter) {
+    if (parameter.most == std::numeric_limits<double>::infinity())
+        return fmt::format("finite and at least {}", parameter.least);
+    return fmt::format("at least {} and at most {}: {}", parameter.least, parameter.most, parameter.why_most);
 }
 
 /// The bytes of its parameters that enter a hash. The first parameter always does, so that older hashes stay valid.

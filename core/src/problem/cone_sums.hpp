@@ -51,11 +51,7 @@ struct SpatialFriction : sdk::FrictionCone {
 
     void project(const delassus_cone&, double* lambda) const { project_spatial(mu, lambda); }
     void project_dual(const delassus_cone&, double* u) const {
-        if (mu > 0.0) {
-            project_spatial(1.0 / mu, u);
-        } else {
-            u[0] = std::max(0.0, u[0]);
-        }
+        FrictionCone::project_dual(mu, 3, std::sqrt(u[1] * u[1] + u[2] * u[2]), u);
     }
 };
 

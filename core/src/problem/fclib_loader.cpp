@@ -5,6 +5,7 @@
 
 #include "support/atomic_file.hpp"
 #include "support/module.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus {
 namespace {
@@ -32,6 +33,7 @@ Problem read_fclib(const std::filesystem::path& file) {
 void write_fclib(const Problem& problem, const std::filesystem::path& file) {
     const auto write = reinterpret_cast<DelassusFclibWrite>(symbol("delassus_fclib_write"));
     const std::lock_guard lock(hdf5_mutex());
+    require_replaceable(file, "");
     AtomicFile target(file);
     write(problem, target.path(), file.string());
     target.commit();

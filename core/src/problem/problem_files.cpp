@@ -10,6 +10,7 @@
 #include "problem/fclib_loader.hpp"
 #include "problem/problem_folder.hpp"
 #include "problem/problem_hdf5_loader.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 namespace fs = std::filesystem;
@@ -26,6 +27,7 @@ Problem read_problem(const fs::path& path) {
     if (!fs::exists(path, error)) throw InputError(fmt::format("{}: there is no such file or folder.", path.string()));
     try {
         if (!names_hdf5_file(path) || fs::is_directory(path, error)) return read_problem_folder(path);
+        require_regular_file(path);
         return is_problem_hdf5(path) ? read_problem_hdf5(path) : read_fclib(path);
     } catch (const std::bad_alloc&) {
         throw InputError(fmt::format("{} does not fit into memory.", path.string()));

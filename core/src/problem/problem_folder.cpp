@@ -3,10 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <span>
-#include <string_view>
 
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
@@ -18,9 +16,6 @@
 namespace delassus {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr std::array<std::string_view, 6> problem_files = {"problem.json", "H.mtx", "D.mtx", "E.mtx", "a.mtx", "b.mtx"};
-constexpr std::array<std::string_view, 3> solution_files = {"x.mtx", "lambda.mtx", "report.json"};
 
 /// The longest vector of zeros that problem.json may ask for without a file for it.
 constexpr std::int32_t most_rows_without_file = 1'000'000;
@@ -100,7 +95,7 @@ Problem read_problem_folder(const fs::path& folder) {
 
 void write_problem_folder(const Problem& problem, const fs::path& folder) {
     const std::string json = problem_json_text(problem);
-    AtomicFolder target(folder, problem_files);
+    AtomicFolder target(folder, "problem");
     const auto write = [&](const char* name, const std::string& text) {
         write_file_atomically(target.path() / name, text);
     };
@@ -132,7 +127,7 @@ void write_solution(const Solution& solution, const std::string& report, const f
             }
         }
     }
-    AtomicFolder target(folder, solution_files);
+    AtomicFolder target(folder, "solution");
     write_file_atomically(target.path() / "x.mtx", vector_market_text(solution.x));
     write_file_atomically(target.path() / "lambda.mtx", vector_market_text(solution.lambda));
     if (!report.empty()) write_file_atomically(target.path() / "report.json", report);

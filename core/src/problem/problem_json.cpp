@@ -136,8 +136,8 @@ ProblemJson::Run parse_run(const Node& node) {
         const Node values = node.at(parameter.key);
         run.parameters.push_back(values.numbers(run.count, std::numeric_limits<double>::quiet_NaN()));
         for (const double value : run.parameters.back()) {
-            if (!(value >= parameter.least))
-                values.refuse("is {}, but a {} is at least {}", value, parameter.name, parameter.least);
+            if (!parameter.takes(value))
+                values.refuse("is {}, but a {} must be {}", value, parameter.name, domain_of(parameter));
         }
     }
     if (!found->is_separable() && node.has("dimension")) {

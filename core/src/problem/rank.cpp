@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "delassus/rank.hpp"
 
-#include <Eigen/QR>
 #include <Eigen/SparseQR>
 #include <algorithm>
 
 #include "delassus/sdk/problem_view.hpp"
 #include "problem/rank_module.hpp"
 #include "support/module.hpp"
+#include "support/pivoted_qr.hpp"
 
 namespace delassus {
 
@@ -47,10 +47,7 @@ sdk::SparseColumns columns_of(const SparseMatrix& D, const SparseMatrix& E, std:
 }
 
 std::int32_t dense_rank(const sdk::SparseColumns& columns) {
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor;
-    factor.setThreshold(dense_threshold);
-    factor.compute(Eigen::MatrixXd(columns));
-    return static_cast<std::int32_t>(factor.rank());
+    return static_cast<std::int32_t>(PivotedQr(Eigen::MatrixXd(columns)).rank(dense_threshold));
 }
 
 std::optional<std::int32_t> sparse_rank(const sdk::SparseColumns& columns) {

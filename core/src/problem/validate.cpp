@@ -147,10 +147,9 @@ private:
     void parameters(const Cone& block, const sdk::ConeOperations& kind, std::size_t c) const {
         const auto known = kind.named_parameters();
         for (std::size_t k = 0; k < known.size(); ++k) {
-            if (!std::isfinite(block.parameters[k]) || block.parameters[k] < known[k].least) {
-                refuse("cone {} has the {} {}; it must be finite and at least {}.", c, known[k].name,
-                       block.parameters[k], known[k].least);
-            }
+            if (!known[k].takes(block.parameters[k]))
+                refuse("cone {} has the {} {}; it must be {}.", c, known[k].name, block.parameters[k],
+                       domain_of(known[k]));
         }
         for (std::size_t k = known.size(); k < block.parameters.size(); ++k) {
             if (block.parameters[k] != 0) {

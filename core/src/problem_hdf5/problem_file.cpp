@@ -11,6 +11,7 @@
 #include "problem/cone_kinds.hpp"
 #include "problem/structure.hpp"
 #include "support/call_in_child.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus::problem_hdf5 {
 
@@ -25,6 +26,7 @@ OpenFile::OpenFile(const std::filesystem::path& path, const char* format) {
     if (!std::filesystem::exists(path, error)) throw InputError(name + ": there is no such file.");
     if (!std::filesystem::is_regular_file(path, error)) throw InputError(name + " is not a regular file.");
     bytes_ = static_cast<std::int64_t>(std::filesystem::file_size(path, error));
+    require_regular_file(path);
     if (H5Fis_hdf5(name.c_str()) <= 0) throw InputError(name + " is not an HDF5 file.");
     const Handle access(H5Pcreate(H5P_FILE_ACCESS));
     H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
@@ -55,6 +57,7 @@ void check_in_child(const std::filesystem::path& path, const char* format) {
 
 ProblemFile::ProblemFile(const std::filesystem::path& path) : file_(path, problem_format) {
     const Group& root = file_.root();
+    root.require_only({"H", "D", "E", "a", "b", "cones", "body_start"});
     a_ = root.number_array("a");
     b_ = root.number_array("b");
     n_ = a_.count();
@@ -63,6 +66,11 @@ ProblemFile::ProblemFile(const std::filesystem::path& path) : file_(path, proble
     D_ = open_matrix("D", m_);
     E_ = open_matrix("E", m_);
     const Group cones = root.group("cones");
+    std::vector<std::string_view> names = {"row_start", "kind", "lo", "hi"};
+    for (const auto& kind : sdk::cone_table)
+        for (const auto& parameter : kind.named_parameters())
+            if (std::find(names.begin(), names.end(), parameter.key) == names.end()) names.push_back(parameter.key);
+    cones.require_only(names);
     cone_row_ = cones.integer_array("row_start");
     cone_kind_ = cones.integer_array("kind");
     if (cone_row_.count() != cone_kind_.count() + 1)
@@ -98,6 +106,7 @@ ProblemFile::ProblemFile(const std::filesystem::path& path) : file_(path, proble
 std::optional<MatrixArrays> ProblemFile::open_matrix(const char* name, std::int64_t rows) const {
     if (!file_.root().has(name)) return std::nullopt;
     const Group group = file_.root().group(name);
+    group.require_only({"row_start", "column", "value"});
     MatrixArrays arrays{group.integer_array("row_start"), group.integer_array("column"), group.number_array("value")};
     if (arrays.row_start.count() != rows + 1)
         refuse(fmt::format("/{}/row_start has {} elements for {} rows", name, arrays.row_start.count(), rows));

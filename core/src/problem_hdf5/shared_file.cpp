@@ -10,6 +10,8 @@
 #include <cstring>
 
 #include "delassus/error.hpp"
+#include "support/call_in_child.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus::problem_hdf5 {
 
@@ -24,6 +26,7 @@ Writing::Writing(const std::filesystem::path& file, bool create, std::string tar
     if (file_ < 0)
         throw InputError(
             fmt::format("{} cannot be {} ({}).", target_, create ? "created" : "written", last_complaint()));
+    if (create) text("writer", std::string(file_mark));
 }
 
 Writing::~Writing() {
@@ -139,24 +142,28 @@ void write_in_turn(const Communicator& communicator, const std::filesystem::path
     const int rank = communicator.rank();
     std::optional<AtomicFile> target;
     std::string name;
+    // A child, because HDF5 crashes at the end of a process in which it could not write.
+    const auto write = [&](bool create, const std::function<void(Writing&)>& content) {
+        traffic.bytes_written += write_in_child(path, "HDF5", [&] {
+            hdf5::require_memory();
+            Writing file(name, create, path.string());
+            content(file);
+            file.close();
+            return file.bytes();
+        });
+    };
     together(communicator, [&] {
         if (rank != 0) return;
+        require_replaceable(path, "");
         target.emplace(path);
         name = target->path().string();
-        Writing file(name, true, path.string());
-        lay_out(file);
-        file.close();
-        traffic.bytes_written += file.bytes();
+        write(true, lay_out);
         reserve(name, path.string());
     });
     name = communicator.broadcast(name);
     for (int turn = 0; turn < communicator.size(); ++turn) {
         together(communicator, [&] {
-            if (rank != turn) return;
-            Writing file(name, false, path.string());
-            write_own(file);
-            file.close();
-            traffic.bytes_written += file.bytes();
+            if (rank == turn) write(false, write_own);
         });
     }
     together(communicator, [&] {

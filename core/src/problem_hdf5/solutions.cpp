@@ -143,6 +143,7 @@ void read_solution(const Communicator& communicator, const std::filesystem::path
     });
     together(communicator, [&] {
         const OpenFile file(path, solution_format);
+        file.root().require_only({"x", "lambda", "report"});
         const auto read = [&](const char* name, const Places& places) {
             const hdf5::Array array = file.root().number_array(name);
             if (array.count() != places.total)

@@ -2,7 +2,9 @@
 #include "scene/mass_properties.hpp"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <numbers>
+#include <vector>
 
 #include "delassus/error.hpp"
 
@@ -12,10 +14,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// A homogeneous solid of density one about the origin of its own frame: ∫dV, ∫x dV, ∫x xᵀ dV.
+/// A homogeneous solid of density one: V = ∫dV, c = ∫x dV / V in its own frame, ∫(x − c)(x − c)ᵀ dV. About c, so that
+/// digits are not lost to a distance from the origin.
 struct Moments {
     double volume = 0.0;
-    Vector3d first = Vector3d::Zero();
+    Vector3d centre = Vector3d::Zero();
     Matrix3d second = Matrix3d::Zero();
 };
 
@@ -37,24 +40,29 @@ Moments capsule(double r, double l) {
     return moments;
 }
 
-// A closed surface is a sum of tetrahedra with the origin, of signed volume V = a·(b×c)/6:
+// A closed surface is a sum of tetrahedra with any point, here its first, of signed volume V = a·(b×c)/6:
 //     ∫x dV = V s/4,   ∫x xᵀ dV = V (s sᵀ + aaᵀ + bbᵀ + ccᵀ)/20,   s = a + b + c
 Moments closed_surface(const Mesh& mesh) {
     Moments moments;
+    if (mesh.vertices.empty()) return moments;
+    const Vector3d origin(mesh.vertices.front().data());
+    Vector3d first = Vector3d::Zero();
     for (const auto& triangle : mesh.triangles) {
         std::array<Vector3d, 3> corner;
-        for (std::size_t i = 0; i < 3; ++i) {
-            const auto& vertex = mesh.vertices[static_cast<std::size_t>(triangle[i])];
-            corner[i] = Vector3d(vertex[0], vertex[1], vertex[2]);
-        }
+        for (std::size_t i = 0; i < 3; ++i)
+            corner[i] = Vector3d(mesh.vertices[static_cast<std::size_t>(triangle[i])].data()) - origin;
         const double volume = corner[0].dot(corner[1].cross(corner[2])) / 6.0;
         const Vector3d sum = corner[0] + corner[1] + corner[2];
         moments.volume += volume;
-        moments.first += volume / 4.0 * sum;
+        first += volume / 4.0 * sum;
         Matrix3d second = sum * sum.transpose();
         for (const auto& point : corner) second += point * point.transpose();
         moments.second += volume / 20.0 * second;
     }
+    if (!(moments.volume > 0.0)) return moments;
+    const Vector3d centre = first / moments.volume;
+    moments.centre = origin + centre;
+    moments.second -= moments.volume * centre * centre.transpose();
     return moments;
 }
 
@@ -84,23 +92,27 @@ Moments moments_of(const Shape& shape) {
 }  // namespace
 
 MassProperties mass_properties(std::span<const Shape> shapes) {
+    std::vector<Moments> all;  // in the frame of the body
     Moments total;
     for (const auto& shape : shapes) {
-        const Moments own = moments_of(shape);
+        Moments own = moments_of(shape);
         if (!(own.volume > 0.0)) throw InputError("a shape without volume: mass and inertia cannot follow from it");
         const auto& [w, x, y, z] = shape.pose.orientation;
         const Matrix3d A = Eigen::Quaterniond(w, x, y, z).toRotationMatrix();
-        const Vector3d p(shape.pose.position[0], shape.pose.position[1], shape.pose.position[2]);
-        const Vector3d first = A * own.first;
+        own.centre = Vector3d(shape.pose.position.data()) + A * own.centre;
+        own.second = (A * own.second * A.transpose()).eval();
         total.volume += own.volume;
-        total.first += first + own.volume * p;
-        total.second += A * own.second * A.transpose() + first * p.transpose() + p * first.transpose() +
-                        own.volume * p * p.transpose();
+        total.centre += own.volume * own.centre;
+        all.push_back(own);
     }
-    const Vector3d centre = total.first / total.volume;
-    const Matrix3d about_centre = total.second - total.volume * centre * centre.transpose();
-    // J = tr(S) 1 − S with S = ∫x xᵀ dV.
-    const Matrix3d J = about_centre.trace() * Matrix3d::Identity() - about_centre;
+    total.centre /= total.volume;
+    for (const Moments& own : all) {
+        const Vector3d way = own.centre - total.centre;
+        total.second += own.second + own.volume * way * way.transpose();
+    }
+    // J = tr(S) 1 − S with S = ∫(x − c)(x − c)ᵀ dV.
+    const Matrix3d J = total.second.trace() * Matrix3d::Identity() - total.second;
+    const Vector3d& centre = total.centre;
     return {total.volume, {centre[0], centre[1], centre[2]}, {J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2)}};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "problem/cone_kinds.hpp"
 #include "scene/hull.hpp"
 #include "scene/mass_properties.hpp"
 #include "scene/system_reader.hpp"
@@ -14,8 +15,11 @@ namespace delassus::scene {
 ContactMaterial SystemReader::read_contact_material(const YAML::Node& node, std::string_view name,
                                                     std::vector<std::pair<std::string_view, Handler>> more) {
     ContactMaterial material;
-    more.emplace_back("friction",
-                      [&](const YAML::Node& n) { material.friction = nonnegative_number(source_, n, "friction"); });
+    more.emplace_back("friction", [&](const YAML::Node& n) {
+        material.friction = nonnegative_number(source_, n, "friction");
+        if (const auto& mu = operations_of(ConeKind::Friction).named_parameters()[0]; !mu.takes(material.friction))
+            source_.refuse(n, fmt::format("\"friction\" is {}; it must be {}", material.friction, domain_of(mu)));
+    });
     more.emplace_back("restitution", [&](const YAML::Node& n) {
         material.restitution = finite_number(source_, n, "restitution");
         if (material.restitution < 0.0 || material.restitution > 1.0)

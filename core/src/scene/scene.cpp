@@ -10,6 +10,7 @@
 #include "scene/choose_method.hpp"
 #include "scene/overrides.hpp"
 #include "scene/system_reader.hpp"
+#include "solver/auto_solver.hpp"
 #include "solver/name_with_options.hpp"
 #include "support/text_file.hpp"
 
@@ -38,20 +39,45 @@ void check_system_name(const Source& source, const YAML::Node& node, const std::
     if (!plain) source.refuse(node, fmt::format("\"{}\" cannot name a system; use letters, digits, _ and -", name));
 }
 
-void apply(const SceneOverrides& overrides, SceneSystem& system) {
-    if (!overrides.solver.empty()) {
-        const SolverConfig chosen = parse_solver(overrides.solver);
-        if (chosen.name != system.solver.name) system.solver.options.clear();
-        system.solver.name = chosen.name;
-        for (const auto& [key, text] : chosen.options) system.solver.options.insert_or_assign(key, text);
+/// Puts what --solver or --integrator names where the file would have it, so that --set can add to it. The options of
+/// another one than the file's mean nothing to this one and go. unnamed: what the file means where it gives no name.
+void put_method(const std::string& key, const std::string& text, std::string_view unnamed, Source& source,
+                YAML::Node map) {
+    if (text.empty() || !map.IsMap()) return;  // refused when it is read
+    const auto [name, options] = parse_name_with_options(text, key);
+    const std::string place = fmt::format("--{} {}", key, text);
+    const auto node_of = [&](const std::string& value) {
+        const YAML::Node node(value);
+        source.comes_from(node, place);
+        return node;
+    };
+    const YAML::Node given = std::as_const(map)[key];
+    YAML::Node section(YAML::NodeType::Map);
+    std::string before;
+    if (given.IsDefined() && given.IsScalar()) before = given.Scalar();
+    if (given.IsDefined() && given.IsMap()) {
+        section.reset(given);
+        const YAML::Node named = std::as_const(section)["name"];
+        if (named.IsDefined() && named.IsScalar()) before = named.Scalar();
+    } else {
+        source.comes_from(section, place);
+        map[key] = section;
     }
-    if (overrides.law) system.solver.law = overrides.law;
-    if (!overrides.integrator.empty()) {
-        const auto [name, options] = parse_name_with_options(overrides.integrator, "integrator");
-        if (name != system.integrator) system.integrator_options.clear();
-        system.integrator = name;
-        for (const auto& [key, text] : options) system.integrator_options.insert_or_assign(key, text);
+    NameWithOptions old{std::string(unnamed), {}};
+    if (!before.empty()) old = parse_name_with_options(before, key);
+    if (old.name.empty()) old.name = name;
+    if (old.name != name) {
+        section.remove("options");
+        old.options.clear();
     }
+    section["name"] = node_of(name);
+    if (old.options.empty() && options.empty()) return;
+    if (!std::as_const(section)["options"].IsDefined()) section["options"] = YAML::Node(YAML::NodeType::Map);
+    YAML::Node all = section["options"];
+    if (!all.IsMap()) return;  // refused when it is read
+    for (const auto& [option, value] : old.options)
+        if (!std::as_const(all)[option].IsDefined()) all[option] = node_of(value);
+    for (const auto& [option, value] : options) all[option] = node_of(value);
 }
 
 /// The overrides for every system, put where the file would have them.
@@ -97,14 +123,20 @@ Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOv
     Source source(where);
     Scene scene;
     try {
-        const YAML::Node root = YAML::Load(yaml);
+        const YAML::Node root = load_document(source, yaml);
         if (!root.IsMap()) throw InputError(fmt::format("{}: a scene must be a map of keys to values", where));
-        for (const auto& [path, text] : overrides.values) scene::set_value(source, root, path, text);
+        std::vector<YAML::Node> system_nodes;
         if (root["systems"].IsDefined() && root["systems"].IsMap()) {
-            for (const auto& entry : root["systems"]) put_values(overrides, source, entry.second);
+            for (const auto& entry : root["systems"]) system_nodes.push_back(entry.second);
         } else {
-            put_values(overrides, source, root);
+            system_nodes.push_back(root);
         }
+        for (const auto& system : system_nodes) {
+            put_method("solver", overrides.solver, auto_name, source, system);
+            put_method("integrator", overrides.integrator, {}, source, system);
+        }
+        for (const auto& [path, text] : overrides.values) scene::set_value(source, root, path, text);
+        for (const auto& system : system_nodes) put_values(overrides, source, system);
         const std::pair<std::string_view, Handler> title{
             "title", [&](const YAML::Node& n) { scene.title = scalar(source, n, "title"); }};
         if (root["systems"].IsDefined()) {
@@ -126,7 +158,7 @@ Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOv
             read_one_system(source, root, scene, "main", "the scene", {title, {"systems", [](const YAML::Node&) {}}});
         }
         for (auto& system : scene.systems) {
-            apply(overrides, system);
+            if (overrides.law) system.solver.law = overrides.law;
             scene::choose_method(system);
         }
         scene.canonical = canonical_text(root, overrides);

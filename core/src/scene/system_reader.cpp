@@ -7,6 +7,7 @@
 
 #include "config/sections.hpp"
 #include "scene/choose_method.hpp"
+#include "solver/name_with_options.hpp"
 
 namespace delassus::scene {
 
@@ -60,7 +61,12 @@ void SystemReader::build(const YAML::Node& place) {
     const std::array<std::string_view, 5> moving = {"bodies", "nodes", "elastic_blocks", "elastic_meshes", "beams"};
     if (std::none_of(moving.begin(), moving.end(), [&](std::string_view key) { return lists_.contains(key); }))
         missing("bodies", "bodies: [{name: ball, mass: 1, …}]");
-    read_items("joints", &SystemReader::read_joint);
+    // A gear names joints, which may stand after it.
+    const auto is_gear = [](const YAML::Node& item) {
+        return item["kind"].IsDefined() && item["kind"].IsScalar() && item["kind"].Scalar() == "gear";
+    };
+    read_items("joints", &SystemReader::read_joint, [&](const YAML::Node& item) { return !is_gear(item); });
+    read_items("joints", &SystemReader::read_joint, is_gear);
     read_items("motors", &SystemReader::read_motor);
     read_items("actuators", &SystemReader::read_actuator);
     read_items("springs", &SystemReader::read_spring);
@@ -73,11 +79,13 @@ void SystemReader::build(const YAML::Node& place) {
     at(place, [&] { result_.system->finish(); });
 }
 
-void SystemReader::read_items(std::string_view key, ItemReader reader) {
+void SystemReader::read_items(std::string_view key, ItemReader reader,
+                              const std::function<bool(const YAML::Node&)>& takes) {
     const auto found = lists_.find(key);
     if (found == lists_.end() || found->second.IsNull()) return;
     for (const YAML::Node& item : elements(source_, found->second, key)) {
         if (!item.IsMap()) source_.refuse(item, fmt::format("an item of \"{}\" must be a map of keys to values", key));
+        if (takes && !takes(item)) continue;
         const YAML::Node repeated = item["repeat"];
         if (!repeated.IsDefined()) {
             (this->*reader)(item, {});
@@ -208,19 +216,32 @@ void SystemReader::read_coordinates(const YAML::Node& node) {
 }
 
 void SystemReader::read_integrator(const YAML::Node& node) {
-    if (node.IsScalar()) {  // integrator: rk4
-        result_.integrator = node.Scalar();
+    OptionTexts of_name;
+    const auto choose = [&](const YAML::Node& n, const std::string& text) {
+        if (text.empty()) return;
+        try {
+            NameWithOptions parsed = parse_name_with_options(text, "integrator");
+            result_.integrator = std::move(parsed.name);
+            of_name = std::move(parsed.options);
+        } catch (const InputError& error) {
+            source_.refuse(n, error.what());
+        }
+    };
+    bool named = false;
+    if (node.IsScalar()) {  // integrator: rk4, integrator: newmark(beta=0.3)
+        choose(node, node.Scalar());
+        result_.integrator_options = std::move(of_name);
         return;
     }
-    bool named = false;
     read_map(source_, node, "\"integrator\"",
              {{"name",
                [&](const YAML::Node& n) {
-                   result_.integrator = scalar(source_, n, "name");
+                   choose(n, scalar(source_, n, "name"));
                    named = true;
                }},
               {"options", [&](const YAML::Node& n) { result_.integrator_options = read_options(source_, n); }}});
     if (!named) source_.refuse(node, "\"integrator\" lacks the key \"name\"");
+    result_.integrator_options.merge(of_name);  // a key of "options" counts
 }
 
 namespace {

@@ -3,6 +3,7 @@
 // file.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -58,7 +59,8 @@ private:
     void read_keep_apart(const YAML::Node& node);
 
     /// Reads each item of the list, each of its copies.
-    void read_items(std::string_view key, ItemReader reader);
+    /// takes: which items; none: all.
+    void read_items(std::string_view key, ItemReader reader, const std::function<bool(const YAML::Node&)>& takes = {});
 
     struct ShapeOfBody {
         Shape shape;

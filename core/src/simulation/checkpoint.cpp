@@ -12,6 +12,7 @@
 #include "delassus/error.hpp"
 #include "simulation/step_columns.hpp"
 #include "support/atomic_file.hpp"
+#include "support/checksum.hpp"
 #include "support/json.hpp"
 #include "support/text_file.hpp"
 
@@ -21,8 +22,19 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 6;
+constexpr int version = 7;
 constexpr std::size_t digits = 16;
+
+/// How a checkpoint of this text ends.
+std::string checksum_line(std::string_view text) {
+    return fmt::format(" \"crc32\": \"{:08x}\"\n}}\n", checksum(text));
+}
+
+void require_whole(std::string_view text) {
+    const auto line = text.rfind(" \"crc32\"");
+    if (line == std::string_view::npos || text.substr(line) != checksum_line(text.substr(0, line)))
+        throw InputError("it is damaged: its checksum is not that of its content");
+}
 
 // Numbers are their 64 bits in hexadecimal, one after the other: no digit is lost, and zeros keep their signs.
 std::string bits(const std::vector<double>& values) {
@@ -45,6 +57,26 @@ std::vector<double> numbers(const Json& json) {
         values.push_back(std::bit_cast<double>(one));
     }
     return values;
+}
+
+std::vector<double> as_numbers(const std::vector<std::uint64_t>& words) {
+    std::vector<double> values;
+    for (const auto word : words) values.push_back(std::bit_cast<double>(word));
+    return values;
+}
+
+std::vector<std::uint64_t> as_words(const std::vector<double>& values) {
+    std::vector<std::uint64_t> words;
+    for (const double value : values) words.push_back(std::bit_cast<std::uint64_t>(value));
+    return words;
+}
+
+/// The text's last key is a checksum of all before it.
+std::string with_checksum(std::string json) {
+    json.erase(json.find_last_of('}'));
+    while (json.ends_with('\n') || json.ends_with(' ')) json.pop_back();
+    json += ",\n";
+    return json + checksum_line(json);
 }
 
 /// By names; real numbers as bits.
@@ -77,10 +109,8 @@ SimulationTotals totals_of(const Json& json) {
             value.get_to(totals.*member);
         }
     };
-    for (const TotalColumn& column : total_columns) {
-        if (!json.contains(column.name)) throw InputError(fmt::format("its totals lack \"{}\"", column.name));
+    for (const TotalColumn& column : total_columns)
         std::visit([&](auto member) { take(json.at(column.name), member); }, column.value);
-    }
     return totals;
 }
 
@@ -91,6 +121,9 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                  {"version", version},
                  {"scene", checkpoint.scene},
                  {"contact_forces", checkpoint.contact_forces},
+                 {"every", checkpoint.every},
+                 {"pictures", checkpoint.pictures},
+                 {"dump", checkpoint.dump.value_or(0)},
                  {"systems", Json::array()}};
     for (const auto& system : checkpoint.systems) {
         const auto& simulation = system.simulation;
@@ -108,9 +141,10 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"sleeping", bits(simulation.sleeping)},
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)},
-                                   {"picture_times", bits(system.picture_times)}});
+                                   {"picture_times", bits(system.picture_times)},
+                                   {"written", bits(as_numbers(system.written))}});
     }
-    write_file_atomically(file, json_text(json, 1) + "\n");
+    write_file_atomically(file, with_checksum(json_text(json, 1)));
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& file) {
@@ -119,9 +153,13 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
         const Json json = parse_ordered_json(text);
         if (json.at("format") != format) throw InputError("it is not a checkpoint of Delassus");
         if (json.at("version") != version) throw InputError("it was written by another version of Delassus");
+        require_whole(text);
         Checkpoint checkpoint;
         json.at("scene").get_to(checkpoint.scene);
         json.at("contact_forces").get_to(checkpoint.contact_forces);
+        json.at("every").get_to(checkpoint.every);
+        json.at("pictures").get_to(checkpoint.pictures);
+        if (const auto dump = json.at("dump").get<std::int64_t>(); dump > 0) checkpoint.dump = dump;
         for (const Json& one : json.at("systems")) {
             CheckpointedSystem system;
             one.at("name").get_to(system.name);
@@ -136,6 +174,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             system.simulation.totals = totals_of(one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             system.picture_times = numbers(one.at("picture_times"));
+            system.written = as_words(numbers(one.at("written")));
             checkpoint.systems.push_back(std::move(system));
         }
         return checkpoint;

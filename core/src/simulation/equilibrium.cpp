@@ -9,6 +9,7 @@
 #include "delassus/error.hpp"
 #include "dynamics/path_follower.hpp"
 #include "dynamics/relaxation.hpp"
+#include "support/pivoted_qr.hpp"
 
 namespace delassus {
 namespace {
@@ -71,7 +72,7 @@ public:
         require_nothing_touches(mechanics_, found.state, rows_, 0.0);
         Vector loads = Vector::Zero(mechanics_.n()), lambda = Vector::Zero(mechanics_.m());
         mechanics_.add_force(found.state, 1.0, loads.data());
-        if (loads.size() > 0) found.largest_force = loads.lpNorm<Eigen::Infinity>();
+        found.largest_force = largest_entry(loads);
         double load = 0.0;
         int divided = 0;
         for (int step = 1; step <= rule_.load_steps;) {
@@ -164,7 +165,7 @@ private:
         Vector loads = Vector::Zero(mechanics_.n());
         mechanics_.set_load_factor(1.0);
         mechanics_.add_force(found.state, 1.0, loads.data());
-        if (loads.size() > 0) found.largest_force = loads.lpNorm<Eigen::Infinity>();
+        found.largest_force = largest_entry(loads);
         LoadPathPoint start;
         start.lambda = Vector::Zero(mechanics_.m());
         start.state = found.state;

@@ -2,6 +2,7 @@
 // Steps of a fixed size, counted from t = 0, and their parts where a method cannot take them as one.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -16,6 +17,11 @@ namespace delassus {
 
 /// Times within this fraction of a step are equal but for rounding.
 inline constexpr double rounding_of_step = 1e-9;
+
+/// Whether a run in steps of this size has come to its end, however short it is.
+inline bool has_ended(double t, double end, double h) {
+    return end - t <= rounding_of_step * std::min(h, end);
+}
 
 /// A step of fixed size from t: its size, and the time that it reaches.
 struct FixedStep {

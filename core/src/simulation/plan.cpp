@@ -11,6 +11,7 @@
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/simulation.hpp"
+#include "simulation/shared_reactions.hpp"
 #include "simulation/touching.hpp"
 #include "solver/auto_solver.hpp"
 
@@ -19,16 +20,6 @@ namespace {
 
 std::string counted(std::size_t count, std::string_view one, std::string_view many) {
     return fmt::format("{} {}", count, count == 1 ? one : many);
-}
-
-/// "a, b, c and 4 more".
-std::string some_of(const std::vector<std::string>& names) {
-    constexpr std::size_t most = 3;
-    std::vector<std::string> shown(names.begin(),
-                                   names.begin() + static_cast<std::ptrdiff_t>(std::min(most, names.size())));
-    std::string text = fmt::format("{}", fmt::join(shown, ", "));
-    if (names.size() > most) text += fmt::format(" and {} more", names.size() - most);
-    return text;
 }
 
 /// The reason where a scene asks for it.
@@ -201,10 +192,7 @@ private:
         }
         if (const auto redundant = plan_.constraints - of_trees - system_.system->m(); redundant > 0)
             leave(counted(static_cast<std::size_t>(redundant), "row of joints and motors", "rows of joints and motors"),
-                  joints ? std::string("others imply them in every configuration")
-                         : fmt::format(
-                               "others imply them in every configuration, their reactions are reported as 0: of {}",
-                               some_of(system_.system->joints_with_rows_left_out())));
+                  "others imply them in every configuration; " + shared_reactions(*system_.system));
         if (const std::string start = simulation_.start(); !start.empty())
             keep("a start other than the scene places it", start);
         if (has_limits()) {

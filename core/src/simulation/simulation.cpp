@@ -260,7 +260,8 @@ bool Simulation::renew_rows(State& state, std::int64_t steps) {
 
 bool Simulation::finished() const {
     // The last of steps that are chosen ends at `end` itself.
-    return system_->end - now_.state.t <= (system_->control ? 0.0 : rounding_of_step * system_->step);
+    const double t = now_.state.t;
+    return system_->control ? t >= system_->end : has_ended(t, system_->end, system_->step);
 }
 
 void Simulation::advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {

@@ -61,6 +61,12 @@ public:
                            problem.describe(needs));
     }
 
+    [[nodiscard]] SetUpCounts counts() const override {
+        SetUpCounts sum;
+        for (const auto& [key, solver] : solvers_) sum += counts_of(solver);
+        return sum;
+    }
+
     std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override {
         const std::uint64_t needs = needs_of(problem, {});

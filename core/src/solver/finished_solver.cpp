@@ -34,6 +34,11 @@ public:
         return finish_.refusal(problem, warm);
     }
 
+    [[nodiscard]] SetUpCounts counts() const override {
+        SetUpCounts sum = counts_of(main_);
+        return sum += counts_of(finish_);
+    }
+
     std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);

@@ -40,7 +40,28 @@ double least_natural(const Errors& error) {
     return std::max(error.dual, by_gap);
 }
 
+/// The first measure that is not finite; null if all are.
+const ErrorMeasure* unknown_measure(const Errors& error) {
+    for (const ErrorMeasure& measure : error_measures)
+        if (!std::isfinite(error.*measure.value)) return &measure;
+    return nullptr;
+}
+
 }  // namespace
+
+double worst_of(const Errors& error) {
+    if (unknown_measure(error)) return std::numeric_limits<double>::infinity();
+    return std::max({error.natural, error.dual, error.balance});
+}
+
+void refuse_to_judge(SolveReport& report) {
+    report.status = Status::NumericalFailure;
+    report.message =
+        "the numbers of the problem are too large or too small for double precision: with N = D H⁻¹ Dᵀ + E and r = D "
+        "H⁻¹a + b, the diagonal of N or the length of r, squared, is beyond 1e308 or below 1e-308, so that no error "
+        "can "
+        "be measured; other units may help";
+}
 
 void check_settings(const SolveSettings& settings) {
     if (!(settings.tolerance > 0.0) || !std::isfinite(settings.tolerance))
@@ -86,6 +107,13 @@ void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfB
                 "tolerance {:.2e}",
                 report.solver, report.error.natural, report.error.balance, report.tolerance);
         }
+    }
+    if (const ErrorMeasure* unknown = report.status == Status::Solved ? unknown_measure(report.error) : nullptr) {
+        report.status = Status::NumericalFailure;
+        report.message = fmt::format(
+            "{} claimed convergence, but the measure \"{}\" is {}: numbers of the problem or of the solution are too "
+            "large for double precision",
+            report.solver, unknown->name, report.error.*unknown->value);
     }
     if (const double least = report.status == Status::Solved && only_cones ? least_natural(report.error) : 0.0;
         least > lost_in_rounding * natural_bound) {

@@ -12,6 +12,10 @@
 
 #include "delassus/error.hpp"
 #include "delassus/registry.hpp"
+#include "delassus/sdk/blas_memory.hpp"
+#include "support/module.hpp"
+#include "support/process_record.hpp"
+#include "support/sentence.hpp"
 
 namespace delassus {
 
@@ -27,6 +31,28 @@ void keep_forever(const boost::dll::shared_library& library) {
     static auto* const libraries = new std::vector<boost::dll::shared_library>;
     const std::lock_guard lock(mutex);
     libraries->push_back(library);
+}
+
+/// The names of plugins loaded from libraries that were built without optimisation.
+class UnoptimizedNames {
+public:
+    void add(const std::string& name) {
+        const std::lock_guard lock(mutex_);
+        names_.insert(name);
+    }
+    [[nodiscard]] std::vector<std::string> list() {
+        const std::lock_guard lock(mutex_);
+        return {names_.begin(), names_.end()};
+    }
+
+private:
+    std::mutex mutex_;
+    std::set<std::string> names_;
+};
+
+UnoptimizedNames& unoptimized_names() {
+    static auto* const names = new UnoptimizedNames;
+    return *names;
 }
 
 boost::dll::shared_library open(const std::filesystem::path& path, bool global) {
@@ -67,6 +93,8 @@ std::vector<OptionInfo> read_options(const delassus_plugin_descriptor& descripto
         if (row.type < DELASSUS_OPTION_BOOLEAN || row.type > DELASSUS_OPTION_TEXT)
             throw PluginError(fmt::format("its option \"{}\" has an unknown type", option.key));
         option.type = static_cast<delassus_option_type>(row.type);
+        if (!row.default_value && row.type != DELASSUS_OPTION_TEXT)
+            throw PluginError(fmt::format("its option \"{}\" has no default", option.key));
         option.default_value = text_of(row.default_value);
         option.minimum = row.minimum;
         option.maximum = row.maximum;
@@ -128,6 +156,7 @@ PluginInfo read_descriptor(const delassus_plugin_descriptor& descriptor) {
     info.abi_minor = descriptor.abi_minor;
     info.flags = descriptor.flags;
     info.capabilities = descriptor.capabilities;
+    info.build = descriptor.build <= DELASSUS_BUILD_UNOPTIMIZED ? descriptor.build : DELASSUS_BUILD_UNKNOWN;
     info.options = read_options(descriptor);
     static_cast<void>(resolve_options(info.name, info.options, {}));  // the defaults must lie in their own domains
     return info;
@@ -139,11 +168,14 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
     const auto absolute = std::filesystem::absolute(path).lexically_normal();
     if (!std::filesystem::is_regular_file(absolute))
         throw PluginError(fmt::format("there is no plugin {}", absolute.string()));
+    const ForeignCall call("the plugin " + absolute.string(), "while it was loaded", ForeignCall::patience);
     auto library = open(absolute, false);
     keep_forever(library);
     if (!library.has(DELASSUS_PLUGIN_SYMBOL))
         throw PluginError(fmt::format("{} is not a Delassus plugin: it does not export {}", absolute.string(),
                                       DELASSUS_PLUGIN_SYMBOL));
+    if (!sdk::openblas_has_memory())
+        throw PluginError(no_memory_for_blas(fmt::format("the plugin {}", absolute.string())));
     std::shared_ptr<Plugin> plugin(new Plugin);
     try {
         plugin->descriptor_ = shake_hands(library.get<const delassus_plugin_descriptor*()>(DELASSUS_PLUGIN_SYMBOL)());
@@ -151,14 +183,19 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
-        throw PluginError(fmt::format("the plugin {}: {}", absolute.string(), error.what()));
+        throw PluginError(fmt::format("the plugin {}: {}", absolute.string(), sentence_of(error)));
     } catch (...) {
         throw PluginError(
             fmt::format("the plugin {} threw an exception from {}", absolute.string(), DELASSUS_PLUGIN_SYMBOL));
     }
     plugin->info_.library = absolute;
     if (plugin->info_.flags & DELASSUS_FLAG_GLOBAL_SYMBOLS) keep_forever(open(absolute, true));
+    if (plugin->info_.build == DELASSUS_BUILD_UNOPTIMIZED) unoptimized_names().add(plugin->info_.name);
     return plugin;
+}
+
+std::vector<std::string> unoptimized_plugins() {
+    return unoptimized_names().list();
 }
 
 std::shared_ptr<const Plugin> Plugin::of(const delassus_plugin_descriptor& descriptor) {

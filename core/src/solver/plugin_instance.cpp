@@ -29,7 +29,7 @@ Status status_of(std::int32_t raw) {
 }
 
 PluginInstance::PluginInstance(std::shared_ptr<const Plugin> plugin, const OptionTexts& chosen)
-    : plugin_(std::move(plugin)) {
+    : plugin_(std::move(plugin)), who_("the solver " + info().name) {
     const auto resolved = resolve_options(info().name, info().options, chosen);
     std::vector<delassus_option_value> values;
     for (const auto& value : resolved) {
@@ -37,8 +37,8 @@ PluginInstance::PluginInstance(std::shared_ptr<const Plugin> plugin, const Optio
         values.push_back(
             {value.key.c_str(), value.type, 0, value.integer, value.real, textual ? value.text.c_str() : nullptr});
     }
-    const auto status =
-        guarded([&] { return border().create(values.data(), static_cast<std::int32_t>(values.size()), &solver_); });
+    const auto status = guarded(
+        "create", [&] { return border().create(values.data(), static_cast<std::int32_t>(values.size()), &solver_); });
     if (status != DELASSUS_SOLVED || !solver_) {
         solver_ = nullptr;
         throw InputError(fmt::format("{} cannot be set up: {}", info().name, last_error()));
@@ -46,11 +46,12 @@ PluginInstance::PluginInstance(std::shared_ptr<const Plugin> plugin, const Optio
 }
 
 PluginInstance::~PluginInstance() {
-    if (solver_) guarded([&] { return border().destroy(solver_), DELASSUS_SOLVED; });
+    if (solver_) guarded("destroy", [&] { return border().destroy(solver_), DELASSUS_SOLVED; });
 }
 
 std::string PluginInstance::last_error() const {
     if (!thrown_.empty()) return thrown_;
+    const ForeignCall call(who_, "in last_error", ForeignCall::patience);
     const char* text = border().last_error(solver_);
     return text && *text ? text : "it gave no reason";
 }

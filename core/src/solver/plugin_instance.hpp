@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -12,6 +13,8 @@
 
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
+#include "support/process_record.hpp"
+#include "support/sentence.hpp"
 
 namespace delassus {
 
@@ -39,6 +42,11 @@ private:
     bool running_ = false;
 };
 
+/// Seconds after which a solver that has a time limit, and shows no sign of life, counts as hung.
+[[nodiscard]] inline double limit_of_calls(const SolveSettings& settings) {
+    return settings.time_limit + std::max(2.0, settings.time_limit);
+}
+
 [[nodiscard]] Status status_of(std::int32_t raw);
 
 /// Makes a solver with its options, and destroys it.
@@ -52,17 +60,25 @@ public:
 
     [[nodiscard]] const PluginInfo& info() const { return plugin_->info(); }
     [[nodiscard]] const delassus_plugin_descriptor& border() const { return plugin_->descriptor(); }
+    /// "the solver pgs"
+    [[nodiscard]] const std::string& who() const { return who_; }
     [[nodiscard]] void* get() const { return solver_; }
 
     /// Runs an operation of the plugin. Exceptions are not allowed through the border, but a plugin that throws all the
-    /// same must not take the host down.
+    /// same must not take the host down. limit: as of ForeignCall.
+    template <class Operation>
+    std::int32_t guarded(const char* name, Operation&& operation, double limit = ForeignCall::patience) {
+        const ForeignCall call(who_, std::string("in ") + name, limit);
+        return guarded(operation);
+    }
+    /// The same for what notes its call itself.
     template <class Operation>
     std::int32_t guarded(Operation&& operation) {
         thrown_.clear();
         try {
             return operation();
         } catch (const std::exception& error) {
-            thrown_ = fmt::format("it threw an exception through the plugin border: {}", error.what());
+            thrown_ = fmt::format("it threw an exception through the plugin border: {}", sentence_of(error));
         } catch (...) {
             thrown_ = "it threw an exception through the plugin border";
         }
@@ -75,6 +91,7 @@ public:
 
 private:
     std::shared_ptr<const Plugin> plugin_;
+    std::string who_;
     void* solver_ = nullptr;
     std::string thrown_;
 };

@@ -25,6 +25,7 @@ struct Listener {
     const ErrorMeter* meter;  // null unless the curve is recorded
     SolveReport& report;
     Stopwatch& watch;
+    ForeignCall& call;
     double seconds_before;  // setup
     double next_sample = 0.0;
     Clock::time_point next_display = Clock::now();
@@ -62,6 +63,7 @@ struct Listener {
             self.watch.stop();
             answer = self.hear(iteration, x, lambda);
             if (self.given_up && answer == DELASSUS_CONTINUE) answer = DELASSUS_STOP_CANCEL;
+            if (answer == DELASSUS_CONTINUE) self.call.renew();
         } catch (...) {
             self.watch.stop();
             self.failure = std::current_exception();
@@ -87,8 +89,9 @@ public:
                                problem.describe(missing), registry ? who_can(*registry, needs) : std::string());
         if (!border().accepts) return {};
         char reason[512] = "";
-        const auto answer =
-            guarded([&] { return border().accepts(instance.get(), &problem.raw(), reason, sizeof reason); });
+        const auto answer = instance.guarded(
+            "accepts", [&] { return border().accepts(instance.get(), &problem.raw(), reason, sizeof reason); },
+            std::min(ForeignCall::patience, limit_of_calls(settings)));
         if (answer == 1 && instance.thrown().empty()) return {};
         reason[sizeof reason - 1] = '\0';
         return fmt::format("{} cannot solve {}: {}.", info().name, quoted_name(problem),
@@ -97,28 +100,27 @@ public:
                                                       : "it gave no reason");
     }
 
+    [[nodiscard]] SetUpCounts counts() const override { return counts_; }
+
     std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override;
 
 private:
     [[nodiscard]] const delassus_plugin_descriptor& border() const { return instance.border(); }
-    template <class Operation>
-    std::int32_t guarded(Operation&& operation) {
-        return instance.guarded(operation);
-    }
-
     /// Renews the analysis and the factorisation as far as the problem's identity asks.
-    std::int32_t set_up(const PreparedProblem& problem) {
+    std::int32_t set_up(const PreparedProblem& problem, double limit) {
         const auto& raw = problem.raw();
         if (analyzed && pattern_id == raw.pattern_id && values_id == raw.values_id) return DELASSUS_SOLVED;
         if (!analyzed || pattern_id != raw.pattern_id) {
             analyzed = false;
-            if (const auto status = guarded([&] { return border().analyze(instance.get(), &raw); });
+            if (const auto status = instance.guarded(
+                    "analyze", [&] { return border().analyze(instance.get(), &raw); }, limit);
                 status != DELASSUS_SOLVED)
                 return status;
         }
         analyzed = false;
-        const auto status = guarded([&] { return border().factorize(instance.get(), &raw); });
+        const auto status = instance.guarded(
+            "factorize", [&] { return border().factorize(instance.get(), &raw); }, limit);
         analyzed = status == DELASSUS_SOLVED;
         pattern_id = raw.pattern_id;
         values_id = raw.values_id;
@@ -129,6 +131,7 @@ private:
     OptionTexts chosen;
     const Registry* registry;
     bool analyzed = false;
+    SetUpCounts counts_;  // at the last solve
     std::uint64_t pattern_id = 0, values_id = 0;
 };
 
@@ -136,11 +139,11 @@ std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution
                                         const SolveSettings& settings, SolveReport& report) {
     if (border().use_team) {
         const sdk::Team team = settings.team ? settings.team->team() : sdk::Team();
-        guarded([&] { return border().use_team(instance.get(), team.raw()), DELASSUS_SOLVED; });
+        instance.guarded("use_team", [&] { return border().use_team(instance.get(), team.raw()), DELASSUS_SOLVED; });
     }
     Stopwatch setup, watch;
     setup.start();
-    std::int32_t raw_status = set_up(problem);
+    std::int32_t raw_status = set_up(problem, limit_of_calls(settings));
     setup.stop();
     report.seconds_setup = setup.seconds();
 
@@ -151,27 +154,29 @@ std::optional<Errors> PluginSolver::run(const PreparedProblem& problem, Solution
     bool given_up = false;
     if (raw_status == DELASSUS_SOLVED) {
         const ErrorMeter* meter = settings.record_curve ? &problem.meter() : nullptr;
-        Listener listener{settings, meter, report, watch, report.seconds_setup};
+        ForeignCall call(instance.who(), "in solve", limit_of_calls(settings));
+        Listener listener{settings, meter, report, watch, call, report.seconds_setup};
         const delassus_request request{
             sizeof request,      settings.warm_start ? 1 : 0, settings.tolerance, settings.max_iterations,
             settings.time_limit, &Listener::callback,         &listener};
         watch.start();
-        raw_status = guarded([&] {
+        raw_status = instance.guarded([&] {
             return border().solve(instance.get(), &problem.raw(), &request, solution.x.data(), solution.lambda.data(),
                                   &outcome);
         });
         watch.stop();
         if (listener.failure) std::rethrow_exception(listener.failure);
-        if (instance.thrown().empty()) report.iterations = outcome.iterations;
+        if (instance.thrown().empty()) {
+            report.iterations = outcome.iterations;
+            counts_ = {outcome.analyses, outcome.factorizations};
+        }
+        if (outcome.message) report.message = outcome.message;
         given_up = listener.given_up;
     }
     report.seconds_solve = watch.seconds();
-    report.analyses = outcome.analyses;
-    report.factorizations = outcome.factorizations;
     report.claimed_residual = outcome.residual;
     report.status = status_of(raw_status);
     if (given_up && report.status == Status::Cancelled) report.status = Status::Stalled;
-    if (outcome.message) report.message = outcome.message;
     if (report.status == Status::Infeasible)
         judge_infeasibility(report, proven_size(problem, solution.x, solution.lambda));
     if (report.status == Status::Error || report.status == Status::NumericalFailure)

@@ -10,6 +10,7 @@
 #include "problem/need_of.hpp"
 #include "support/json.hpp"
 #include "support/nearest_name.hpp"
+#include "support/sentence.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus {
@@ -97,14 +98,14 @@ bool RankingRule::matches(const RankedNeeds& asked) const {
 
 Ranking::Ranking(const std::filesystem::path& file) {
     try {
-        const nlohmann::json json = parse_json(read_file(file));
+        const nlohmann::json json = parse_json(read_file(file, most_bytes_of_text));
         check_keys(json, {"format", "made_by", "rules"}, "a ranking");
         if (json.at("format") != 1) throw InputError("its format is not 1");
         for (const auto& rule : json.at("rules")) rules_.push_back(read_rule(rule));
         if (rules_.empty() || !json.at("rules").back().at("when").empty())
             throw InputError("its last rule must match everything: \"when\": {}");
     } catch (const nlohmann::json::exception& error) {
-        throw InputError(fmt::format("the ranking {} cannot be read: {}", file.string(), error.what()));
+        throw InputError(fmt::format("the ranking {} cannot be read: {}", file.string(), sentence_of(error)));
     } catch (const InputError& error) {
         throw InputError(fmt::format("the ranking {} cannot be used: {}", file.string(), error.what()));
     }

@@ -6,16 +6,18 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
+#include <map>
 #include <new>
 #include <set>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/library_location.hpp"
 #include "support/nearest_name.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 
@@ -41,9 +43,11 @@ Registry::Registry(std::vector<fs::path> folders) : folders_(std::move(folders))
     std::sort(plugins_.begin(), plugins_.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
 
     // Written by cmake/DelassusSummary.cmake.
-    std::ifstream left_out(folders_.back() / "not-built.list");
+    const fs::path not_built = folders_.back() / "not-built.list";
+    if (std::error_code absent; !fs::exists(not_built, absent)) return;
+    std::istringstream lines(read_file(not_built, most_bytes_of_text));
     for (std::string kind, name, reason;
-         std::getline(left_out, kind, '\t') && std::getline(left_out, name, '\t') && std::getline(left_out, reason);) {
+         std::getline(lines, kind, '\t') && std::getline(lines, name, '\t') && std::getline(lines, reason);) {
         if (kind == "solver") unbuilt_.push_back({name, reason});
         if (kind == "part") missing_parts_.push_back({name, reason});
     }
@@ -54,7 +58,7 @@ void Registry::scan(const fs::path& folder) {
     std::set<fs::path> libraries, sidecars;
     // A relative folder of the environment would depend on the working directory.
     if (!folder.is_absolute()) {
-        rejected_.push_back({folder, "a plugin folder must be given by an absolute path"});
+        rejected_.push_back({folder, "a plugin folder must be given by an absolute path", {}});
         return;
     }
     for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -64,33 +68,50 @@ void Registry::scan(const fs::path& folder) {
     }
     if (error == std::errc::not_enough_memory) throw std::bad_alloc();
     if (error) {
-        rejected_.push_back({folder, fmt::format("cannot be read: {}", error.message())});
+        rejected_.push_back({folder, fmt::format("cannot be read: {}", error.message()), {}});
         return;
     }
+    std::vector<std::pair<fs::path, PluginInfo>> described;
     for (const auto& sidecar : sidecars) {
         try {
-            PluginInfo info = read_sidecar(sidecar);
-            const bool listed_before = std::any_of(plugins_.begin(), plugins_.end(),
-                                                   [&](const PluginInfo& other) { return other.name == info.name; });
-            if (libraries.erase(info.library) == 0) {
-                rejected_.push_back(
-                    {sidecar, fmt::format("its library {} is missing", info.library.filename().string())});
-            } else if (info.abi_major != DELASSUS_ABI_MAJOR) {
-                rejected_.push_back(
-                    {info.library,
-                     fmt::format("built for version {}.{} of the plugin interface; this is {}.{}", info.abi_major,
-                                 info.abi_minor, DELASSUS_ABI_MAJOR, DELASSUS_ABI_MINOR)});
-            } else if (listed_before) {
-                rejected_.push_back({info.library, fmt::format("another plugin named \"{}\" comes first", info.name)});
-            } else {
-                plugins_.push_back(std::move(info));
-            }
+            described.emplace_back(sidecar, read_sidecar(sidecar));
         } catch (const PluginError& problem) {
-            rejected_.push_back({sidecar, problem.what()});
+            rejected_.push_back({sidecar, problem.what(), sidecar.stem().string()});
+            libraries.erase(fs::path(sidecar).replace_extension(".so"));
         }
     }
-    for (const auto& library : libraries)
-        rejected_.push_back({library, "it has no sidecar; `delassus plugins describe FILE --sidecar` writes one"});
+    // Of several sidecars of one library the one with its own name counts.
+    std::stable_partition(described.begin(), described.end(),
+                          [](const auto& entry) { return entry.first.stem() == entry.second.library.stem(); });
+    std::map<fs::path, fs::path> sidecar_of;
+    for (auto& [sidecar, info] : described) {
+        const auto reject = [&, &sidecar = sidecar, &info = info](const fs::path& path, std::string reason) {
+            rejected_.push_back({path, std::move(reason), info.name});
+        };
+        const std::string file = info.library.filename().string();
+        if (!libraries.contains(info.library)) {
+            reject(sidecar, fmt::format("its library {} is missing", file));
+        } else if (const auto [other, first] = sidecar_of.emplace(info.library, sidecar); !first) {
+            reject(sidecar,
+                   fmt::format("its library {} has another sidecar, {}", file, other->second.filename().string()));
+        } else if (info.abi_major != DELASSUS_ABI_MAJOR) {
+            reject(info.library, fmt::format("built for version {}.{} of the plugin interface; this is {}.{}",
+                                             info.abi_major, info.abi_minor, DELASSUS_ABI_MAJOR, DELASSUS_ABI_MINOR));
+        } else if (std::any_of(plugins_.begin(), plugins_.end(),
+                               [&name = info.name](const PluginInfo& listed) { return listed.name == name; })) {
+            reject(info.library, fmt::format("another plugin named \"{}\" comes first", info.name));
+        } else {
+            plugins_.push_back(std::move(info));
+        }
+    }
+    for (const auto& library : libraries) {
+        if (sidecar_of.contains(library)) continue;
+        const std::string describe = fmt::format("`delassus plugins describe {} --sidecar`", library.string());
+        rejected_.push_back(
+            {library,
+             fmt::format("it has no sidecar, by which it is listed without being loaded; {} writes one", describe),
+             library.stem().string()});
+    }
 }
 
 void Registry::add(std::shared_ptr<const Plugin> plugin) {
@@ -106,15 +127,23 @@ void Registry::add(std::shared_ptr<const Plugin> plugin) {
 const PluginInfo& Registry::find(const std::string& name) const {
     for (const auto& plugin : plugins_)
         if (plugin.name == name) return plugin;
+    for (const auto& row : rejected_)
+        if (!row.name.empty() && (row.name == name || row.path.stem() == name))
+            throw InputError(
+                fmt::format("the plugin \"{}\" was rejected: {}: {}", name, row.path.string(), row.reason));
     for (const auto& plugin : unbuilt_)
         if (plugin.name == name)
             throw InputError(fmt::format("the solver {} was not built here: {}", name, plugin.reason));
+    std::string unsearched;
+    for (const auto& row : rejected_)
+        if (row.name.empty())
+            unsearched += fmt::format("; the folder {} was not searched: {}", row.path.string(), row.reason);
     std::vector<std::string_view> names;
     for (const auto& plugin : plugins_) names.push_back(plugin.name);
     if (names.empty())
-        throw InputError(
-            fmt::format("there is no solver \"{}\": no plugin was found in {}", name, folders_.back().string()));
-    throw InputError(fmt::format("there is no solver \"{}\"{}", name, nearest_name_hint(name, names)));
+        throw InputError(fmt::format("there is no solver \"{}\": no plugin was found in {}{}", name,
+                                     folders_.back().string(), unsearched));
+    throw InputError(fmt::format("there is no solver \"{}\"{}{}", name, nearest_name_hint(name, names), unsearched));
 }
 
 std::shared_ptr<const Plugin> Registry::load(const std::string& name_or_path) const {

@@ -2,15 +2,16 @@
 // The JSON sidecar beside a plugin, by which it is listed without being loaded.
 #include <fmt/format.h>
 
-#include <fstream>
 #include <limits>
-#include <sstream>
+#include <string>
 
 #include "delassus/error.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/plugin_info.hpp"
 #include "support/json.hpp"
 #include "support/json_number.hpp"
+#include "support/sentence.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 
@@ -26,6 +27,17 @@ delassus_option_type type_of(const std::string& name) {
     for (std::size_t k = 0; k < std::size(type_names); ++k)
         if (name == type_names[k]) return static_cast<delassus_option_type>(k);
     throw PluginError(fmt::format("\"{}\" is not an option type", name));
+}
+
+/// "optimized" in a sidecar: true, false, or null where the plugin does not say. Sidecars of before have no such key.
+Json optimized_of(std::uint32_t build) {
+    if (build == DELASSUS_BUILD_UNKNOWN) return nullptr;
+    return build == DELASSUS_BUILD_OPTIMIZED;
+}
+
+std::uint32_t build_of(const Json& optimized) {
+    if (optimized.is_null()) return DELASSUS_BUILD_UNKNOWN;
+    return optimized.get<bool>() ? DELASSUS_BUILD_OPTIMIZED : DELASSUS_BUILD_UNOPTIMIZED;
 }
 
 OptionInfo read_option(const Json& json) {
@@ -66,18 +78,21 @@ std::string sidecar_text(const PluginInfo& info) {
                           {"description", info.description},
                           {"licence", info.licence},
                           {"flags", info.flags},
+                          {"optimized", optimized_of(info.build)},
                           {"capabilities", capability_names(info.capabilities)},
                           {"options", options}};
     return json_text(sidecar, 2) + "\n";
 }
 
 PluginInfo read_sidecar(const std::filesystem::path& sidecar) {
-    std::ifstream file(sidecar);
-    std::ostringstream text;
-    text << file.rdbuf();
-    if (!file) throw PluginError(fmt::format("cannot read {}", sidecar.string()));
+    std::string text;
     try {
-        const Json json = parse_ordered_json(text.str());
+        text = read_file(sidecar, most_bytes_of_text);
+    } catch (const InputError& error) {
+        throw PluginError(error.what());
+    }
+    try {
+        const Json json = parse_ordered_json(text);
         if (json.at("format") != sidecar_format || json.at("version") != sidecar_version)
             throw PluginError(
                 fmt::format("{} is not a plugin sidecar of version {}", sidecar.string(), sidecar_version));
@@ -89,6 +104,7 @@ PluginInfo read_sidecar(const std::filesystem::path& sidecar) {
         info.abi_major = json.at("abi").at(0);
         info.abi_minor = json.at("abi").at(1);
         info.flags = json.at("flags");
+        info.build = build_of(json.value("optimized", Json()));
         info.capabilities = capabilities_of(json.at("capabilities").get<std::vector<std::string>>());
         for (const auto& option : json.at("options")) info.options.push_back(read_option(option));
         const std::filesystem::path library = json.at("library").get<std::string>();
@@ -97,7 +113,7 @@ PluginInfo read_sidecar(const std::filesystem::path& sidecar) {
         info.library = std::filesystem::absolute(sidecar).parent_path() / library;
         return info;
     } catch (const nlohmann::json::exception& error) {
-        throw PluginError(fmt::format("{} is not a valid sidecar: {}", sidecar.string(), error.what()));
+        throw PluginError(fmt::format("{} is not a valid sidecar: {}", sidecar.string(), sentence_of(error)));
     } catch (const InputError& error) {
         throw PluginError(fmt::format("{}: {}", sidecar.string(), error.what()));
     }

@@ -137,7 +137,15 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
     report.options = implementation_->options();
     report.law = problem.problem().law;
     report.tolerance = settings.tolerance;
+    if (std::isnan(problem.meter().reference())) {
+        refuse_to_judge(report);
+        report.error = problem.meter().measure(solution.x, solution.lambda);
+        return report;
+    }
     const std::optional<Errors> measured = implementation_->run(problem, solution, settings, report);
+    const SetUpCounts counts = implementation_->counts();
+    report.analyses = counts.analyses;
+    report.factorizations = counts.factorizations;
 
     if (!measured && (!all_finite(solution.x) || !all_finite(solution.lambda))) {
         report.status = Status::NumericalFailure;

@@ -28,7 +28,12 @@ SolveSettings SolverConfig::settings() const {
 
 NameWithOptions parse_name_with_options(std::string_view text, std::string_view what) {
     NameWithOptions result;
-    const auto open = text.find('(');
+    auto open = text.find('(');
+    // The folders of a library's path may have brackets of their own.
+    if (text.substr(0, open).find('/') != std::string_view::npos) {
+        const auto end = text.find(".so(");
+        open = end == std::string_view::npos ? end : end + 3;
+    }
     result.name = text.substr(0, open);
     if (result.name.empty()) throw InputError(fmt::format("\"{}\" names no {}", text, what));
     if (open == std::string_view::npos) return result;
@@ -52,6 +57,13 @@ SolverConfig parse_solver(std::string_view text) {
     solver.name = std::move(name);
     solver.options = std::move(options);
     return solver;
+}
+
+void choose(SolverConfig& config, std::string_view text) {
+    auto [name, options] = parse_name_with_options(text, "solver");
+    if (name != (config.name.empty() ? auto_name : config.name)) config.options.clear();
+    config.name = std::move(name);
+    for (auto& [key, value] : options) config.options.insert_or_assign(key, std::move(value));
 }
 
 PluginInfo solver_info(const Registry& registry, const std::string& name) {

@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "solver/judgement.hpp"
+
 namespace delassus {
 
 DecreaseWatch::DecreaseWatch(double tolerance, std::int64_t max_iterations)
@@ -37,15 +39,6 @@ bool DecreaseWatch::in_reach(std::int64_t iteration, double natural, double firs
     }
     return false;
 }
-
-namespace {
-
-/// A start with velocities and reactions of different steps may have a small natural error and yet not balance.
-double worst_of(const Errors& error) {
-    return std::max(error.natural, error.balance);
-}
-
-}  // namespace
 
 StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                          SolveReport& report)
@@ -177,8 +170,6 @@ void StageRunner::add(const StageReport& stage, const SolveReport& result) {
     report_.iterations += result.iterations;
     report_.seconds_setup += result.seconds_setup;
     report_.seconds_solve += result.seconds_solve;
-    report_.analyses += result.analyses;
-    report_.factorizations += result.factorizations;
     report_.claimed_residual = result.claimed_residual;
     report_.stages.push_back(stage);
 }

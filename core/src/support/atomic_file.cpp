@@ -6,13 +6,19 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <deque>
+#include <fstream>
 
 #include "delassus/error.hpp"
+#include "support/checksum.hpp"
+#include "support/output_folder.hpp"
 
 namespace delassus {
 namespace fs = std::filesystem;
@@ -52,39 +58,59 @@ int write_all(int file, std::string_view content) {
     return 0;
 }
 
+/// How temporary names of this machine go on after the target's. Machines may share a file system.
+std::string partial_ending() {
+    std::array<char, 256> host{};
+    gethostname(host.data(), host.size() - 1);
+    return fmt::format(".partial-{:08x}-", checksum(host.data()));
+}
+
 /// A name beside target that nothing has yet.
 fs::path temporary_name_beside(const fs::path& target) {
     static std::atomic<unsigned> count{0};
     for (;;) {
         fs::path name = target;
-        name += fmt::format(".partial-{}-{}", getpid(), count++);
+        name += fmt::format("{}{}-{}", partial_ending(), getpid(), count++);
         std::error_code error;
         if (!fs::exists(fs::symlink_status(name, error))) return name;
     }
 }
 
-void require_replaceable(const fs::path& target, std::span<const std::string_view> own_files) {
-    std::error_code error;
-    if (!fs::exists(fs::symlink_status(target, error))) return;
-    if (!fs::is_directory(target, error)) {
-        throw InputError(fmt::format("{} exists and is not a folder; give another name.", target.string()));
-    }
-    fs::directory_iterator entries(target, error);
-    if (error) throw InputError(fmt::format("{} cannot be listed: {}.", target.string(), error.message()));
-    for (const fs::directory_entry& entry : entries) {
-        const std::string name = entry.path().filename().string();
-        std::error_code type_error;
-        if (std::find(own_files.begin(), own_files.end(), name) == own_files.end() ||
-            fs::is_directory(entry.symlink_status(type_error))) {
-            throw InputError(
-                fmt::format("{} holds {}, which would be lost if the folder were replaced; "
-                            "give another name or an empty folder.",
-                            target.string(), name));
-        }
-    }
+/// Whether there is no such process, or only its exit code, which nobody has asked for yet.
+bool has_ended(pid_t process) {
+    if (kill(process, 0) != 0) return errno == ESRCH;
+    std::ifstream file(fmt::format("/proc/{}/stat", process));
+    std::string text;
+    std::getline(file, text);  // number, (name), state …
+    const auto name_end = text.rfind(')');
+    return name_end != std::string::npos && name_end + 2 < text.size() &&
+           (text[name_end + 2] == 'Z' || text[name_end + 2] == 'X');
 }
 
 }  // namespace
+
+void remove_leftovers(const fs::path& folder, const std::function<bool(const std::string&)>& is_target) {
+    const std::string ending = partial_ending();
+    std::error_code error;
+    std::vector<fs::path> found;
+    for (auto entry = fs::directory_iterator(folder.empty() ? "." : folder, error);
+         !error && entry != fs::directory_iterator(); entry.increment(error)) {
+        const std::string name = entry->path().filename().string();
+        const auto at = name.rfind(ending);
+        if (at == std::string::npos || !is_target(name.substr(0, at))) continue;
+        pid_t writer = 0;
+        const char* end = name.data() + name.size();
+        const auto [rest, failure] = std::from_chars(name.data() + at + ending.size(), end, writer);
+        const bool named_so = failure == std::errc() && writer > 0 && rest != end && *rest == '-';
+        if (named_so && has_ended(writer)) found.push_back(entry->path());
+    }
+    for (const auto& leftover : found) fs::remove_all(leftover, error);
+}
+
+void remove_leftovers(const fs::path& target) {
+    const fs::path path = without_trailing_slash(target);
+    remove_leftovers(path.parent_path(), [&](const std::string& name) { return name == path.filename(); });
+}
 
 AtomicFile::AtomicFile(fs::path target) : target_(std::move(target)) {
     require_parent(target_);
@@ -134,10 +160,10 @@ void append_to_file(const fs::path& path, std::string_view content) {
     if (failure != 0) refuse_write(path, failure);
 }
 
-AtomicFolder::AtomicFolder(const fs::path& target, std::span<const std::string_view> own_files)
-    : target_(without_trailing_slash(target)) {
+AtomicFolder::AtomicFolder(const fs::path& target, std::string kind)
+    : target_(without_trailing_slash(target)), kind_(std::move(kind)) {
     require_parent(target_);
-    require_replaceable(target_, own_files);
+    require_replaceable(target_, kind_);
     std::error_code error;
     if (fs::is_symlink(target_, error)) {
         const fs::path pointed_to = fs::canonical(target_, error);  // a link stays a link: its folder is replaced
@@ -155,12 +181,20 @@ AtomicFolder::~AtomicFolder() {
 }
 
 void AtomicFolder::commit() {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(temporary_)) names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    write_folder_mark(temporary_, kind_, names);
     std::error_code ignored;
     if (!fs::exists(target_, ignored)) {
-        if (std::rename(temporary_.c_str(), target_.c_str()) != 0) refuse_write(target_, errno);
-        temporary_.clear();
-        return;
+        if (std::rename(temporary_.c_str(), target_.c_str()) == 0) {
+            temporary_.clear();
+            return;
+        }
+        if (errno != ENOTEMPTY && errno != EEXIST) refuse_write(target_, errno);  // else another process was faster
     }
+    // What has come there meanwhile counts too.
+    require_replaceable(target_, kind_);
     // One exchange where the file system can do it; the destructor then removes the old folder. Elsewhere two renames,
     // of which the second is undone if it fails.
     if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0) return;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <filesystem>
-#include <span>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,6 +22,12 @@ DELASSUS_API void write_files_atomically(const std::vector<std::pair<std::filesy
 
 /// Adds to the end of the file, or creates it; all or nothing. Throws InputError if that fails.
 DELASSUS_API void append_to_file(const std::filesystem::path& path, std::string_view content);
+
+/// Removes what writers of this target have left beside it that were ended before they could: on this machine.
+DELASSUS_API void remove_leftovers(const std::filesystem::path& target);
+/// The same of all targets in the folder that have such a name.
+DELASSUS_API void remove_leftovers(const std::filesystem::path& folder,
+                                   const std::function<bool(const std::string& name)>& is_target);
 
 /// A file under construction: write() it, or let a library create path(); then commit(). A file that is not committed
 /// disappears.
@@ -47,12 +53,11 @@ private:
     std::filesystem::path temporary_;
 };
 
-/// A folder under construction. Fill path(), then commit(); a folder that is not committed disappears.
+/// A folder under construction. Fill path() with files, then commit(); a folder that is not committed disappears.
 class DELASSUS_API AtomicFolder {
 public:
-    /// own_files: the names that a folder of this kind may hold. A target that exists is replaced only if it holds
-    /// nothing else; otherwise InputError names the file that would be lost.
-    AtomicFolder(const std::filesystem::path& target, std::span<const std::string_view> own_files);
+    /// kind: of the folder's mark. A target that exists must satisfy require_replaceable().
+    AtomicFolder(const std::filesystem::path& target, std::string kind);
     AtomicFolder(const AtomicFolder&) = delete;
     AtomicFolder& operator=(const AtomicFolder&) = delete;
     ~AtomicFolder();
@@ -66,6 +71,7 @@ public:
 private:
     std::filesystem::path target_;
     std::filesystem::path temporary_;
+    std::string kind_;
 };
 
 }  // namespace delassus

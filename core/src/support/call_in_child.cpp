@@ -3,6 +3,8 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,12 +13,16 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <new>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "delassus/error.hpp"
+#include "support/process_record.hpp"
+#include "support/sentence.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 namespace {
@@ -52,8 +58,8 @@ std::string message_of(const Task& task) {
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& failure) {
-        return holds_refusal + fmt::format("{} cannot be {}: {}.", task.file.string(), task.done, failure.what()) +
-               message_end;
+        return holds_refusal +
+               fmt::format("{} cannot be {}: {}.", task.file.string(), task.done, sentence_of(failure)) + message_end;
     }
 }
 
@@ -64,6 +70,7 @@ std::string message_of(const Task& task) {
     const rlimit processor_time{task.seconds, task.seconds};
     setrlimit(RLIMIT_CORE, &no_core);
     setrlimit(RLIMIT_CPU, &processor_time);
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // it holds what the parent has locked
     // What the C library says about a damaged heap is not for the user.
     const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
     dup2(nowhere, STDOUT_FILENO);
@@ -86,10 +93,15 @@ int wait_for(pid_t child) {
     return status;
 }
 
-std::string read_to_end(int pipe) {
+/// Nothing more if `seconds` pass: a library may wait, for a pipe say, without using the processor.
+std::string read_to_end(int pipe, double seconds) {
     std::string bytes;
     std::vector<char> buffer(1 << 16);
+    const double end = watch_seconds() + seconds;
     for (;;) {
+        if (watch_seconds() > end) return bytes;
+        pollfd waiting{pipe, POLLIN, 0};
+        if (poll(&waiting, 1, 1000) <= 0) continue;
         const ssize_t got = read(pipe, buffer.data(), buffer.size());
         if (got > 0) bytes.append(buffer.data(), static_cast<std::size_t>(got));
         if (got == 0 || (got < 0 && errno != EINTR)) return bytes;
@@ -117,7 +129,9 @@ std::optional<std::string> result_of(const Task& task, int& status) {
     }
     std::string message;
     try {
-        message = read_to_end(pipe[0]);
+        const bool bounded = task.seconds != RLIM_INFINITY;
+        message = read_to_end(pipe[0], bounded ? 60.0 + 4.0 * static_cast<double>(task.seconds)
+                                               : std::numeric_limits<double>::infinity());
     } catch (...) {
         close(pipe[0]);
         kill(child, SIGKILL);
@@ -125,6 +139,7 @@ std::optional<std::string> result_of(const Task& task, int& status) {
         throw;
     }
     close(pipe[0]);
+    if (message.empty() || message.back() != message_end) kill(child, SIGKILL);  // if it is not gone, it waits
     status = wait_for(child);
     if (message == out_of_memory) throw std::bad_alloc();
     if (message.size() >= 2 && message.back() == message_end) {
@@ -139,6 +154,7 @@ std::optional<std::string> result_of(const Task& task, int& status) {
 
 std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
                           const std::function<std::string()>& work) {
+    require_regular_file(file);
     int status = 0;
     if (auto result = result_of({file, "read", seconds, work}, status)) return std::move(*result);
     const bool too_long = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
@@ -146,11 +162,13 @@ std::string call_in_child(const std::filesystem::path& file, const char* library
         fmt::format("{} is damaged: {} {} on it.", file.string(), library, too_long ? "does not end" : "fails"));
 }
 
-void write_in_child(const std::filesystem::path& file, const char* library, const std::function<void()>& work) {
+std::int64_t write_in_child(const std::filesystem::path& file, const char* library,
+                            const std::function<std::int64_t()>& work) {
     int status = 0;
-    const std::function<std::string()> write = [&] { return work(), std::string(); };
-    if (!result_of({file, "written", RLIM_INFINITY, write}, status))
-        throw InputError(fmt::format("{} cannot be written: {} fails.", file.string(), library));
+    const std::function<std::string()> write = [&] { return std::to_string(work()); };
+    const auto bytes = result_of({file, "written", RLIM_INFINITY, write}, status);
+    if (!bytes) throw InputError(fmt::format("{} cannot be written: {} fails.", file.string(), library));
+    return std::stoll(*bytes);
 }
 
 }  // namespace delassus

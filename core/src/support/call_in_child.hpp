@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -15,9 +16,9 @@ namespace delassus {
 DELASSUS_API std::string call_in_child(const std::filesystem::path& file, const char* library, unsigned seconds,
                                        const std::function<std::string()>& work);
 
-/// Runs work(), which writes the file, in a child process: some libraries crash when memory or the disk runs out.
-/// Throws as the function above.
-DELASSUS_API void write_in_child(const std::filesystem::path& file, const char* library,
-                                 const std::function<void()>& work);
+/// Runs work(), which writes the file and returns how many bytes, in a child process: some libraries crash when memory
+/// or the disk runs out, at once or where the process ends. Throws as the function above.
+DELASSUS_API std::int64_t write_in_child(const std::filesystem::path& file, const char* library,
+                                         const std::function<std::int64_t()>& work);
 
 }  // namespace delassus

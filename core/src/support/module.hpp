@@ -2,11 +2,15 @@
 // Modules: parts of the library with a heavy dependency, loaded when a file or a scene first asks for them.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "delassus/export.hpp"
 
 namespace delassus {
+
+/// The sentence for `who`, "the library x.so" say, where !sdk::openblas_has_memory().
+[[nodiscard]] std::string no_memory_for_blas(std::string_view who);
 
 /// Whether this installation has the module.
 [[nodiscard]] DELASSUS_API bool has_module(std::string_view module);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "support/text_file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -12,25 +15,57 @@
 
 namespace delassus {
 
-std::string read_file(const std::filesystem::path& path) {
-    std::error_code error;
-    const auto status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status)) throw InputError(fmt::format("{}: there is no such file.", path.string()));
-    if (!std::filesystem::is_regular_file(status)) {
-        throw InputError(fmt::format("{} is not a regular file.", path.string()));
+namespace {
+
+struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, Close>;
+
+/// Opened so that a pipe does not wait for a writer, and judged by what was opened.
+File opened(const std::filesystem::path& path, struct stat& information) {
+    const auto refuse = [&] {
+        if (errno == ENOENT || errno == ENOTDIR)
+            throw InputError(fmt::format("{}: there is no such file.", path.string()));
+        throw InputError(fmt::format("{} cannot be opened: {}.", path.string(), std::strerror(errno)));
+    };
+    const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (descriptor < 0 && errno == ENXIO) throw InputError(fmt::format("{} is not a regular file.", path.string()));
+    if (descriptor < 0) refuse();
+    File file(fdopen(descriptor, "rb"));
+    if (!file) {
+        close(descriptor);
+        refuse();
     }
-    const auto close = [](std::FILE* file) { std::fclose(file); };
-    const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
-    if (!file) throw InputError(fmt::format("{} cannot be opened: {}.", path.string(), std::strerror(errno)));
+    if (fstat(descriptor, &information) != 0) refuse();
+    if (!S_ISREG(information.st_mode)) throw InputError(fmt::format("{} is not a regular file.", path.string()));
+    return file;
+}
+
+}  // namespace
+
+void require_regular_file(const std::filesystem::path& path) {
+    struct stat information {};
+    static_cast<void>(opened(path, information));
+}
+
+std::string read_file(const std::filesystem::path& path, std::uint64_t most) {
+    struct stat information {};
+    const File file = opened(path, information);
+    const auto bytes = static_cast<std::uint64_t>(information.st_size);
+    const auto refuse_size = [&] {
+        throw InputError(fmt::format("{} has more than {} bytes, which no such file needs.", path.string(), most));
+    };
+    if (bytes > most) refuse_size();
     std::string content;
-    const auto size = std::filesystem::file_size(path, error);
-    content.resize(error ? 0 : static_cast<std::size_t>(size) + 1);
+    content.resize(static_cast<std::size_t>(bytes) + 1);
     std::size_t held = 0;
     for (;;) {
         if (held == content.size()) content.resize(2 * content.size() + 4096);
         const std::size_t got = std::fread(content.data() + held, 1, content.size() - held, file.get());
         if (got == 0) break;
         held += got;
+        if (held > most) refuse_size();
     }
     if (std::ferror(file.get()) != 0) {
         throw InputError(fmt::format("{} cannot be read: {}.", path.string(), std::strerror(errno)));

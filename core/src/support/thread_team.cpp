@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "delassus/thread_team.hpp"
 
+#include <fmt/format.h>
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
@@ -9,8 +10,12 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <system_error>
 #include <thread>
 #include <vector>
+
+#include "delassus/error.hpp"
+#include "support/process_record.hpp"
 
 namespace delassus {
 
@@ -22,14 +27,6 @@ int usable_processors() {
 }
 
 namespace {
-
-/// How often this process is the child of a fork since the first team.
-std::atomic<unsigned>& forks() {
-    static std::atomic<unsigned> count = 0;
-    static const int registered = pthread_atfork(nullptr, nullptr, [] { forks().fetch_add(1); });
-    static_cast<void>(registered);
-    return count;
-}
 
 void pause() {
 #if defined(__x86_64__)
@@ -65,9 +62,12 @@ struct ThreadTeam::Threads {
         const WithoutSignals blocked;
         try {
             for (int index = 1; index < members; ++index) workers.emplace_back([this, index] { work(index); });
-        } catch (...) {
+        } catch (const std::system_error& error) {
             dismiss();
-            throw;
+            throw Error(
+                fmt::format("{} threads cannot be started ({}): a limit of the system on threads or memory is reached; "
+                            "the setting \"threads: 1\" of solvers needs none",
+                            members - 1, error.code().message()));
         }
     }
     ~Threads() { dismiss(); }
@@ -202,7 +202,7 @@ private:
 
 public:
     const int size;
-    const unsigned born = forks().load();
+    const unsigned born = count_of_forks();
     pthread_t caller = pthread_self();
 
 private:
@@ -228,7 +228,7 @@ ThreadTeam::ThreadTeam(int size)
 
 // Threads that a fork left behind cannot be joined: what describes them stays.
 ThreadTeam::~ThreadTeam() {
-    if (threads_ && threads_->born != forks().load()) static_cast<void>(threads_.release());
+    if (threads_ && threads_->born != count_of_forks()) static_cast<void>(threads_.release());
 }
 
 std::shared_ptr<ThreadTeam> ThreadTeam::for_threads(std::optional<std::int64_t> asked) {
@@ -248,7 +248,7 @@ sdk::Team ThreadTeam::team() const {
 void ThreadTeam::run(void* context, void (*task)(void* data, std::int32_t member), void* data) {
     auto& self = *static_cast<ThreadTeam*>(context);
     if (self.raw_.size == 1) return task(data, 0);
-    if (self.threads_ && self.threads_->born != forks().load()) static_cast<void>(self.threads_.release());
+    if (self.threads_ && self.threads_->born != count_of_forks()) static_cast<void>(self.threads_.release());
     if (!self.threads_) self.threads_ = std::make_unique<Threads>(self.raw_.size);
     self.threads_->run(task, data);
     if (self.threads_->rests()) self.raw_.size = 1;

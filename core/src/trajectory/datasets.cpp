@@ -25,7 +25,24 @@ void describe(hid_t set, const Column& column, const std::string& file) {
 }
 
 [[noreturn]] void fail(const std::string& file) {
-    throw InputError(fmt::format("{}: the trajectory cannot be written", file));
+    // HDF5 says only that it failed; of the calls that write, the last one left why.
+    const int failure = errno;
+    const bool known = failure == ENOSPC || failure == EDQUOT || failure == EFBIG;
+    throw InputError(fmt::format("{}: the trajectory cannot be written{}{}", file, known ? ": " : "",
+                                 known ? std::strerror(failure) : ""));
+}
+
+/// How a dataset of this size is made that does not grow: with checksums, which only chunks have.
+Handle with_checksum(const std::vector<hsize_t>& size, std::size_t element, const std::string& file) {
+    constexpr hsize_t largest_chunk = 1 << 30;
+    Handle creation = made(H5Pcreate(H5P_DATASET_CREATE), file);
+    hsize_t bytes = element;
+    for (const auto extent : size) bytes *= extent;
+    std::vector<hsize_t> chunk = size;
+    chunk[0] = std::clamp<hsize_t>(largest_chunk / std::max<hsize_t>(1, bytes / size[0]), 1, size[0]);
+    H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
+    H5Pset_fletcher32(creation.get());
+    return creation;
 }
 
 void put(hid_t group, const Column& column, hid_t stored, hid_t native, const void* values, std::size_t count,
@@ -36,8 +53,9 @@ void put(hid_t group, const Column& column, hid_t stored, hid_t native, const vo
     std::vector<hsize_t> size = {count / width};
     size.insert(size.end(), shape.begin(), shape.end());
     const Handle space = made(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), file);
+    const Handle creation = with_checksum(size, H5Tget_size(stored), file);
     const Handle set =
-        made(H5Dcreate2(group, column.name, stored, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), file);
+        made(H5Dcreate2(group, column.name, stored, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT), file);
     if (H5Dwrite(set.get(), native, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) fail(file);
     describe(set.get(), column, file);
 }
@@ -71,6 +89,7 @@ void release_reserve(hid_t open_file) {
 }
 
 Handle made(hid_t id, const std::string& file) {
+    if (id < 0 && (errno == ENOSPC || errno == EDQUOT || errno == EFBIG)) fail(file);
     if (id < 0) throw InputError(fmt::format("{}: HDF5 cannot write or continue the trajectory", file));
     return Handle(id);
 }
@@ -112,8 +131,9 @@ void put_texts(hid_t group, const char* name, const std::vector<std::string>& te
     H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
     const hsize_t count = texts.size();
     const Handle space = made(H5Screate_simple(1, &count, nullptr), file);
+    const Handle creation = with_checksum({count}, length, file);
     const Handle set =
-        made(H5Dcreate2(group, name, type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), file);
+        made(H5Dcreate2(group, name, type.get(), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT), file);
     if (H5Dwrite(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, block.data()) < 0) fail(file);
 }
 
@@ -129,7 +149,10 @@ void put_rows(hid_t group, const Column& column, const std::vector<std::int32_t>
 
 Series::Series(hid_t group, const Column& column, std::vector<hsize_t> shape, bool resume, std::int64_t rows,
                const std::string& file)
-    : file_(file), shape_(std::move(shape)), set_(resume ? open(group, column, rows) : create(group, column)) {
+    : file_(file),
+      name_(column.name),
+      shape_(std::move(shape)),
+      set_(resume ? open(group, column, rows) : create(group, column)) {
     rows_ = resume ? static_cast<hsize_t>(rows) : 0;
 }
 
@@ -171,18 +194,56 @@ void Series::write() {
     waiting_.clear();
 }
 
-double Series::last() const {
-    if (rows_ == 0) return 0.0;
-    std::vector<hsize_t> start(shape_.size() + 1, 0), block(shape_.size() + 1, 1);
-    start[0] = rows_ - 1;
-    for (std::size_t i = 0; i < shape_.size(); ++i) start[i + 1] = shape_[i] - 1;
+bool Series::read(hsize_t first, hsize_t last, bool checked, std::vector<double>& values) const {
+    std::vector<hsize_t> start = {first}, block = {last - first};
+    for (const auto extent : shape_) {
+        start.push_back(0);
+        block.push_back(extent);
+    }
+    values.resize(block[0] * width());
+    if (values.empty()) return true;
     const Handle space = made(H5Dget_space(set_.get()), file_);
     const Handle memory = made(H5Screate_simple(static_cast<int>(block.size()), block.data(), nullptr), file_);
-    double value = 0.0;
-    if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) < 0 ||
-        H5Dread(set_.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, &value) < 0)
+    const Handle transfer = made(H5Pcreate(H5P_DATASET_XFER), file_);
+    H5Pset_edc_check(transfer.get(), checked ? H5Z_ENABLE_EDC : H5Z_DISABLE_EDC);
+    return H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) >= 0 &&
+           H5Dread(set_.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), transfer.get(), values.data()) >= 0;
+}
+
+double Series::last() const {
+    std::vector<double> row;
+    if (rows_ == 0) return 0.0;
+    if (!read(rows_ - 1, rows_, false, row))
         throw InputError(fmt::format("{}: the trajectory cannot be continued", file_));
-    return value;
+    return row.back();
+}
+
+void Series::require_kept(std::uint64_t expected) {
+    std::vector<double> values;
+    bool whole = true;
+    for (hsize_t first = 0; whole && first < rows_; first += rows_of_chunk()) {
+        whole = read(first, std::min(rows_, first + rows_of_chunk()), false, values);
+        note(values.data(), values.size());
+    }
+    if (!whole || written_ != expected)
+        throw InputError(fmt::format(
+            "{}: the trajectory cannot be continued: \"{}\" is not what the run has written up to its checkpoint",
+            file_, name_));
+}
+
+void Series::cut() {
+    // A run that was killed while it wrote the last chunk can have left it with the checksum of another state of it.
+    // HDF5 would not change such a chunk; what it holds of the rows to keep is written anew.
+    const hsize_t before = rows_ - rows_ % rows_of_chunk();
+    std::vector<double> tail;
+    if (!read(before, rows_, true, tail)) {
+        if (!read(before, rows_, false, tail)) fail(file_);
+        waiting_.insert(waiting_.begin(), tail.begin(), tail.end());
+        rows_ = before;
+    }
+    std::vector<hsize_t> size = {rows_};
+    size.insert(size.end(), shape_.begin(), shape_.end());
+    if (H5Dset_extent(set_.get(), size.data()) < 0) fail(file_);
 }
 
 Handle Series::create(hid_t group, const Column& column) const {
@@ -195,6 +256,7 @@ Handle Series::create(hid_t group, const Column& column) const {
     const Handle space = made(H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), file_);
     const Handle creation = made(H5Pcreate(H5P_DATASET_CREATE), file_);
     H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
+    H5Pset_fletcher32(creation.get());
     Handle set = made(H5Dcreate2(group, column.name, column.integer ? H5T_STD_I64LE : H5T_IEEE_F64LE, space.get(),
                                  H5P_DEFAULT, creation.get(), H5P_DEFAULT),
                       file_);
@@ -211,8 +273,6 @@ Handle Series::open(hid_t group, const Column& column, std::int64_t rows) const 
         size[0] < static_cast<hsize_t>(rows))
         throw InputError(
             fmt::format("{}: \"{}\" is shorter than the checkpoint says, or of another shape", file_, column.name));
-    size[0] = static_cast<hsize_t>(rows);
-    H5Dset_extent(set.get(), size.data());
     return set;
 }
 

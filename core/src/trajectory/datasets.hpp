@@ -2,6 +2,7 @@
 // Writing HDF5 objects of a trajectory. Each function throws InputError if HDF5 fails; file: its name for the message.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -49,9 +50,21 @@ public:
     Series(hid_t group, const Column& column, std::vector<hsize_t> shape, bool resume, std::int64_t rows,
            const std::string& file);
 
-    void add(double value) { waiting_.push_back(value); }
-    void add(const double* values, std::size_t count) { waiting_.insert(waiting_.end(), values, values + count); }
+    void add(double value) { add(&value, 1); }
+    void add(const double* values, std::size_t count) {
+        note(values, count);
+        waiting_.insert(waiting_.end(), values, values + count);
+    }
     void write();
+
+    /// Takes the rows to keep into the checksum; throws InputError if it is not this one then.
+    void require_kept(std::uint64_t expected);
+    /// Goes on from rows whose checksum this is.
+    void begin_from(std::uint64_t kept) { written_ = kept; }
+    /// Cuts off what is beyond the rows to keep.
+    void cut();
+    /// The checksum of all numbers on disk and waiting, in their order. One number that differs changes it for certain.
+    [[nodiscard]] std::uint64_t written() const { return written_; }
 
     /// How many bytes write() makes the file longer, at most.
     [[nodiscard]] std::uint64_t growth() const;
@@ -64,11 +77,20 @@ public:
 private:
     [[nodiscard]] hdf5::Handle create(hid_t group, const Column& column) const;
     [[nodiscard]] hdf5::Handle open(hid_t group, const Column& column, std::int64_t rows) const;
+    /// Rows first … last − 1 on disk; checked: by the checksums of HDF5. False if HDF5 fails.
+    [[nodiscard]] bool read(hsize_t first, hsize_t last, bool checked, std::vector<double>& values) const;
+    /// FNV-1a by words.
+    void note(const double* values, std::size_t count) {
+        for (std::size_t i = 0; i < count; ++i)
+            written_ = (written_ ^ std::bit_cast<std::uint64_t>(values[i])) * 0x100000001b3ULL;
+    }
     [[nodiscard]] hsize_t width() const;
     [[nodiscard]] hsize_t rows_of_chunk() const;
 
     const std::string& file_;
+    std::string name_;
     std::vector<hsize_t> shape_;
+    std::uint64_t written_ = 0xcbf29ce484222325ULL;
     hdf5::Handle set_;
     hsize_t rows_ = 0;
     std::vector<double> waiting_;

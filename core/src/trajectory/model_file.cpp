@@ -254,8 +254,8 @@ std::uint64_t size_of(const std::vector<Element>& rows) {
 }  // namespace
 
 std::uint64_t largest_size(const TrajectoryModel& model) {
-    constexpr std::uint64_t of_a_shape = 256;  // kind, body, size, pose, ends
-    constexpr std::uint64_t of_headers = 256 * 1024;
+    constexpr std::uint64_t of_a_shape = 256;         // kind, body, size, pose, ends
+    constexpr std::uint64_t of_headers = 512 * 1024;  // trees of chunks included
     std::uint64_t bytes = of_headers + size_of(model.bodies) + size_of(model.fixed) + size_of(model.nodes) +
                           size_of(model.node_entry) + size_of(model.loose) + size_of(model.surface) +
                           size_of(model.cables) + of_a_shape * model.shapes.size();

@@ -9,6 +9,7 @@
 #include "hdf5/isolated.hpp"
 #include "output/recorded.hpp"
 #include "simulation/step_columns.hpp"
+#include "support/text_file.hpp"
 #include "trajectory/model_file.hpp"
 
 namespace delassus::trajectory {
@@ -166,6 +167,7 @@ std::vector<RecordedSystem> read_file(const std::filesystem::path& path, const R
     const std::string name = path.string();
     std::error_code error;
     const auto bytes = std::filesystem::file_size(path, error);
+    require_regular_file(path);
     const Handle access(H5Pcreate(H5P_FILE_ACCESS));
     H5Pset_file_locking(access.get(), false, true);  // the run may still go on
     const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));

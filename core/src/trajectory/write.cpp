@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 
 #include <type_traits>
+#include <utility>
 #include <variant>
 
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
+#include "hdf5/isolated.hpp"
 #include "output/trajectory.hpp"
 #include "simulation/step_columns.hpp"
 #include "trajectory/datasets.hpp"
@@ -115,6 +117,28 @@ public:
         if (waiting_ >= 1000) write();
     }
 
+    [[nodiscard]] std::vector<std::uint64_t> written() const {
+        std::vector<std::uint64_t> sums;
+        for (const auto* all : {&steps_, &frames_, &contacts_})
+            for (const auto& series : *all) sums.push_back(series.written());
+        return sums;
+    }
+
+    void cut() {
+        for (auto* all : {&steps_, &frames_, &contacts_})
+            for (auto& series : *all) series.cut();
+    }
+
+    /// act(series, its checksum) with each dataset of a file that is continued.
+    template <class Act>
+    void each_kept(const std::vector<std::uint64_t>& sums, Act&& act) {
+        auto sum = sums.begin();
+        if (sums.size() != steps_.size() + frames_.size() + contacts_.size())
+            throw InputError(fmt::format("{}: the checkpoint is of a trajectory with other datasets", name_));
+        for (auto* all : {&steps_, &frames_, &contacts_})
+            for (auto& series : *all) act(series, *sum++);
+    }
+
     void write() {
         std::uint64_t growth = 0, waiting = 0;
         for (const auto* all : {&steps_, &contacts_, &frames_})
@@ -143,8 +167,51 @@ private:
 class Hdf5Writer : public TrajectoryWriter {
 public:
     Hdf5Writer(const std::filesystem::path& path, const std::vector<TrajectorySystem>& systems, bool resume)
+        : Hdf5Writer(path, systems, resume, H5F_ACC_RDWR) {
+        uncut_ = resume;
+        for (std::size_t i = 0; resume && i < systems.size(); ++i)
+            systems_[i].each_kept(systems[i].written, [](Series& series, auto sum) { series.begin_from(sum); });
+    }
+    Hdf5Writer(const Hdf5Writer&) = delete;
+    Hdf5Writer& operator=(const Hdf5Writer&) = delete;
+    ~Hdf5Writer() override {
+        if (!uncut_ && H5Fflush(file_.get(), H5F_SCOPE_LOCAL) >= 0) release_reserve(file_.get());
+    }
+
+    /// Throws InputError unless the file holds the rows to keep, as they were written. Changes nothing.
+    static void require_kept(const std::filesystem::path& path, const std::vector<TrajectorySystem>& systems) {
+        Hdf5Writer writer(path, systems, true, H5F_ACC_RDONLY);
+        writer.uncut_ = true;
+        for (std::size_t i = 0; i < systems.size(); ++i)
+            writer.systems_[i].each_kept(systems[i].written,
+                                         [](Series& series, auto sum) { series.require_kept(sum); });
+    }
+
+    void add_step(std::size_t system, const StepRecord& record) override {
+        cut();
+        systems_[system].add_step(record);
+    }
+    void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
+                   const std::vector<ContactRecord>& contacts) override {
+        cut();
+        systems_[system].add_frame(state, poses, contacts);
+    }
+    [[nodiscard]] std::vector<std::uint64_t> written(std::size_t system) const override {
+        return systems_[system].written();
+    }
+    void flush() override {
+        cut();
+        for (auto& system : systems_) system.write();
+        if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0)
+            throw InputError(fmt::format("{}: the trajectory cannot be written", name_));
+        unflushed_ = 0;
+    }
+
+private:
+    Hdf5Writer(const std::filesystem::path& path, const std::vector<TrajectorySystem>& systems, bool resume,
+               unsigned access)
         : name_(path.string()),
-          file_(made(resume ? H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT)
+          file_(made(resume ? H5Fopen(path.c_str(), access, H5P_DEFAULT)
                             : H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
                      name_)) {
         if (!resume) {
@@ -159,28 +226,17 @@ public:
         for (const auto& system : systems)
             systems_.emplace_back(file_.get(), group.get(), system, resume, name_, unflushed_);
     }
-    Hdf5Writer(const Hdf5Writer&) = delete;
-    Hdf5Writer& operator=(const Hdf5Writer&) = delete;
-    ~Hdf5Writer() override {
-        if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) >= 0) release_reserve(file_.get());
+
+    /// Of a file that is continued, what was written after the checkpoint goes with the first new row.
+    void cut() {
+        if (!std::exchange(uncut_, false)) return;
+        for (auto& system : systems_) system.cut();
     }
 
-    void add_step(std::size_t system, const StepRecord& record) override { systems_[system].add_step(record); }
-    void add_frame(std::size_t system, const State& state, const std::vector<Pose>& poses,
-                   const std::vector<ContactRecord>& contacts) override {
-        systems_[system].add_frame(state, poses, contacts);
-    }
-    void flush() override {
-        for (auto& system : systems_) system.write();
-        if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0)
-            throw InputError(fmt::format("{}: the trajectory cannot be written", name_));
-        unflushed_ = 0;
-    }
-
-private:
     std::string name_;
     Handle file_;
     std::uint64_t unflushed_ = 0;  // bytes written since the last flush
+    bool uncut_ = false;           // continued, and as it was found
     std::vector<SystemFile> systems_;
 };
 
@@ -191,5 +247,11 @@ extern "C" DELASSUS_API delassus::TrajectoryWriter* delassus_trajectory_open(
     const std::filesystem::path& file, const std::vector<delassus::TrajectorySystem>& systems, bool resume) {
     delassus::hdf5::require_memory();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures become sentences
+    if (resume) {
+        const auto check = [&](delassus::hdf5::Packer&) {
+            delassus::trajectory::Hdf5Writer::require_kept(file, systems);
+        };
+        delassus::hdf5::read_isolated(file, check, [](delassus::hdf5::Unpacker&) {});
+    }
     return new delassus::trajectory::Hdf5Writer(file, systems, resume);
 }

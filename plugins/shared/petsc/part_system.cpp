@@ -414,6 +414,10 @@ void make_schwarz(PC preconditioner, Mat matrix, Schwarz settings) {
 
 void make_linear_solver(const Processes& processes, Mat matrix, LinearSolver kind, KrylovHandle& krylov,
                         Schwarz schwarz) {
+    PetscReal squares = 0.0;  // MUMPS orders by products of entries, and crashes where these are no numbers
+    check(MatNorm(matrix, NORM_FROBENIUS, &squares));
+    if (!std::isfinite(squares * squares))
+        throw sdk::NumericalFailure("the numbers of the matrix to factor are too large for double precision");
     check(KSPCreate(processes.get(), krylov.make()));
     check(KSPSetOperators(krylov.get(), matrix, matrix));
     PC preconditioner = nullptr;

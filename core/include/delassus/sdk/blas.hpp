@@ -7,15 +7,17 @@
 #include <array>
 #include <string>
 
+#include "delassus/sdk/blas_memory.hpp"
+
 namespace delassus::sdk {
 
 /// Three operations of the C interface to BLAS (32-bit integers), for column-major matrices, and what they come from.
 /// The library stays loaded until the process ends. Its threads are its own (OPENBLAS_NUM_THREADS, OMP_NUM_THREADS).
 class Blas {
 public:
-    /// OpenBLAS or BLIS behind the names by which systems install them; null where there is neither. The reference BLAS
-    /// is passed over: Eigen is faster. The first call in a process loads the library, which takes some milliseconds
-    /// and, with OpenBLAS, starts its threads.
+    /// OpenBLAS or BLIS behind the names by which systems install them; null where there is neither, or no memory for
+    /// it. The reference BLAS is passed over: Eigen is faster. The first call in a process loads the library, which
+    /// takes some milliseconds and, with OpenBLAS, starts its threads.
     static const Blas* find() {
         static const Blas blas;
         return blas.name_.empty() ? nullptr : &blas;
@@ -81,7 +83,7 @@ private:
         gemm_ = reinterpret_cast<Gemm>(dlsym(library, "cblas_dgemm"));
         syrk_ = reinterpret_cast<Syrk>(dlsym(library, "cblas_dsyrk"));
         trsm_ = reinterpret_cast<Trsm>(dlsym(library, "cblas_dtrsm"));
-        if (dlsym(library, mark) && gemm_ && syrk_ && trsm_) {
+        if (dlsym(library, mark) && gemm_ && syrk_ && trsm_ && openblas_has_memory()) {
             core_ = reinterpret_cast<char* (*)()>(dlsym(library, "openblas_get_corename"));
             threads_ = reinterpret_cast<int (*)()>(dlsym(library, "openblas_get_num_threads"));
             // One thread, until BlasThreads asks for more.

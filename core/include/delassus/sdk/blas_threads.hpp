@@ -3,11 +3,15 @@
 #pragma once
 
 #include <dlfcn.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <limits>
+#include <system_error>
+#include <thread>
+#include <vector>
 
 #include "delassus/sdk/team.hpp"
 
@@ -20,7 +24,7 @@ namespace delassus::sdk {
 class BlasThreads {
 public:
     /// flops: of the work to come, about.
-    explicit BlasThreads(double flops) : several_(flops >= worth_more_threads && members_ > 1) {
+    explicit BlasThreads(double flops) : several_(flops >= worth_more_threads && members_ > 1 && can_start()) {
         if (several_) set(std::min(members_, allowed()));
     }
     ~BlasThreads() {
@@ -37,6 +41,23 @@ public:
     }
 
 private:
+    /// OpenBLAS interrupts its process where a thread does not start, and waits for ever where its memory is refused:
+    /// whether as many threads as processors start, asked once, and memory is not limited.
+    static bool can_start() {
+        static const bool answer = [] {
+            rlimit memory{};
+            if (getrlimit(RLIMIT_AS, &memory) != 0 || memory.rlim_cur != RLIM_INFINITY) return false;
+            std::vector<std::jthread> trial;
+            try {
+                for (unsigned k = 0; k < std::thread::hardware_concurrency(); ++k) trial.emplace_back([] {});
+            } catch (const std::system_error&) {
+                return false;
+            }
+            return true;
+        }();
+        return answer;
+    }
+
     static constexpr double worth_more_threads = 2e8;  // some 20 ms of one thread
 
     /// By OpenBLAS's own variables.

@@ -11,6 +11,8 @@
 namespace delassus::sdk {
 
 DELASSUS_SDK_FUNCTION SymmetricEigen::SymmetricEigen(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+    found_ = true;
+    if (matrix.rows() == 0) return;  // Eigen looks for the largest entry of none
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
     found_ = solver.info() == Eigen::Success;
     values_ = solver.eigenvalues();

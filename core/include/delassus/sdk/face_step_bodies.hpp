@@ -86,12 +86,13 @@ DELASSUS_SDK_FUNCTION void FaceStep::tangent(const ScaledProblem& scaled, const 
         } else if (pieces_[k] == Piece::Apex) {
             std::fill_n(out, block.rows, 0.0);
         } else {
+            const double *ray = surface->ray.data(), *round = surface->round.data();
             double along = 0.0, around = 0.0;
             for (std::int32_t i = 0; i < block.rows; ++i) {
-                along += surface->ray[i] * in[i];
-                around += surface->round[i] * in[i];
+                along += ray[i] * in[i];
+                around += round[i] * in[i];
             }
-            for (std::int32_t i = 0; i < block.rows; ++i) out[i] = along * surface->ray[i] + around * surface->round[i];
+            for (std::int32_t i = 0; i < block.rows; ++i) out[i] = along * ray[i] + around * round[i];
             ++surface;
         }
     }
@@ -128,10 +129,11 @@ DELASSUS_SDK_FUNCTION FaceStep::Piece FaceStep::identify_block(const ScaledProbl
 // result += K v
 DELASSUS_SDK_FUNCTION void FaceStep::add_curvature(const Vector& v, Vector& result) const {
     for (const Surface& surface : surfaces_) {
+        const double* round = surface.round.data();
         double around = 0.0;
-        for (std::int32_t i = 0; i < surface.rows; ++i) around += surface.round[i] * v[surface.first + i];
+        for (std::int32_t i = 0; i < surface.rows; ++i) around += round[i] * v[surface.first + i];
         around *= surface.curvature;
-        for (std::int32_t i = 0; i < surface.rows; ++i) result[surface.first + i] += around * surface.round[i];
+        for (std::int32_t i = 0; i < surface.rows; ++i) result[surface.first + i] += around * round[i];
     }
 }
 

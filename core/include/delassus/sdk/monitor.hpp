@@ -20,7 +20,8 @@ public:
     /// True: stop now. x may be null. Iteration 0 is the starting point.
     [[nodiscard]] bool check(std::int64_t iteration, const double* x, const Vector& lambda, double residual);
 
-    /// The iterate with the smallest residual that check() has seen; m.
+    /// The iterate with the smallest residual that check() has seen, and the first of them until one has a residual
+    /// that is finite; m. Empty before the first check().
     [[nodiscard]] const Vector& best() const { return best_; }
     [[nodiscard]] double best_residual() const { return outcome_.residual; }
     [[nodiscard]] Outcome& outcome() { return outcome_; }

@@ -12,13 +12,13 @@ namespace delassus::sdk {
 DELASSUS_SDK_FUNCTION bool Monitor::check(std::int64_t iteration, const double* x, const Vector& lambda,
                                           double residual) {
     outcome_.iterations = iteration;
-    if (!std::isfinite(residual)) {
-        outcome_.message = "the iterates stopped being finite";
-        return finish(DELASSUS_NUMERICAL_FAILURE);
-    }
     if (residual < outcome_.residual || std::isnan(outcome_.residual)) {
         outcome_.residual = residual;
         best_ = lambda;
+    }
+    if (!std::isfinite(residual)) {
+        outcome_.message = "the iterates stopped being finite";
+        return finish(DELASSUS_NUMERICAL_FAILURE);
     }
     if (residual < 0.99 * milestone_) {
         milestone_ = residual;

@@ -2,6 +2,7 @@
 // A plugin's option table and the values that a user chose.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -15,8 +16,12 @@ namespace delassus::sdk {
 
 // Rows of an option table. All strings must be literals: the table is static. Defaults are written as a user would.
 
-constexpr delassus_option boolean_option(const char* key, bool standard, const char* doc) {
-    return {key, DELASSUS_OPTION_BOOLEAN, 0, standard ? "true" : "false", 0.0, 1.0, nullptr, "", doc};
+constexpr delassus_option boolean_option(const char* key, const char* standard, const char* doc) {
+    return {key, DELASSUS_OPTION_BOOLEAN, 0, standard, 0.0, 1.0, nullptr, "", doc};
+}
+/// With a bool itself, not with what converts to one, as every text does to true.
+constexpr delassus_option boolean_option(const char* key, std::same_as<bool> auto standard, const char* doc) {
+    return boolean_option(key, standard ? "true" : "false", doc);
 }
 constexpr delassus_option integer_option(const char* key, const char* standard, double minimum, double maximum,
                                          const char* unit, const char* doc) {

@@ -34,7 +34,8 @@ public:
 
     /// s_c, one a block.
     [[nodiscard]] const std::vector<double>& scaling() const { return scaling_; }
-    /// ‖S r‖₂, or 1 if that is zero.
+    /// ‖S r‖₂, or 1 if that is zero. NaN, and all errors with it, where double precision does not hold N, the squares
+    /// of S, or ‖S r‖².
     [[nodiscard]] double reference() const { return reference_; }
     /// Whether the De Saxcé term is added to u.
     [[nodiscard]] bool coulomb() const { return coulomb_; }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "delassus/sdk/compiled_once.hpp"
 #include "delassus/sdk/residual.hpp"
@@ -37,9 +38,15 @@ DELASSUS_SDK_FUNCTION void NaturalResidual::assign(const ProblemView& problem, c
     coulomb_ = problem.coulomb;
     block_scaling(problem.cones, diagonal, scaling_);
     double sum = 0.0;
-    for (std::size_t c = 0; c < cones_.size(); ++c)
-        sum += scaling_[c] * scaling_[c] * r.segment(cones_[c].first_row, cones_[c].rows).squaredNorm();
-    reference_ = sum > 0.0 ? std::sqrt(sum) : 1.0;
+    bool held = std::isfinite(diagonal.sum());
+    for (std::size_t c = 0; c < cones_.size(); ++c) {
+        const double square = scaling_[c] * scaling_[c];
+        held = held && square > 0.0 && std::isfinite(square);
+        sum += square * r.segment(cones_[c].first_row, cones_[c].rows).squaredNorm();
+    }
+    reference_ = !held || !std::isfinite(sum) ? std::numeric_limits<double>::quiet_NaN()
+                 : sum > 0.0                  ? std::sqrt(sum)
+                                              : 1.0;
 }
 
 DELASSUS_SDK_FUNCTION double NaturalResidual::natural(const double* lambda, const double* u) const {

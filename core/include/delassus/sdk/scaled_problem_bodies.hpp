@@ -127,10 +127,11 @@ DELASSUS_SDK_FUNCTION double ScaledProblem::natural_square(const Part& part, con
             continue;
         }
         const Block& block = blocks_[k];
-        for (std::int32_t i = 0; i < block.rows; ++i) trial[i] = l[i] - u[i];
-        if (coulomb_) trial[0] -= de_saxce(block.cone, u);
-        project_block(block, trial.data());
-        for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - trial[i]) * (l[i] - trial[i]);
+        double* tried = trial.data();
+        for (std::int32_t i = 0; i < block.rows; ++i) tried[i] = l[i] - u[i];
+        if (coulomb_) tried[0] -= de_saxce(block.cone, u);
+        project_block(block, tried);
+        for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - tried[i]) * (l[i] - tried[i]);
     }
     for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k) {
         const Interval& run = intervals_[k];

@@ -153,7 +153,9 @@ private:
                 &use_team,
                 analyze_partitioned(),
                 factorize_partitioned(),
-                solve_partitioned()};
+                solve_partitioned(),
+                DELASSUS_BUILD,
+                0};
     }
 
     // ---- Partitioned problems: a class derived from PartitionedSolver (sdk/partitioned_solver.hpp) takes them ----

@@ -17,11 +17,17 @@ inline constexpr std::int32_t most_parameters = 4;
 
 /// A number that a block's cone has, e.g. the friction coefficient.
 struct ConeParameter {
-    std::string_view key;      ///< in problem.json
-    std::string_view name;     ///< in messages
-    double least = 0.0;        ///< the smallest allowed value
-    double example = 0.0;      ///< an ordinary one, for problems of tests
-    bool is_reaction = false;  ///< whether it has the unit of λ
+    std::string_view key;                                   ///< in problem.json
+    std::string_view name;                                  ///< in messages
+    double least = 0.0;                                     ///< the smallest allowed value
+    double example = 0.0;                                   ///< an ordinary one, for problems of tests
+    bool is_reaction = false;                               ///< whether it has the unit of λ
+    double most = std::numeric_limits<double>::infinity();  ///< the largest allowed value
+    std::string_view why_most = {};                         ///< what is wrong with larger ones, as messages say it
+
+    [[nodiscard]] constexpr bool takes(double value) const {
+        return value >= least && value <= most && value < std::numeric_limits<double>::infinity();
+    }
 };
 
 /// lo ≤ λ ≤ hi of one row; bounds may be infinite.

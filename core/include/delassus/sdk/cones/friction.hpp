@@ -15,6 +15,10 @@ inline double friction_coefficient(const delassus_cone& cone) {
 
 /// The friction cone ‖λ_t‖ ≤ μ λ_n, its dual μ‖u_t‖ ≤ u_n; normal first, one or two tangents.
 struct FrictionCone {
+    /// The error measures are relative to velocities, and the exact law adds μ‖u_t‖ to u_n: an error ε of the natural
+    /// map leaves one of μ ε in u_n (docs/errors.md, "Large friction").
+    static constexpr double largest_coefficient = 1e4;
+
     static constexpr ConeDescription description = {
         .kind = DELASSUS_CONE_FRICTION,
         .name = "friction",
@@ -27,7 +31,11 @@ struct FrictionCone {
         .most_rows = 3,
         .usual_rows = 3,
         .parameter_count = 1,
-        .parameters = {{.key = "mu", .name = "friction coefficient", .example = 0.5}},
+        .parameters = {{.key = "mu",
+                        .name = "friction coefficient",
+                        .example = 0.5,
+                        .most = largest_coefficient,
+                        .why_most = "beyond that, errors within any tolerance hide the velocity along the normal"}},
     };
 
     static double tangent_norm(const delassus_cone& cone, const double* v) {
@@ -68,13 +76,18 @@ struct FrictionCone {
         project_with_slope(friction_coefficient(cone), cone.rows, lambda);
     }
 
-    /// μ‖u_t‖ ≤ u_n is the cone of slope 1/μ; for μ = 0 it is the half space u_n ≥ 0.
+    /// Onto {μ‖u_t‖ ≤ u_n}, which for μ = 0 is the half space u_n ≥ 0. With t = ‖u_t‖, outside it and its polar cone {t
+    /// ≤ −μ u_n}, the nearest point is on the generator (μ, u_t/t): t' = (t + μ u_n)/(1 + μ²), u_n' = μ t'.
     static void project_dual(const delassus_cone& cone, double* u) {
-        if (const double mu = friction_coefficient(cone); mu > 0.0) {
-            project_with_slope(1.0 / mu, cone.rows, u);
-        } else {
-            u[0] = std::max(0.0, u[0]);
-        }
+        project_dual(friction_coefficient(cone), cone.rows, tangent_norm(cone, u), u);
+    }
+    /// The same, without branches, as project_spatial; t: ‖u_t‖.
+    static void project_dual(double mu, int rows, double t, double* u) {
+        const bool inside = mu * t <= u[0];
+        const double tangent = std::max(0.0, (t + mu * u[0]) / (1.0 + mu * mu));
+        const double factor = inside ? 1.0 : t > 0.0 ? tangent / t : 0.0;
+        u[0] = inside ? u[0] : mu * tangent;
+        for (int i = 1; i < rows; ++i) u[i] *= factor;
     }
 
     static double gap(const delassus_cone& cone, const double* lambda, const double* u) {
