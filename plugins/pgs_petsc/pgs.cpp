@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 
 #include "options.hpp"
 
@@ -78,9 +77,7 @@ sdk::Outcome PartitionedGaussSeidel::solve(const sdk::LocalProblemView& problem,
         sums[0] += s * s * u_.segment(split.cones[c].first_row, split.cones[c].rows).squaredNorm();
     }
     part_.processes().sum(sums);
-    reference_ = !std::isfinite(sums[0]) ? std::numeric_limits<double>::quiet_NaN()
-                 : sums[0] > 0.0         ? std::sqrt(sums[0])
-                                         : 1.0;
+    reference_ = sdk::reference_of(sums[0]);
     model_.set_right_hand_side(split, operator_, residual_.scaling());
     lambda_.setZero(problem.m);
     if (request.warm_start() && sums[1] == 0.0) lambda_ = lambda;

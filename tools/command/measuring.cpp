@@ -53,8 +53,12 @@ std::string write_report_files(OutputFolder& folder, const std::vector<std::pair
     return no_page;
 }
 
+void warn_of_unoptimized(const std::string& plugin) {
+    fmt::print(stderr, "delassus: warning: {} was {}\n", plugin, unoptimized_build);
+}
+
 void UnoptimizedPlugins::warn() const {
-    for (const auto& name : names_) fmt::print(stderr, "delassus: warning: {} was {}\n", name, unoptimized_build);
+    for (const auto& name : names_) warn_of_unoptimized(name);
 }
 
 std::vector<std::string> own_command_line() {

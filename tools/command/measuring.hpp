@@ -43,7 +43,10 @@ private:
 /// The command line of this process, as it was given.
 [[nodiscard]] std::vector<std::string> own_command_line();
 
-/// Collects plugins that were built without optimisation, and warns of them on standard error.
+/// Warns on standard error that the plugin was built without optimisation.
+void warn_of_unoptimized(const std::string& plugin);
+
+/// Collects plugins that were built without optimisation, and warns of each once.
 class UnoptimizedPlugins {
 public:
     [[nodiscard]] std::function<void(const std::string&)> listener() {

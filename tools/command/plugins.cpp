@@ -8,6 +8,7 @@
 #include "delassus/error.hpp"
 #include "delassus/needs.hpp"
 #include "delassus/sdk/cones.hpp"
+#include "measuring.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "support/atomic_file.hpp"
@@ -185,8 +186,7 @@ int describe(const PluginsArguments& arguments) {
     } else {
         fmt::print("{}", text);
     }
-    if (info.build == DELASSUS_BUILD_UNOPTIMIZED)
-        fmt::print(stderr, "delassus: warning: {} was {}\n", info.name, unoptimized_build);
+    if (info.build == DELASSUS_BUILD_UNOPTIMIZED) warn_of_unoptimized(info.name);
     return exit_solved;
 }
 

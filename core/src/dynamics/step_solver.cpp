@@ -26,14 +26,6 @@
 
 namespace delassus {
 
-namespace {
-
-PartTraits traits_of(const PreparedProblem& part) {
-    return {part.needs(), amplification_of(part.problem().cones, part.problem().law)};
-}
-
-}  // namespace
-
 /// What is kept of a part of the problem from one step to the next.
 struct KeptPart {
     Problem data;  // unused where the whole problem is one part
@@ -118,7 +110,7 @@ struct StepSolver::Implementation {
         return !config.sweeps && !method_error.empty() && (!config.tolerance || config.name == auto_name);
     }
     /// The tolerance of a part then; nothing otherwise.
-    [[nodiscard]] std::optional<double> goal_for(const PreparedProblem& part,
+    [[nodiscard]] std::optional<double> goal_for(const PreparedProblem& part, const PartTraits& traits,
                                                  std::span<const std::int32_t> columns) const;
     /// Solves with `auto` what the configured solver left at `report`, from the start `first`; the better answer is in
     /// solution, what it is worth in report.
@@ -147,9 +139,6 @@ struct StepSolver::Implementation {
     static bool is_rounding(const Errors& error) {
         return rows_are_rounding(error) && error.balance <= rounding_limit_of_steps;
     }
-
-    /// What the rounding of reactions that cancel one another leaves in the balance, as a share like it.
-    static double rounding_of_reactions(const Problem& problem, const Solution& solution);
 
     /// Parts beyond so many share instances; it bounds the memory.
     static constexpr std::size_t most_instances = 64;
@@ -348,7 +337,8 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     Solver& solver = by.solver;
     SolveSettings part_settings = settings;
     part_settings.team = threads;
-    set_step_tolerance(config, traits_of(prepared), goal_for(prepared, columns), part_settings);
+    const PartTraits traits{prepared.needs(), amplification_of(prepared.problem().cones, prepared.problem().law)};
+    set_step_tolerance(config, traits, goal_for(prepared, traits, columns), part_settings);
     if (share < suspicious) {
         const double least = rounding_of_motion / share;
         part_settings.tolerance = std::max(part_settings.tolerance, least);
@@ -375,9 +365,12 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         return report.status == Status::Solved || report.near_goal ||
                (config.sweeps && report.status == Status::IterationLimit);
     };
+    // Beside reactions that grow without bound, as where two bodies squeeze a third, every velocity is rounding, and
+    // all measures that add the two are small.
     const auto count_rounding = [&] {
         if (!done())
-            report.error.balance = std::max(report.error.balance, rounding_of_reactions(prepared.problem(), solution));
+            report.error.balance =
+                std::max(report.error.balance, rounding_of_balance(prepared.problem(), solution).reactions);
     };
     count_rounding();
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
@@ -385,8 +378,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     count_rounding();
     // What nobody asked for ends no run.
     if (!done() && part_settings.needed > 0.0 && report.status != Status::Infeasible)
-        report.near_goal =
-            worst_of(report.error) <= config.tolerance.value_or(usable_multiple * loosest_goal(traits_of(prepared)));
+        report.near_goal = worst_of(report.error) <= config.tolerance.value_or(usable_multiple * loosest_goal(traits));
     result.natural = report.error.natural;
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
@@ -398,22 +390,6 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
         spent.unsolved =
             fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
                         report.error.natural, report.message.empty() ? "" : ": ", report.message);
-}
-
-// Beside reactions that grow without bound, as where two bodies squeeze a third, every velocity is rounding, and all
-// measures that add the two are small.
-double StepSolver::Implementation::rounding_of_reactions(const Problem& problem, const Solution& solution) {
-    sdk::Vector impulse = sdk::Vector::Zero(problem.n()), sizes = impulse;
-    const SparseMatrix& D = problem.D;
-    for (std::int32_t row = 0; row < D.rows; ++row)
-        for (auto e = static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(row)]);
-             e < static_cast<std::size_t>(D.row_start[static_cast<std::size_t>(row) + 1]); ++e) {
-            const double term = D.value[e] * solution.lambda[static_cast<std::size_t>(row)];
-            impulse[D.column[e]] += term;
-            sizes[D.column[e]] += std::abs(term);
-        }
-    const double size = std::max(impulse.norm(), sdk::VectorView(problem.a.data(), problem.n()).norm());
-    return size > 0.0 ? 0.5 * std::numeric_limits<double>::epsilon() * sizes.norm() / size : 0.0;
 }
 
 // What dry friction stops loses a share of its speed in each step that is as small as the tolerance, until the squares
@@ -506,7 +482,7 @@ void StepSolver::Implementation::solve_again(const PreparedProblem& prepared, In
     report = std::move(second);
 }
 
-std::optional<double> StepSolver::Implementation::goal_for(const PreparedProblem& part,
+std::optional<double> StepSolver::Implementation::goal_for(const PreparedProblem& part, const PartTraits& traits,
                                                            std::span<const std::int32_t> columns) const {
     if (!follows_method()) return {};
     const Problem& problem = part.problem();
@@ -521,7 +497,7 @@ std::optional<double> StepSolver::Implementation::goal_for(const PreparedProblem
                     .in_rows = part.meter().norm_in_rows(errors),
                     .reference = part.meter().reference(),
                     .rows = static_cast<double>(problem.m())},
-                   traits_of(part));
+                   traits);
 }
 
 std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {

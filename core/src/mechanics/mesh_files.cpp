@@ -125,12 +125,12 @@ Surface read_triangles(const std::filesystem::path& file, double scale) {
     const auto read = reinterpret_cast<DelassusSurfaceMeshRead>(module_symbol(
         "delassus_surface_mesh", "delassus_surface_mesh_read", file.string() + " cannot be read", "assimp"));
     Mesh mesh;
-    std::vector<Vector3> middle(1);
-    read(file, mesh, middle[0]);
+    Vector3 middle = {};
+    read(file, mesh, middle);
     scale_by(scale, mesh.vertices);
-    scale_by(scale, middle);
+    for (double& x : middle) x *= scale;
     check_numbers(mesh, file.string());
-    return {joined(mesh), middle[0]};
+    return {joined(mesh), middle};
 }
 
 /// Six times the volume of a tetrahedron.

@@ -8,6 +8,7 @@
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
 #include "output/system_model.hpp"
+#include "support/text_file.hpp"
 
 namespace delassus {
 namespace {
@@ -18,11 +19,10 @@ constexpr std::chrono::seconds between_checkpoints{5};
 
 constexpr const char* kind_of_folder = "run";
 
-/// Whoever asks to go on in a folder without a run makes none.
+/// The folder, if there is a run to go on with; none is made otherwise.
 const fs::path& with_checkpoint(const fs::path& folder) {
     const fs::path file = folder / "checkpoint.json";
-    std::error_code error;
-    if (!fs::exists(file, error)) throw InputError(fmt::format("{}: there is no such file.", file.string()));
+    require_regular_file(file);
     return folder;
 }
 

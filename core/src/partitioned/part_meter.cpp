@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "delassus/error.hpp"
+#include "delassus/sdk/residual.hpp"
 #include "partitioned/bytes.hpp"
 #include "partitioned/local_entries.hpp"
 
@@ -186,9 +187,7 @@ void PartMeter::renew() {
         }
     }
     part_.communicator->sum(sums);
-    reference_ = !std::isfinite(sums[0]) ? std::numeric_limits<double>::quiet_NaN()
-                 : sums[0] > 0.0         ? std::sqrt(sums[0])
-                                         : 1.0;
+    reference_ = sdk::reference_of(sums[0]);
     r_norm_ = std::sqrt(sums[1]);
 }
 

@@ -156,15 +156,13 @@ struct PartitionedSolver::Implementation {
         return sum;
     }
 
-    /// Runs a collective operation of the plugin and agrees on how it ended; a sentence of the first process on which
-    /// it failed, if it did.
+    /// How a collective operation of the plugin ended; a sentence of the first process on which it failed, if it did.
     struct Ending {
         std::int32_t status = DELASSUS_SOLVED;
         std::string sentence;
     };
-    template <class Operation>
-    Ending run(const char* name, Operation&& operation, double limit) {
-        const std::int32_t own = instance->guarded(name, operation, limit);
+    /// The processes agree on it. own: how it ended on this one.
+    Ending agree(std::int32_t own) {
         const bool failed = own == DELASSUS_ERROR || own == DELASSUS_NUMERICAL_FAILURE;
         const std::string sentence =
             failed ? fmt::format("{}: {}", instance->info().name, instance->last_error()) : std::string();
@@ -194,13 +192,13 @@ struct PartitionedSolver::Implementation {
         if (analyzed && pattern_id == raw.pattern_id && values_id == raw.values_id) return {};
         if (!analyzed || pattern_id != raw.pattern_id) {
             analyzed = false;
-            auto ending = run(
-                "analyze", [&] { return instance->border().analyze_partitioned(instance->get(), &raw); }, limit);
+            auto ending = agree(instance->guarded(
+                "analyze", [&] { return instance->border().analyze_partitioned(instance->get(), &raw); }, limit));
             if (ending.status != DELASSUS_SOLVED) return ending;
         }
         analyzed = false;
-        auto ending = run(
-            "factorize", [&] { return instance->border().factorize_partitioned(instance->get(), &raw); }, limit);
+        auto ending = agree(instance->guarded(
+            "factorize", [&] { return instance->border().factorize_partitioned(instance->get(), &raw); }, limit));
         analyzed = ending.status == DELASSUS_SOLVED;
         pattern_id = raw.pattern_id;
         values_id = raw.values_id;
@@ -297,13 +295,9 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
             sizeof request,      settings.warm_start ? 1 : 0, settings.tolerance, settings.max_iterations,
             settings.time_limit, &PartListener::callback,     &listener};
         watch.start();
-        ending = run(
-            "solve",
-            [&] {
-                return border.solve_partitioned(instance->get(), &raw, &request, own.x.data(), own.lambda.data(),
-                                                &outcome);
-            },
-            std::numeric_limits<double>::infinity());
+        ending = agree(instance->guarded([&] {
+            return border.solve_partitioned(instance->get(), &raw, &request, own.x.data(), own.lambda.data(), &outcome);
+        }));
         watch.stop();
         if (ending.status != DELASSUS_ERROR) {
             report.iterations = outcome.iterations;

@@ -22,11 +22,9 @@ using hdf5::last_complaint;
 
 OpenFile::OpenFile(const std::filesystem::path& path, const char* format) {
     const std::string name = path.string();
-    std::error_code error;
-    if (!std::filesystem::exists(path, error)) throw InputError(name + ": there is no such file.");
-    if (!std::filesystem::is_regular_file(path, error)) throw InputError(name + " is not a regular file.");
-    bytes_ = static_cast<std::int64_t>(std::filesystem::file_size(path, error));
     require_regular_file(path);
+    std::error_code error;
+    bytes_ = static_cast<std::int64_t>(std::filesystem::file_size(path, error));
     if (H5Fis_hdf5(name.c_str()) <= 0) throw InputError(name + " is not an HDF5 file.");
     const Handle access(H5Pcreate(H5P_FILE_ACCESS));
     H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);

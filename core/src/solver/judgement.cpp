@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "delassus/error.hpp"
 #include "problem/infeasibility.hpp"
@@ -54,13 +56,44 @@ double worst_of(const Errors& error) {
     return std::max({error.natural, error.dual, error.balance});
 }
 
+RoundingOfBalance rounding_of_balance(const Problem& problem, const Solution& solution) {
+    const auto n = static_cast<std::size_t>(problem.n());
+    if (n == 0) return {};
+    std::vector<double> magnitude(n), momentum(n, 0.0), impulse(n, 0.0), reactions(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) magnitude[i] = std::abs(problem.a[i]);
+    problem.H.multiply_add(1.0, solution.x.data(), momentum.data());
+    problem.D.transpose_multiply_add(1.0, solution.lambda.data(), impulse.data());
+    SparseMatrix absolute = problem.H;
+    std::vector<double> sizes = solution.x;
+    const auto make_absolute = [](std::span<double> values) {
+        for (double& value : values) value = std::abs(value);
+    };
+    make_absolute(absolute.value);
+    make_absolute(sizes);
+    absolute.multiply_add(1.0, sizes.data(), magnitude.data());
+    absolute = problem.D;
+    sizes = solution.lambda;
+    make_absolute(absolute.value);
+    make_absolute(sizes);
+    absolute.transpose_multiply_add(1.0, sizes.data(), reactions.data());
+    for (std::size_t i = 0; i < n; ++i) magnitude[i] += reactions[i];
+    const auto norm = [](std::span<const double> values) {
+        double sum = 0.0;
+        for (const double value : values) sum += value * value;
+        return std::sqrt(sum);
+    };
+    const double divisor = std::max({norm(momentum), norm(impulse), norm(problem.a)});
+    if (!(divisor > 0.0)) return {};
+    const double unit = 0.5 * std::numeric_limits<double>::epsilon() / divisor;
+    return {unit * norm(magnitude), unit * norm(reactions)};
+}
+
 void refuse_to_judge(SolveReport& report) {
     report.status = Status::NumericalFailure;
     report.message =
         "the numbers of the problem are too large or too small for double precision: with N = D H⁻¹ Dᵀ + E and r = D "
         "H⁻¹a + b, the diagonal of N or the length of r, squared, is beyond 1e308 or below 1e-308, so that no error "
-        "can "
-        "be measured; other units may help";
+        "can be measured; other units may help";
 }
 
 void check_settings(const SolveSettings& settings) {
@@ -81,7 +114,7 @@ void judge_infeasibility(SolveReport& report, double proven) {
         report.solver, proven);
 }
 
-void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfBalance()>& rounding_of_balance) {
+void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfBalance()>& rounding_of) {
     const double claimed = claim_slack * report.tolerance;
     const double natural_bound = std::max(claimed, std::min(rounding_slack * report.error.rounding, rounding_limit));
     const double balance_bound = std::max(claimed, balance_floor);
@@ -90,7 +123,7 @@ void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfB
         // If only the rounding of x contradicts the claim, the answer is neither a false claim nor a solution.
         // Reactions that cancel one another leave nothing to compare their rounding with: where they are small enough
         // for the natural error to be measured, it says all.
-        const RoundingOfBalance rounding = rounding_of_balance();
+        const RoundingOfBalance rounding = rounding_of();
         const bool natural = report.error.natural <= natural_bound;
         const bool stands = natural && report.error.balance <= rounding_slack * rounding.reactions &&
                             rounding_slack * report.error.rounding <= natural_bound;

@@ -19,6 +19,9 @@ struct RoundingOfBalance {
 /// swallow velocities, and the balance; infinite where any measure is not finite, so that nothing is known.
 [[nodiscard]] DELASSUS_API double worst_of(const Errors& error);
 
+/// Of a problem as a whole. Zero where it has no H, and where nothing moves.
+[[nodiscard]] DELASSUS_API RoundingOfBalance rounding_of_balance(const Problem& problem, const Solution& solution);
+
 /// For a problem whose errors cannot be measured (ErrorMeter::reference is NaN): what it ends with, and no solver is
 /// asked.
 void refuse_to_judge(SolveReport& report);
@@ -31,9 +34,8 @@ DELASSUS_API void check_settings(const SolveSettings& settings);
 void judge_infeasibility(SolveReport& report, double proven);
 
 /// Compares the claim report.status with report.error and corrects status and message (docs/errors.md, "When a claim
-/// stands"). only_cones: every set is a cone. rounding_of_balance: called where only the balance is missed; in the
+/// stands"). only_cones: every set is a cone. rounding_of: called where only the balance is missed; in the
 /// same cases on all processes that have the same report.
-DELASSUS_API void judge(SolveReport& report, bool only_cones,
-                        const std::function<RoundingOfBalance()>& rounding_of_balance);
+DELASSUS_API void judge(SolveReport& report, bool only_cones, const std::function<RoundingOfBalance()>& rounding_of);
 
 }  // namespace delassus

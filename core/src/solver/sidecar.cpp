@@ -29,7 +29,8 @@ delassus_option_type type_of(const std::string& name) {
     throw PluginError(fmt::format("\"{}\" is not an option type", name));
 }
 
-/// "optimized" in a sidecar: true, false, or null where the plugin does not say. Sidecars of before have no such key.
+/// "optimized" in a sidecar: true, false, or null where the plugin does not say. Those of ABI 2.4 and before lack the
+/// key.
 Json optimized_of(std::uint32_t build) {
     if (build == DELASSUS_BUILD_UNKNOWN) return nullptr;
     return build == DELASSUS_BUILD_OPTIMIZED;

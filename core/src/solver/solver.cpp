@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
-#include <span>
 
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
@@ -18,42 +16,6 @@
 #include "support/finite.hpp"
 
 namespace delassus {
-
-namespace {
-
-/// See RoundingOfBalance.
-RoundingOfBalance rounding_of_balance(const Problem& problem, const Solution& solution) {
-    const auto n = static_cast<std::size_t>(problem.n());
-    std::vector<double> magnitude(n), momentum(n, 0.0), impulse(n, 0.0), reactions(n, 0.0);
-    for (std::size_t i = 0; i < n; ++i) magnitude[i] = std::abs(problem.a[i]);
-    problem.H.multiply_add(1.0, solution.x.data(), momentum.data());
-    problem.D.transpose_multiply_add(1.0, solution.lambda.data(), impulse.data());
-    SparseMatrix absolute = problem.H;
-    std::vector<double> sizes = solution.x;
-    const auto make_absolute = [](std::span<double> values) {
-        for (double& value : values) value = std::abs(value);
-    };
-    make_absolute(absolute.value);
-    make_absolute(sizes);
-    absolute.multiply_add(1.0, sizes.data(), magnitude.data());
-    absolute = problem.D;
-    sizes = solution.lambda;
-    make_absolute(absolute.value);
-    make_absolute(sizes);
-    absolute.transpose_multiply_add(1.0, sizes.data(), reactions.data());
-    for (std::size_t i = 0; i < n; ++i) magnitude[i] += reactions[i];
-    const auto norm = [](std::span<const double> values) {
-        double sum = 0.0;
-        for (const double value : values) sum += value * value;
-        return std::sqrt(sum);
-    };
-    const double divisor = std::max({norm(momentum), norm(impulse), norm(problem.a)});
-    if (!(divisor > 0.0)) return {};
-    const double unit = 0.5 * std::numeric_limits<double>::epsilon() / divisor;
-    return {unit * norm(magnitude), unit * norm(reactions)};
-}
-
-}  // namespace
 
 std::string_view name_of(Status status) {
     switch (status) {
@@ -158,9 +120,7 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
     const auto& cones = problem.problem().cones;
     const bool only_cones =
         std::all_of(cones.begin(), cones.end(), [](const Cone& cone) { return operations_of(cone).is_cone; });
-    const auto rounding = [&] {
-        return n > 0 ? rounding_of_balance(problem.problem(), solution) : RoundingOfBalance();
-    };
+    const auto rounding = [&] { return rounding_of_balance(problem.problem(), solution); };
     judge(report, only_cones, std::ref(rounding));  // a std::function that allocates nothing
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
     return report;

@@ -24,10 +24,15 @@ void describe(hid_t set, const Column& column, const std::string& file) {
     put_text(set, "description", column.description, file);
 }
 
+/// Whether the error number says that there is no room for more.
+bool is_full(int failure) {
+    return failure == ENOSPC || failure == EDQUOT || failure == EFBIG;
+}
+
 [[noreturn]] void fail(const std::string& file) {
     // HDF5 says only that it failed; of the calls that write, the last one left why.
     const int failure = errno;
-    const bool known = failure == ENOSPC || failure == EDQUOT || failure == EFBIG;
+    const bool known = is_full(failure);
     throw InputError(fmt::format("{}: the trajectory cannot be written{}{}", file, known ? ": " : "",
                                  known ? std::strerror(failure) : ""));
 }
@@ -89,7 +94,7 @@ void release_reserve(hid_t open_file) {
 }
 
 Handle made(hid_t id, const std::string& file) {
-    if (id < 0 && (errno == ENOSPC || errno == EDQUOT || errno == EFBIG)) fail(file);
+    if (id < 0 && is_full(errno)) fail(file);
     if (id < 0) throw InputError(fmt::format("{}: HDF5 cannot write or continue the trajectory", file));
     return Handle(id);
 }

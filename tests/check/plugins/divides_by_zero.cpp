@@ -3,8 +3,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include <cstdint>
-
 #include "sweeps.hpp"
 
 namespace {

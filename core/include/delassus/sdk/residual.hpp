@@ -7,6 +7,8 @@
 // zero the error is absolute. With the exact Coulomb law u carries the De Saxcé term.
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "delassus/sdk/cones.hpp"
@@ -18,6 +20,12 @@ namespace delassus::sdk {
 /// others.
 void block_scaling(const ConeRange& cones, const Vector& diagonal, std::vector<double>& scaling);
 std::vector<double> block_scaling(const ConeRange& cones, const Vector& diagonal);
+
+/// The divisor of the natural error, from ‖S r‖²: ‖S r‖, 1 if that is zero, NaN if it is not finite.
+inline double reference_of(double square) {
+    if (!std::isfinite(square)) return std::numeric_limits<double>::quiet_NaN();
+    return square > 0.0 ? std::sqrt(square) : 1.0;
+}
 
 /// The natural error and its parts for one problem.
 class NaturalResidual {

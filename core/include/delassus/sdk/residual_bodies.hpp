@@ -44,9 +44,7 @@ DELASSUS_SDK_FUNCTION void NaturalResidual::assign(const ProblemView& problem, c
         held = held && square > 0.0 && std::isfinite(square);
         sum += square * r.segment(cones_[c].first_row, cones_[c].rows).squaredNorm();
     }
-    reference_ = !held || !std::isfinite(sum) ? std::numeric_limits<double>::quiet_NaN()
-                 : sum > 0.0                  ? std::sqrt(sum)
-                                              : 1.0;
+    reference_ = reference_of(held ? sum : std::numeric_limits<double>::quiet_NaN());
 }
 
 DELASSUS_SDK_FUNCTION double NaturalResidual::natural(const double* lambda, const double* u) const {
