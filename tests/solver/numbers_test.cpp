@@ -118,7 +118,7 @@ TEST_P(Numbers, OverflowIsAStatusOrARefusal) {
         for (const auto& [name, problem] : {std::pair("small", small(law)), std::pair("diagonal", mixed(law, false)),
                                             std::pair("blocks", mixed(law, true)), std::pair("linear", linear(law))})
             for (const auto& [place, change] : places())
-                for (const double value : {1e160, -1e160, 1e200, 1e308, 1e-160, 1e-200, 1e-320}) {
+                for (const double value : {-1e160, 1e308, 1e-160, 1e-320}) {
                     Problem changed = problem;
                     change(changed, value);
                     try_one(registry, GetParam(), changed,
