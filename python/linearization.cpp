@@ -177,14 +177,15 @@ bool Linearization::add_friction(const Cone& cone, std::int32_t row, std::int32_
         speed_by_mu[0] = speed;
         if (rho * speed > near) C.row(0).tail(rows - 1) += mu / speed * velocity.tail(rows - 1).transpose();
     }
-    const ActiveUnit::Vector z = force - rho * moved_velocity;
-    const double normal = z[0], tangential = rows == 3 ? std::hypot(z[1], z[2]) : std::abs(z[1]);
+    Eigen::Vector3d z = Eigen::Vector3d::Zero();
+    z.head(rows) = force - rho * moved_velocity;
+    const double normal = z[0], tangential = std::hypot(z[1], z[2]);
     const double sticks = tangential - mu * normal, opens = normal + mu * tangential;
     const bool degenerate = std::min(std::abs(sticks), std::abs(opens)) <= near;
     ActiveUnit unit{row, number, ActiveUnit::Matrix::Identity(rows, rows), {}, ActiveUnit::Vector::Zero(rows)};
     if (sticks > 0.0) {
         if (opens <= 0.0) return degenerate;
-        const ActiveUnit::Vector t = z.tail(rows - 1) / tangential;
+        const ActiveUnit::Vector t = z.segment(1, rows - 1) / tangential;
         ActiveUnit::Vector along(rows);
         along[0] = 1.0;
         along.tail(rows - 1) = mu * t;

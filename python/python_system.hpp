@@ -166,7 +166,7 @@ public:
         const py::gil_scoped_acquire with_gil;
         for (const py::handle& entry : py::list(ask("unilateral", state, py::float_(h)))) {
             const py::tuple parts = py::reinterpret_borrow<py::tuple>(entry);
-            const auto& cone = parts[0].cast<const Cone&>();
+            const auto cone = parts[0].cast<Cone>();
             const auto gap = parts[1].cast<Array<double>>(), rate = parts[2].cast<Array<double>>();
             const auto starts = parts[3].cast<Array<std::int32_t>>(), columns = parts[4].cast<Array<std::int32_t>>();
             const auto values = parts[5].cast<Array<double>>();
