@@ -394,7 +394,8 @@ TEST(JointScenes, SayWhatIsSavedAndRefuseWhatCannotBe) {
             parse_scene("coordinates: joint\nsleeping: true\nstep: 0.01\nend: 1\n" + mechanism.text, "test").systems[0],
             registry),
         Unsupported);
-    EXPECT_THROW(parse_scene("coordinates: reduced\nstep: 0.01\nend: 1\n" + mechanism.text, "test"), InputError);
+    EXPECT_THROW(static_cast<void>(parse_scene("coordinates: reduced\nstep: 0.01\nend: 1\n" + mechanism.text, "test")),
+                 InputError);
 }
 
 }  // namespace
