@@ -9,10 +9,11 @@ own_mounts() {
     [ -n "${DELASSUS_OWN_MOUNTS:-}" ] || DELASSUS_OWN_MOUNTS=1 exec unshare --mount --propagation private "$0" "$@"
 }
 
-# mount_system ROOT: what a running system has.
+# mount_system ROOT: what a running system has, and this network: its names, and the certificates that it is trusted by.
 mount_system() {
     local folder
     cp /etc/resolv.conf /etc/hosts "$1/etc/"
+    if [ -f /etc/ssl/certs/ca-certificates.crt ]; then cp /etc/ssl/certs/ca-certificates.crt "$1/etc/network-certificates.crt"; fi
     mountpoint -q "$1/proc" || mount -t proc proc "$1/proc"
     for folder in dev sys; do mountpoint -q "$1/$folder" || mount --rbind "/$folder" "$1/$folder"; done
 }
@@ -28,4 +29,7 @@ debian_root() {
 }
 
 # in_root ROOT COMMAND…: with the environment of a fresh system.
-in_root() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 chroot "$@"; }
+in_root() {
+    env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+        NODE_EXTRA_CA_CERTS=/etc/network-certificates.crt chroot "$@"
+}
