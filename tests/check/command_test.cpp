@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "check/known_problems.hpp"
 #include "delassus/problem_files.hpp"
 #include "helpers.hpp"
 
@@ -16,10 +15,7 @@ using test::run_command;
 
 class Command : public testing::Test {
 protected:
-    void SetUp() override {
-        for (const auto& known : check::known_problems())
-            if (known.problem.name == "friction_diagonal_associated") write_problem(known.problem, problem());
-    }
+    void SetUp() override { write_problem(test::known_problem("friction_diagonal_associated").problem, problem()); }
     [[nodiscard]] std::filesystem::path problem() const { return folder_.path() / "problem"; }
 
     test::CommandResult solve(const std::string& plugin, std::vector<std::string> more = {}) {

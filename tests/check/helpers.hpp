@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "check/known_problems.hpp"
+
 namespace delassus::test {
 
 /// The shared library of tests/check/plugins/<name>.
@@ -42,6 +44,12 @@ public:
 private:
     std::filesystem::path path_;
 };
+
+inline check::KnownProblem known_problem(const std::string& name) {
+    for (auto& known : check::known_problems())
+        if (known.problem.name == name) return known;
+    throw std::logic_error("no known problem " + name);
+}
 
 inline std::string content_of(const std::filesystem::path& file) {
     std::ostringstream text;

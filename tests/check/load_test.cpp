@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "check/known_problems.hpp"
 #include "delassus/error.hpp"
 #include "delassus/solver.hpp"
 #include "helpers.hpp"
@@ -15,12 +14,7 @@ namespace delassus::load_test {
 namespace {
 
 using test::fixture;
-
-check::KnownProblem known_problem(const std::string& name) {
-    for (auto& known : check::known_problems())
-        if (known.problem.name == name) return known;
-    throw std::logic_error("no known problem " + name);
-}
+using test::known_problem;
 
 /// The sentence of the exception that loading throws.
 std::string refusal_of(const std::string& name) {

@@ -9,7 +9,6 @@
 #include <fstream>
 #include <thread>
 
-#include "check/known_problems.hpp"
 #include "delassus/problem_files.hpp"
 #include "helpers.hpp"
 
@@ -22,8 +21,7 @@ using test::run_command;
 class Watch : public testing::Test {
 protected:
     void SetUp() override {
-        for (const auto& known : check::known_problems())
-            if (known.problem.name == "friction_diagonal_associated") write_problem(known.problem, problem());
+        write_problem(test::known_problem("friction_diagonal_associated").problem, problem());
         write_scene("");
     }
     [[nodiscard]] std::filesystem::path problem() const { return folder_.path() / "problem"; }
@@ -38,10 +36,10 @@ protected:
                                   "[{sphere: {radius: 0.1}, material: m}]}\n";
     }
 
-    test::CommandResult with(const std::string& deed, std::vector<std::string> arguments) const {
+    test::CommandResult with(const std::string& deed, const std::vector<std::string>& arguments) const {
         return run_command(arguments, {{"DELASSUS_TEST_DEED", deed}});
     }
-    test::CommandResult solve(const std::string& deed, std::vector<std::string> more = {}) const {
+    test::CommandResult solve(const std::string& deed, const std::vector<std::string>& more = {}) const {
         std::vector<std::string> arguments{"solve", problem().string(), "--solver", fixture("misbehaves").string()};
         arguments.insert(arguments.end(), more.begin(), more.end());
         return with(deed, arguments);

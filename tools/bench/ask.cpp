@@ -59,7 +59,7 @@ ChildResult ask(const WorkerSettings& worker, const Json& request, const std::fu
         child.program = worker.launcher;
         child.arguments = {"-n",   std::to_string(processes), "--oversubscribe", "--bind-to",
                            "none", worker.command.string(),   "worker"};
-        // Open MPI 4 explains at length how its processes ended; its option --quiet is none of Open MPI 5.
+        // Open MPI 4 explains at length how its processes ended. It has an option --quiet, which Open MPI 5 refuses.
         child.environment.emplace_back("OMPI_MCA_orte_execute_quiet", "1");
     } else if (const auto cores = allowed_cores(); !cores.empty()) {
         child.core = cores.back();

@@ -70,7 +70,7 @@ public:
 private:
     IsolatedOutcome isolated(const std::string& name, Leave leave,
                              const std::function<std::string(const Subject&)>& run) {
-        const auto outcome = run_isolated(seconds_, leave, [&] { return run(Subject(report_.library)); });
+        auto outcome = run_isolated(seconds_, leave, [&] { return run(Subject(report_.library)); });
         if (!outcome.returned) ++hangs_;
         if (outcome.bytes_printed > 0 && printing_.empty()) printing_ = name;
         bytes_printed_ += outcome.bytes_printed;

@@ -26,17 +26,10 @@ struct ConformanceReport {
     [[nodiscard]] std::size_t count(CheckResult::Verdict verdict) const;
 };
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr double usual_seconds_per_check = 200.0;  // a solve by MUMPS takes forty times as long
-#else
-inline constexpr double usual_seconds_per_check = 20.0;
-#endif
-
 /// Runs the suite over the shared library at an absolute path. Each check runs in a process of its own with a time
 /// limit in seconds, so that a crash or a hang is a failed check and not the end. The library is never loaded into
 /// this process. After three checks that did not return, the others are skipped.
-[[nodiscard]] ConformanceReport run_conformance(const std::filesystem::path& library,
-                                                double seconds_per_check = usual_seconds_per_check);
+[[nodiscard]] ConformanceReport run_conformance(const std::filesystem::path& library, double seconds_per_check = 20.0);
 
 [[nodiscard]] std::string to_json(const ConformanceReport& report);
 

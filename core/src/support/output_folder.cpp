@@ -138,10 +138,10 @@ void remove_leftovers_of(const fs::path& folder, const std::vector<std::string>&
         const fs::path path = path_of(name);
         by_folder[path.parent_path()].insert(path.filename().string());
     }
-    for (const auto& inner : by_folder)
-        if (is_within(folder, inner.first))
-            remove_leftovers(folder / inner.first,
-                             [&](const std::string& name) { return inner.second.contains(name); });
+    for (const auto& [inner, targets] : by_folder)
+        if (is_within(folder, inner))
+            remove_leftovers(folder / inner,
+                             [&targets = targets](const std::string& name) { return targets.contains(name); });
 }
 
 /// Removes what the mark of the folder lists. A folder in it that holds more stays.
