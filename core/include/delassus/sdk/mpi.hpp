@@ -11,8 +11,10 @@
 
 #include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <mutex>
 #include <stdexcept>
+#include <string>
 
 #include "delassus/sdk/solver.hpp"
 
@@ -28,12 +30,19 @@ inline bool mpi_is_running() {
 
 namespace mpi_detail {
 
+// Open MPI 5's session folder of a process of its own, with nothing of anybody else's in it; empty if there is none.
+inline std::string& session_folder() {
+    static std::string folder;
+    return folder;
+}
+
 // A process that no launcher started needs none of Open MPI's networks, nor its daemon. Looking for them takes most
 // of a second (measured: 0.30 s against 0.025 s for start and end), so they are left out by default; what the user
 // has set stays. It needs no session folder either, a place for files that processes of one run share: all processes of
 // a user have it below the same folder, which the last to end removes, and one that starts at that moment fails
-// ("orte_session_dir failed") and ends its program. The settings are taken back after the start, since children of this
-// process (an mpirun, say) would inherit them. Other MPIs ignore these names.
+// ("orte_session_dir failed") and ends its program. Open MPI 5 makes one in any case, in TMPDIR, leaves it, and crashes
+// where it cannot: it is given a folder of this process alone, removed at the end. The settings are taken back after
+// the start, since children of this process (an mpirun, say) would inherit them. Other MPIs ignore these names.
 class SingletonEnvironment {
 public:
     SingletonEnvironment() {
@@ -44,8 +53,24 @@ public:
             setenv(defaults[k][0], defaults[k][1], 0);
             set_[k] = true;
         }
+#if defined(OMPI_MAJOR_VERSION) && OMPI_MAJOR_VERSION >= 5
+        if (const char* named = std::getenv("TMPDIR")) {
+            has_temporary_ = true;
+            temporary_ = named;
+        }
+        std::error_code none;
+        std::string folder = (std::filesystem::temp_directory_path(none) / "delassus-mpi-XXXXXX").string();
+        if (none) folder = "/tmp/delassus-mpi-XXXXXX";
+        if (!mkdtemp(folder.data())) throw std::runtime_error("MPI needs a folder for temporary files: set TMPDIR");
+        session_folder() = folder;
+        setenv("TMPDIR", folder.c_str(), 1);
+#endif
     }
     ~SingletonEnvironment() {
+        if (has_temporary_)
+            setenv("TMPDIR", temporary_.c_str(), 1);
+        else if (!session_folder().empty())
+            unsetenv("TMPDIR");
         for (std::size_t k = 0; k < defaults.size(); ++k)
             if (set_[k]) unsetenv(defaults[k][0]);
     }
@@ -63,6 +88,8 @@ private:
         {"OMPI_MCA_opal_signal", ""},  // signals belong to the host
     }};
     std::array<bool, defaults.size()> set_{};
+    bool has_temporary_ = false;
+    std::string temporary_;  // TMPDIR as the user has it, while another is set
 };
 
 inline pid_t& owner() {
@@ -72,7 +99,10 @@ inline pid_t& owner() {
 
 // Runs at exit. A forked child inherits the registration but owns no MPI.
 inline void finalize_at_exit() {
-    if (owner() == getpid() && mpi_is_running()) MPI_Finalize();
+    if (owner() != getpid()) return;
+    if (mpi_is_running()) MPI_Finalize();
+    std::error_code ignored;
+    if (!session_folder().empty()) std::filesystem::remove_all(session_folder(), ignored);
 }
 
 }  // namespace mpi_detail
