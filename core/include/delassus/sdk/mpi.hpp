@@ -78,14 +78,13 @@ public:
     SingletonEnvironment& operator=(const SingletonEnvironment&) = delete;
 
 private:
-    static constexpr std::array<std::array<const char*, 2>, 7> defaults = {{
+    static constexpr std::array<std::array<const char*, 2>, 6> defaults = {{
         {"OMPI_MCA_ess_singleton_isolated", "1"},  // no daemon is forked
         {"OMPI_MCA_orte_create_session_dirs", "0"},
         {"OMPI_MCA_btl", "self"},
         {"OMPI_MCA_pml", "ob1"},
         {"OMPI_MCA_mtl", "^ofi,psm2,psm"},
-        {"PMIX_MCA_gds", "hash"},      // no shared-memory files
-        {"OMPI_MCA_opal_signal", ""},  // signals belong to the host
+        {"PMIX_MCA_gds", "hash"},  // no shared-memory files
     }};
     std::array<bool, defaults.size()> set_{};
     bool has_temporary_ = false;
