@@ -30,8 +30,10 @@ done
 echo 'exec "$@"' >> "$scratch/bin/sudo"
 echo 'grep -qx -- "${@: -1}" "$scratch/installed" && echo "install ok installed"' >> "$scratch/bin/dpkg-query"
 cat >> "$scratch/bin/apt-cache" <<'PROGRAM'
-grep -qx -- "$2" "$scratch/offered" && printf '%s:\n  Installed: (none)\n  Candidate: 1.0\n' "$2"
-exit 0
+grep -qx -- "$2" "$scratch/offered" || exit 0
+printf '%s:\n  Installed: (none)\n  Candidate: 1.0\n' "$2"
+sleep 0.02  # apt writes in pieces
+printf '  Version table:\n'
 PROGRAM
 cat >> "$scratch/bin/apt-get" <<'PROGRAM'
 case " $* " in
