@@ -86,6 +86,7 @@ public:
         last_h_ = 0.0;
         error_.forget();
         left_.clear();
+        left_now_.clear();
     }
 
     // h; the errors of the last steps' velocities and the errors that solves left; the multipliers.
@@ -94,6 +95,7 @@ public:
         memory.numbers = {last_h_};
         for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
         memory.of_columns.push_back(left_);
+        memory.of_columns.push_back(left_now_);
         memory.of_rows = {multipliers_};
         memory.impulses = kept_;
         return memory;
@@ -105,6 +107,7 @@ public:
         for (std::size_t k = 0; k < errors.size(); ++k) errors[k] = std::move(memory.of_columns.at(k));
         error_.load(std::move(errors));
         left_ = std::move(memory.of_columns.at(StepError::kept));
+        left_now_ = std::move(memory.of_columns.at(StepError::kept + 1));
         multipliers_ = std::move(memory.of_rows.at(0));
         kept_ = std::move(memory.impulses);
     }
@@ -130,7 +133,7 @@ private:
         coulomb_ = solver.law() == Law::Coulomb;
         assemble_unilateral(state, h);
 
-        const ErrorOfStep told(solver, estimated_error(state));
+        const ErrorOfStep told(solver, estimated_error(state), error_.of_solver());
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
@@ -138,7 +141,7 @@ private:
         for (const double momentum : problem_.a) scale = std::max(scale, std::abs(momentum));
         scale = solver.largest_on_all(scale);
         solve(solver, report);
-        note_left(solver.left());
+        note_left(solver);
         drop_negligible(scale);
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
         for (const FreeSpin* spin : untouched_)
@@ -157,10 +160,12 @@ private:
     /// Tells the solver this method's error, for one step: the values are in this method's memory.
     class ErrorOfStep {
     public:
-        ErrorOfStep(StepSolver& solver, std::span<const double> error) : solver_(solver) {
+        ErrorOfStep(StepSolver& solver, std::span<const double> error, std::span<const double> of_solver)
+            : solver_(solver) {
             solver_.method_error = error;
+            solver_.error_of_solves = of_solver;
         }
-        ~ErrorOfStep() { solver_.method_error = {}; }
+        ~ErrorOfStep() { solver_.method_error = solver_.error_of_solves = {}; }
         ErrorOfStep(const ErrorOfStep&) = delete;
         ErrorOfStep& operator=(const ErrorOfStep&) = delete;
 
@@ -171,11 +176,13 @@ private:
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
     std::span<const double> estimated_error(const State& state) {
         if (follows_sliding_) return {};
-        error_.note(state.v);
+        error_.note(state.v, left_now_);
         return error_.known();
     }
 
-    void note_left(std::span<const double> left) {
+    void note_left(const StepSolver& solver) {
+        const std::span<const double> left = solver.left(), in_masses = solver.left_in_masses();
+        left_now_.assign(in_masses.begin(), in_masses.end());
         left_.resize(left.size());
         std::ranges::transform(left_, left, left_.begin(),
                                [](double before, double now) { return std::max(before, now); });
@@ -462,6 +469,7 @@ private:
     std::vector<double> delta_, impulse_, force_;
     StepError error_;
     std::vector<double> left_;  ///< largest natural error that a step left in the part of each velocity, n, or empty
+    std::vector<double> left_now_;  ///< what the last solve left, in the norm of the masses, n, or empty
     double last_h_ = 0.0;
     KeptImpulses kept_;
     bool coulomb_ = false;                 // the law that the solver was told

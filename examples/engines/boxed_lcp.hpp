@@ -27,11 +27,11 @@
 class BoxedLcp {
 public:
     /// solver: as --solver has it, "pgs" or "ssn(…)". tolerance: the natural error that is asked for; an answer within
-    /// `needed` is used too. Throws delassus::InputError.
-    explicit BoxedLcp(const std::string& solver = "auto", double tolerance = 1e-10, double needed = 1e-6)
+    /// `loosest` is used too. Throws delassus::InputError.
+    explicit BoxedLcp(const std::string& solver = "auto", double tolerance = 1e-10, double loosest = 1e-6)
         : solver_(make_solver(registry_, delassus::parse_solver(solver))) {
         settings_.tolerance = tolerance;
-        settings_.needed = std::max(tolerance, needed);
+        settings_.loosest = std::max(tolerance, loosest);
         settings_.max_iterations = 10000;
         settings_.warm_start = true;
     }
@@ -82,7 +82,7 @@ public:
         pose(n, A, b, lo, hi, normal_of);
         delassus::Solution solution{{}, lambda_of(x)};
         report_ = solver_.solve(*problem_, solution, settings_);
-        if (!(report_.error.natural <= settings_.needed)) return false;
+        if (!(report_.error.natural <= settings_.loosest)) return false;
         for (std::size_t k = 0; k < rows_.size(); ++k) x[rows_[k]] = scale_[k] * solution.lambda[k];
         return true;
     } catch (const std::exception& error) {

@@ -27,6 +27,7 @@ constexpr delassus::sdk::PluginInfo info{
                     DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
                     DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |
                     DELASSUS_CAN_WARM_START,
+    .flags = DELASSUS_FLAG_LOCAL,
 };
 
 }  // namespace

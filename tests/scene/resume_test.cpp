@@ -119,7 +119,7 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
               "the checkpoint cannot be used: it was written by another version of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 6}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 7, \"scene\": \"\", \"systems\": []}"),
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 8, \"scene\": \"\", \"systems\": []}"),
               "the checkpoint cannot be used: it is damaged: its checksum is not that of its content");
 }
 

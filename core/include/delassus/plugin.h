@@ -281,6 +281,8 @@ typedef struct delassus_team {
 #define DELASSUS_FLAG_GLOBAL_SYMBOLS 1u /* load with RTLD_GLOBAL (libraries that load parts of themselves) */
 #define DELASSUS_FLAG_MPI 2u            /* starts MPI when first created */
 #define DELASSUS_FLAG_PEER 4u           /* for comparisons: works only where it is named, never as a last resort */
+/* Since 2.5. It converges fast near a solution and hardly elsewhere: `auto` starts it at the best iterate of all. */
+#define DELASSUS_FLAG_LOCAL 8u
 
 /* Since 2.5. Whether the compiler optimised the plugin. Its times say little if not, and the host says so wherever it
  * shows or compares them. DELASSUS_BUILD is the number of the compilation at hand. */

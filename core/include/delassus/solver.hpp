@@ -43,13 +43,9 @@ struct CurveSample {
 /// The settings of one solve.
 struct SolveSettings {
     double tolerance = 1e-8;  ///< natural error, > 0
-    /// Above 0, the tolerance is a goal that the caller chose for what the answer is worth, and this is the natural
-    /// error that the caller needs: `auto` tries to reach the goal, and ends within this rather than work for ever
-    /// (SolveReport::near_goal).
-    double needed = 0.0;
-    /// Above 0: the natural error with which the caller can do at all, at least `needed`. Where the goal is out of easy
-    /// reach, `auto` ends within this rather than begin what takes long.
-    double usable = 0.0;
+    /// Above 0, the tolerance is a goal: what `auto` accepts grows with the work that it has spent, up to this natural
+    /// error (SolveReport::near_goal; acceptable_error() in solver/acceptance.hpp).
+    double loosest = 0.0;
     std::int64_t max_iterations = 1000000;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
@@ -100,7 +96,7 @@ struct SolveReport {
     Errors error;
     std::vector<CurveSample> curve;
     std::vector<StageReport> stages;  ///< empty if one solver did it all
-    /// Not solved, but within what is needed where the tolerance is a goal.
+    /// Not solved, but acceptable after the work that was spent, where the tolerance is a goal.
     bool near_goal = false;
 };
 

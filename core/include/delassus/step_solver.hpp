@@ -105,6 +105,9 @@ public:
     /// For each velocity, the natural error that the last solve left in its part of the problem, n; 0 where nothing was
     /// to be solved. Valid until the next solve.
     [[nodiscard]] DELASSUS_API std::span<const double> left() const;
+    /// The same as a velocity, times the velocities that the reactions had to correct, in the norm of the masses
+    /// (‖S r‖, docs/errors.md).
+    [[nodiscard]] DELASSUS_API std::span<const double> left_in_masses() const;
 
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;
     DELASSUS_API void reset_effort();
@@ -121,6 +124,9 @@ public:
     /// the configuration gives no tolerance, each part of the problem is solved to a share of it; where it gives one to
     /// `auto`, to the smaller of the two (docs/tolerance.md). Not owned.
     std::span<const double> method_error;
+    /// What earlier solves left in method_error, n, for each velocity in the norm of the masses of its island; it is
+    /// not taken for the method's own. Not owned.
+    std::span<const double> error_of_solves;
 
     /// Asked about each part of a problem; null: all of them are solved. Not owned.
     RestingParts* resting = nullptr;

@@ -298,8 +298,7 @@ bool SharedSteps::solve_part(const PreparedPart& part, Solution& own, bool warm_
                (config_.sweeps && report.status == Status::IterationLimit);
     };
     const auto judge = [&] {
-        if (done() || !(settings.needed > 0.0) || report.status == Status::Infeasible) return;
-        report.near_goal = worst_of(report.error) <= config_.tolerance.value_or(usable_multiple * loosest_goal(traits));
+        if (!done()) report.near_goal = last_resort(config_, traits, settings, report);
     };
     const Solution start = own;
     run(*solver_, own);

@@ -46,7 +46,8 @@ struct Chain {
 /// What solving a part came to.
 struct PartResult {
     bool solved = true;
-    double natural = 0.0;  ///< left in the solution
+    double natural = 0.0;    ///< left in the solution
+    double in_masses = 0.0;  ///< the same times ErrorMeter::reference()
     SolverEffort effort;
 };
 
@@ -151,10 +152,10 @@ struct StepSolver::Implementation {
     std::deque<KeptKind> kinds;  // few
     Islands islands;
     std::vector<PartResult> results;  // by the number of the part
-    std::vector<double> left;
+    std::vector<double> left, left_in_masses;
     std::vector<Chain> chains;
     Solution start;
-    std::span<const double> method_error;
+    std::span<const double> method_error, error_of_solves;
     SolverEffort effort;
 };
 
@@ -197,8 +198,10 @@ bool StepSolver::solve(Problem&& problem, Solution& solution, bool warm_start) {
     if (on_problem) on_problem(problem);
     self.settings.cancelled = cancelled;
     self.method_error = method_error;
+    self.error_of_solves = error_of_solves;
     ++self.effort.solves;
     self.left.assign(static_cast<std::size_t>(problem.n()), 0.0);
+    self.left_in_masses.assign(static_cast<std::size_t>(problem.n()), 0.0);
     if (shared) {
         PartResult result;
         result.solved = shared->solve(problem, solution, warm_start, self.settings,
@@ -244,6 +247,7 @@ bool StepSolver::Implementation::solve_whole(KeptKind& kind, Problem& problem, S
     PartResult result;
     solve_part(kind, problem, solution, warm_start, 0, {}, settings.team, result);
     std::ranges::fill(left, result.natural);
+    std::ranges::fill(left_in_masses, result.in_masses);
     return take(result);
 }
 
@@ -284,8 +288,10 @@ bool StepSolver::Implementation::solve_parts(KeptKind& kind, std::span<const Isl
     bool solved = true;
     for (std::size_t number = 0; number < list.size(); ++number) {
         solved = take(results[number]) && solved;
-        for (const std::int32_t column : list[number].columns)
+        for (const std::int32_t column : list[number].columns) {
             left[static_cast<std::size_t>(column)] = results[number].natural;
+            left_in_masses[static_cast<std::size_t>(column)] = results[number].in_masses;
+        }
     }
     return solved;
 }
@@ -342,8 +348,7 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     if (share < suspicious) {
         const double least = rounding_of_motion / share;
         part_settings.tolerance = std::max(part_settings.tolerance, least);
-        if (part_settings.needed > 0.0) part_settings.needed = std::max(part_settings.needed, least);
-        if (part_settings.usable > 0.0) part_settings.usable = std::max(part_settings.usable, least);
+        if (part_settings.loosest > 0.0) part_settings.loosest = std::max(part_settings.loosest, least);
     }
     part_settings.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const bool may_repeat = config.name != auto_name && !config.sweeps;
@@ -376,10 +381,9 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     if (!done() && (is_rounding(report.error) || moves_freely(prepared, solution))) return;
     if (!done() && may_repeat) solve_again(prepared, by, part_settings, solution, report, spent);
     count_rounding();
-    // What nobody asked for ends no run.
-    if (!done() && part_settings.needed > 0.0 && report.status != Status::Infeasible)
-        report.near_goal = worst_of(report.error) <= config.tolerance.value_or(usable_multiple * loosest_goal(traits));
+    if (!done()) report.near_goal = last_resort(config, traits, part_settings, report);
     result.natural = report.error.natural;
+    result.in_masses = report.error.natural * prepared.meter().reference();
     spent.worst_natural = std::max(spent.worst_natural, report.error.natural);
     if (report.near_goal) ++spent.near_goal;
     if (done()) return;
@@ -487,14 +491,20 @@ std::optional<double> StepSolver::Implementation::goal_for(const PreparedProblem
     if (!follows_method()) return {};
     const Problem& problem = part.problem();
     std::vector<double> errors(static_cast<std::size_t>(problem.H.rows));
-    double square = 0.0;
+    double square = 0.0, of_solves = 0.0;
     for (std::int32_t i = 0; i < problem.H.rows; ++i) {
-        const double error = method_error[static_cast<std::size_t>(columns.empty() ? i : columns[i])];
+        const auto column = static_cast<std::size_t>(columns.empty() ? i : columns[i]);
+        const double error = method_error[column];
         errors[static_cast<std::size_t>(i)] = error;
         if (error != 0.0) square += entry_of(problem.H, i, i) * error * error;
+        if (!error_of_solves.empty()) of_solves = std::max(of_solves, error_of_solves[column]);
     }
-    return goal_of({.in_masses = std::sqrt(std::abs(square)),
-                    .in_rows = part.meter().norm_in_rows(errors),
+    // What solves left is known as a bound: a quarter of what is seen counts as the method's in any case.
+    const auto of_method = [of_solves](double all) {
+        return std::max(0.25 * all, std::sqrt(std::max(0.0, (all - of_solves) * (all + of_solves))));
+    };
+    return goal_of({.in_masses = of_method(std::sqrt(std::abs(square))),
+                    .in_rows = of_method(part.meter().norm_in_rows(errors)),
                     .reference = part.meter().reference(),
                     .rows = static_cast<double>(problem.m())},
                    traits);
@@ -521,8 +531,7 @@ std::vector<StepSolver::Part> StepSolver::parts(const Problem& problem) const {
 std::string StepSolver::choice(std::uint64_t needs) const {
     const auto& config = implementation_->config;
     if (config.name != auto_name) return config.name;
-    const auto choice =
-        auto_choice(implementation_->registry, config.options, needs, implementation_->settings.tolerance);
+    const auto choice = auto_choice(implementation_->registry, config.options, needs);
     return choice.first.empty() ? std::string() : choice.first.front();
 }
 
@@ -546,6 +555,10 @@ const SolverConfig& StepSolver::config() const {
 
 std::span<const double> StepSolver::left() const {
     return implementation_->left;
+}
+
+std::span<const double> StepSolver::left_in_masses() const {
+    return implementation_->left_in_masses;
 }
 
 Law StepSolver::law() const {

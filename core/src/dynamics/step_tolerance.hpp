@@ -64,24 +64,27 @@ inline double goal_of(const ErrorOfMethod& error, const PartTraits& part) {
     return std::clamp(std::min(by_masses, in_rows), least, std::max(least, loosest_goal(part) * share_of_many));
 }
 
-/// Sets the tolerance of a part. A tolerance that the configuration names is kept at least. goal: of goal_of(), where
-/// tolerances follow from the error of the method.
+/// Sets the tolerance of an island. A tolerance that the configuration names is kept at least. goal: of goal_of(),
+/// where tolerances follow from the error of the method.
 inline void set_step_tolerance(const SolverConfig& config, const PartTraits& part, std::optional<double> goal,
                                SolveSettings& of) {
-    constexpr double slack = 30.0, far_below = 1e-2;
     if (!goal) {
         // Contacts may have no answer to a default tolerance that anybody finds.
-        if (config.tolerance || config.sweeps || (part.needs & DELASSUS_CAN_FRICTION) == 0 ||
-            (part.needs & DELASSUS_CAN_FREE) != 0)
-            return;
-        of.needed = of.tolerance;
-        of.usable = far_below * loosest_goal(part);
+        const bool only_contacts = (part.needs & DELASSUS_CAN_FRICTION) != 0 && (part.needs & DELASSUS_CAN_FREE) == 0;
+        if (!config.tolerance && !config.sweeps && only_contacts) of.loosest = of.tolerance;
         return;
     }
     if (config.tolerance && *goal >= *config.tolerance) return;
     of.tolerance = *goal;
-    of.needed = config.tolerance.value_or(std::min(slack * *goal, usable_multiple * loosest_goal(part)));
-    if (!config.tolerance) of.usable = std::max(of.needed, loosest_goal(part));
+    of.loosest = config.tolerance.value_or(loosest_goal(part));
+}
+
+/// What is used where nothing better is found: nobody asked for the tolerance, and so it ends no run.
+inline bool last_resort(const SolverConfig& config, const PartTraits& part, const SolveSettings& of,
+                        const SolveReport& report) {
+    const double error = std::max(report.error.natural, report.error.balance);
+    return of.loosest > 0.0 && report.status != Status::Infeasible &&
+           error <= config.tolerance.value_or(usable_multiple * loosest_goal(part));
 }
 
 }  // namespace delassus

@@ -16,11 +16,13 @@
 #include "partitioned/part_meter.hpp"
 #include "partitioned/part_proof.hpp"
 #include "partitioned/prepared_part.hpp"
+#include "solver/acceptance.hpp"
 #include "solver/auto_solver.hpp"
 #include "solver/finished_solver.hpp"
 #include "solver/judgement.hpp"
 #include "solver/plugin_instance.hpp"
 #include "solver/ranking.hpp"
+#include "solver/rounds.hpp"
 #include "solver/solver_implementation.hpp"
 #include "support/finite.hpp"
 #include "support/sentence.hpp"
@@ -210,9 +212,11 @@ struct PartitionedSolver::Implementation {
     /// The stages of the ranking, and after them every other solver that can, each from the best so far.
     void solve_in_stages(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
                          SolveReport& report);
-    [[nodiscard]] const RankingRule& rule_of(const PreparedPart& problem, double tolerance) const {
+    /// The solver of a member of `auto`, made when it is first needed.
+    PartitionedSolver& member(const RankedSolver& ranked);
+    [[nodiscard]] const Order& order_of(const PreparedPart& problem) const {
         const auto rows = std::min<std::int64_t>(problem.raw().m_all, std::numeric_limits<std::int32_t>::max());
-        return ranking->rule({problem.needs(), tolerance, simulation}, static_cast<std::int32_t>(rows));
+        return ranking->order({problem.needs(), simulation}, static_cast<std::int32_t>(rows));
     }
 };
 
@@ -226,7 +230,7 @@ PartitionedSolver::PartitionedSolver(const Registry& registry, SolverConfig conf
             throw InputError("a partitioned problem is solved by one solver; leave out the option \"finish\"");
         if (self.config.name == auto_name) {
             self.ranking = std::make_unique<Ranking>(ranking_of(registry, options));
-            self.simulation = by_rules_of_simulations(registry, options);
+            self.simulation = of_steps(registry, options);
             self.info_of_auto = auto_info(registry);
             return;
         }
@@ -250,7 +254,7 @@ std::string PartitionedSolver::refusal(const PreparedPart& problem, const SolveS
     std::uint64_t needs = problem.needs();
     if (const auto& self = *implementation_; self.ranking) {
         if (!unnamed(self.registry, needs).empty()) return {};
-        for (const auto& ranked : self.rule_of(problem, settings.tolerance).stages)
+        for (const auto& ranked : self.order_of(problem).solvers)
             if (can(self.registry, ranked.solver, needs)) return {};
         return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
                            problem.describe(needs));
@@ -320,76 +324,82 @@ void PartitionedSolver::Implementation::solve_with_plugin(const PreparedPart& pr
         report.curve.push_back({report.iterations, report.seconds_setup + report.seconds_solve, NAN});
 }
 
+PartitionedSolver& PartitionedSolver::Implementation::member(const RankedSolver& ranked) {
+    auto place = solvers.find({ranked.solver, ranked.options});
+    if (place != solvers.end()) return place->second;
+    SolverConfig one;
+    one.name = ranked.solver;
+    one.options = ranked.options;
+    return solvers
+        .emplace(std::pair(ranked.solver, ranked.options), PartitionedSolver(registry, std::move(one), communicator))
+        .first->second;
+}
+
 void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& problem, Solution& own,
                                                         const SolveSettings& settings, SolveReport& report) {
-    const RankingRule& rule = rule_of(problem, settings.tolerance);
-    std::vector<RankedStage> stages = rule.stages;
-    for (const auto& name : unnamed(registry, problem.needs()))
-        if (std::none_of(stages.begin(), stages.end(), [&](const RankedStage& one) { return one.solver == name; }))
-            stages.push_back({name, {}, {.reason = "the solvers before it did not reach the tolerance"}});
+    const Order& order = order_of(problem);
+    const std::vector<RankedSolver> ranked = members_of(registry, order, problem.needs());
+    const Solution first = own;
+    std::vector<Solution> left(ranked.size());
     double best = std::numeric_limits<double>::infinity(), spent = 0.0;
-    bool started = settings.warm_start;
     SolveCost total;
     total.phases.fill(0.0);
     total.bytes_sent = 0;
-    for (const auto& ranked : stages) {
-        const bool own_law = !ranked.stage.law || *ranked.stage.law == problem.problem().law;
-        if (!own_law || !can(registry, ranked.solver, problem.needs())) continue;
-        if (ranked.stage.patient && best <= settings.usable) {
+    const auto take = [&](const Turn& turn) -> TurnResult {
+        if (best <= acceptable_error(settings, turn.work)) {
             report.near_goal = true;
-            break;
+            return {TurnEnd::Done, best};
         }
-        auto place = solvers.find({ranked.solver, ranked.options});
-        if (place == solvers.end()) {
-            SolverConfig one;
-            one.name = ranked.solver;
-            one.options = ranked.options;
-            place = solvers
-                        .emplace(std::pair(ranked.solver, ranked.options),
-                                 PartitionedSolver(registry, std::move(one), communicator))
-                        .first;
-        }
+        if (ranked[turn.member].law.value_or(problem.problem().law) != problem.problem().law)
+            return {TurnEnd::Retired, best};
+        PartitionedSolver& solver = member(ranked[turn.member]);
         SolveSettings stage = settings;
-        stage.tolerance = std::max(settings.tolerance, ranked.stage.tolerance);
-        stage.max_iterations = std::min(settings.max_iterations - report.iterations, ranked.stage.max_iterations);
+        stage.max_iterations = std::min(settings.max_iterations - report.iterations, turn.iterations);
         stage.time_limit = settings.time_limit - spent;
-        stage.warm_start = started && (place->second.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
-        if (stage.max_iterations <= 0 || !(stage.time_limit > 0.0)) break;
-        Solution next = own;
-        const SolveReport done = place->second.solve(problem, next, stage);
+        stage.warm_start =
+            (settings.warm_start || turn.start) && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
+        Solution& iterate = left[turn.member];
+        iterate = turn.start ? left[*turn.start] : first;
+        const SolveReport done = solver.solve(problem, iterate, stage);
         spent += done.seconds_setup + done.seconds_solve;
-        add(total, place->second.cost());
+        add(total, solver.cost());
         report.iterations += done.iterations;
         report.seconds_setup += done.seconds_setup;
         report.seconds_solve += done.seconds_solve;
         report.curve.insert(report.curve.end(), done.curve.begin(), done.curve.end());
-        report.stages.push_back({done.solver, done.options, done.law, ranked.stage.reason, stage.tolerance, done.status,
-                                 done.message, done.iterations, done.seconds_setup + done.seconds_solve,
-                                 done.error.natural});
+        report.stages.push_back({done.solver, done.options, done.law, fmt::format("round {}", turn.round + 1),
+                                 stage.tolerance, done.status, done.message, done.iterations,
+                                 done.seconds_setup + done.seconds_solve, done.error.natural});
         const double worst = worst_of(done.error);
-        const bool good = std::isfinite(worst) && worst < best;
-        if (good || !started || done.status == Status::Solved) {
-            own = std::move(next);
+        if ((std::isfinite(worst) && worst < best) || done.status == Status::Solved) {
+            own = iterate;
             best = worst;
-            started = true;
             report.claimed_residual = done.claimed_residual;
         }
         report.status = done.status;
-        const bool to_the_end = stage.tolerance <= settings.tolerance;
-        if ((done.status == Status::Solved && to_the_end) || done.status == Status::Cancelled ||
-            done.status == Status::Infeasible || done.status == Status::TimeLimit ||
-            (ranked.last && done.status != Status::Solved))
-            break;
-        if (done.status == Status::Solved) report.status = Status::Stalled;
-        if (!ranked.stage.to_goal && best <= settings.needed) {
-            report.near_goal = true;
-            break;
-        }
-    }
+        const auto end = [&] {
+            switch (done.status) {
+                case Status::Solved:
+                case Status::Cancelled:
+                case Status::Infeasible:
+                case Status::TimeLimit:
+                    return TurnEnd::Done;
+                case Status::IterationLimit:
+                    return report.iterations >= settings.max_iterations ? TurnEnd::Done : TurnEnd::Exhausted;
+                case Status::Error:
+                    return TurnEnd::Retired;
+                default:
+                    return TurnEnd::Ended;
+            }
+        };
+        return {end(), worst, done.iterations};
+    };
+    const RoundsEnd end = run_rounds(traits_of(registry, ranked), take);
+    if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
     cost = total;
     std::vector<std::string> names;
     for (const auto& stage : report.stages) names.push_back(stage.solver);
-    report.message = fmt::format("{}: {}", rule.name, fmt::join(names, ", then "));
+    report.message = fmt::format("{}: {}", order.name, fmt::join(names, ", then "));
 }
 
 SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own, const SolveSettings& settings) {

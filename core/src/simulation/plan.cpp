@@ -327,7 +327,7 @@ private:
         if (!solver.name.empty() && solver.name != auto_name) return;
         OptionTexts options = solver.options;
         options.try_emplace("simulation", "true");
-        for (auto& name : auto_choice(registry_, options, needs, solver.settings().tolerance).later)
+        for (auto& name : auto_choice(registry_, options, needs).later)
             if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
                 plan_.later_solvers.push_back(std::move(name));
     }

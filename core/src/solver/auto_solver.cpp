@@ -4,16 +4,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
+#include <utility>
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/solver_config.hpp"
 #include "delassus/version.hpp"
 #include "problem/need_of.hpp"
+#include "solver/acceptance.hpp"
 #include "solver/finished_solver.hpp"
 #include "solver/ranking.hpp"
+#include "solver/rounds.hpp"
 #include "solver/solver_implementation.hpp"
+#include "solver/stages.hpp"
 
 namespace delassus {
 
@@ -32,7 +37,7 @@ fs::path ranking_file(const Registry& registry) {
 
 struct AutoOptions {
     Ranking ranking;
-    bool simulation;
+    bool step;  // the problems are steps of a simulation
 };
 
 AutoOptions read_options(const Registry& registry, const OptionTexts& options) {
@@ -52,10 +57,10 @@ public:
     [[nodiscard]] const PluginInfo& info() const override { return info_; }
     [[nodiscard]] const OptionTexts& options() const override { return options_; }
 
-    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) override {
+    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings&) override {
         const std::uint64_t needs = needs_of(problem, {});
         if (!unnamed(registry_, needs).empty()) return {};
-        for (const auto& ranked : rule_of(problem, settings).stages)
+        for (const auto& ranked : order_of(problem).solvers)
             if (can(registry_, ranked.solver, needs)) return {};
         return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
                            problem.describe(needs));
@@ -69,43 +74,49 @@ public:
 
     std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override {
-        const std::uint64_t needs = needs_of(problem, {});
-        const RankingRule& rule = rule_of(problem, settings);
         StageRunner runner(problem, solution, settings, report);
-        if (chosen_.simulation && runner.solved_at_start()) return runner.error();
-        bool done = false;
-        for (const auto& ranked : rule.stages) {
-            if (!ranked.m.takes(problem.raw().m)) continue;
-            Solver* solver = usable(ranked, runner.problem_of(ranked.stage));
-            if (!solver) continue;
-            done = runner.run(*solver, ranked.stage) || ranked.last;
-            if (done) break;
-        }
-        // No solver of the rule is installed, or none reached the tolerance: try every other capable solver, each from
-        // the best iterate so far.
-        if (!done)
-            for (const auto& name : unnamed(registry_, needs)) {
-                const RankedStage ranked{
-                    name, {}, {.reason = "the solvers before it did not reach the tolerance", .watched = true}};
-                const bool tried =
-                    std::any_of(report.stages.begin(), report.stages.end(), [&](const StageReport& stage) {
-                        return stage.solver == name && stage.law == problem.problem().law;
-                    });
-                Solver* solver = tried ? nullptr : usable(ranked, problem);
-                if (solver && runner.run(*solver, ranked.stage)) break;
+        if (chosen_.step && runner.solved_at_start()) return runner.error();
+        const Order& order = order_of(problem);
+        const std::vector<RankedSolver> ranked = members_of(registry_, order, needs_of(problem, {}));
+        const std::vector<Member> members = traits_of(registry_, ranked);
+        Solution start = settings.warm_start ? solution : Solution{};
+        std::vector<Solution> left(members.size());
+        const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
+            const RankedSolver& own = ranked[turn.member];
+            report.near_goal = turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work);
+            if (report.near_goal) return {TurnEnd::Done, runner.worst()};
+            Solver* solver = usable(own, runner.problem_of(own.law));
+            if (!solver) return {TurnEnd::Retired, std::numeric_limits<double>::infinity()};
+            Stage stage{.reason = fmt::format("round {}", turn.round + 1),
+                        .iterations = turn.iterations,
+                        .may_pass = turn.may_pass && !members[turn.member].local,
+                        .law = own.law};
+            // At rest, and where nothing is known of the step, the next steps begin within the tolerance if they change
+            // little. What Newton's method gains with its last iteration costs nothing.
+            constexpr double at_rest = 1e-6;
+            if (chosen_.step && (members[turn.member].local || settings.tolerance <= at_rest)) stage.tighter = 1e-3;
+            Solution& iterate = left[turn.member];
+            iterate = turn.start ? left[*turn.start] : start;
+            TurnResult result = runner.run(*solver, stage, iterate);
+            if (own.law && result.end != TurnEnd::Done) {
+                start = iterate;
+                result.end = TurnEnd::Retired;
             }
-        report.message = fmt::format("{}: {}", rule.name, runner.sentence());
+            return result;
+        });
+        if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
+        report.message = fmt::format("{}: {}{}", order.name, runner.sentence(),
+                                     end == RoundsEnd::Stale ? "; no solver got nearer in three rounds" : "");
         return runner.error();
     }
 
 private:
-    [[nodiscard]] const RankingRule& rule_of(const PreparedProblem& problem, const SolveSettings& settings) const {
-        return chosen_.ranking.rule({needs_of(problem, {}), settings.tolerance, chosen_.simulation}, problem.raw().m);
+    [[nodiscard]] const Order& order_of(const PreparedProblem& problem) const {
+        return chosen_.ranking.order({needs_of(problem, {}), chosen_.step}, problem.raw().m);
     }
 
-    /// The solver of a stage, kept from problem to problem; null if it is not installed or cannot take the problem.
-    Solver* usable(const RankedStage& ranked, const PreparedProblem& problem) {
-        if (!can(registry_, ranked.solver, needs_of(problem, {}))) return nullptr;
+    /// The solver of a member, kept from problem to problem; null if it cannot take the problem.
+    Solver* usable(const RankedSolver& ranked, const PreparedProblem& problem) {
         const auto key = std::make_pair(ranked.solver, ranked.options);
         auto place = solvers_.find(key);
         if (place == solvers_.end())
@@ -121,6 +132,12 @@ private:
 };
 
 }  // namespace
+
+/// The needs of a problem with these under the other law, if there is one.
+static std::uint64_t needs_under(std::optional<Law> law, std::uint64_t needs) {
+    if (!law || (needs & sdk::cones_with_law) == 0) return needs;
+    return (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
+}
 
 bool can(const Registry& registry, const std::string& name, std::uint64_t needs) {
     const auto& plugins = registry.plugins();
@@ -138,8 +155,36 @@ std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) 
     return names;
 }
 
-bool by_rules_of_simulations(const Registry& registry, const OptionTexts& options) {
-    return read_options(registry, options).simulation;
+/// Only free rows, in a step: what a factorisation leaves there is rounding, often of rows that repeat each other,
+/// which no other solver removes. So the first that can is the only one.
+static bool is_linear_step(const Order& order) {
+    return order.linear.value_or(false) && order.step.value_or(false);
+}
+
+std::vector<RankedSolver> members_of(const Registry& registry, const Order& order, std::uint64_t needs) {
+    constexpr std::int64_t of_a_stranger = 100;  // iterations of a solver of which nothing is known
+    std::vector<RankedSolver> members;
+    for (const auto& ranked : order.solvers)
+        if (can(registry, ranked.solver, needs_under(ranked.law, needs))) members.push_back(ranked);
+    if (!members.empty() && is_linear_step(order)) return {members.front()};
+    for (const auto& name : unnamed(registry, needs))
+        if (std::ranges::none_of(members, [&](const RankedSolver& member) { return member.solver == name; }))
+            members.push_back({name, {}, of_a_stranger});
+    return members;
+}
+
+std::vector<Member> traits_of(const Registry& registry, const std::vector<RankedSolver>& ranked) {
+    std::vector<Member> members;
+    for (const auto& one : ranked) {
+        const PluginInfo info = registry.find(one.solver);
+        members.push_back({one.iterations, (info.capabilities & DELASSUS_CAN_WARM_START) != 0,
+                           (info.flags & DELASSUS_FLAG_LOCAL) != 0});
+    }
+    return members;
+}
+
+bool of_steps(const Registry& registry, const OptionTexts& options) {
+    return read_options(registry, options).step;
 }
 
 Ranking ranking_of(const Registry& registry, const OptionTexts& options) {
@@ -150,7 +195,7 @@ PluginInfo auto_info(const Registry& registry) {
     PluginInfo info;
     info.name = auto_name;
     info.version = DELASSUS_VERSION;
-    info.description = "Stages of the other solvers, chosen by the problem and by measured decrease";
+    info.description = "All solvers that can, in turns, with twice the work in each round";
     info.licence = "BSD-3-Clause";
     info.options = {{"ranking",
                      DELASSUS_OPTION_TEXT,
@@ -159,7 +204,7 @@ PluginInfo auto_info(const Registry& registry) {
                      0.0,
                      {},
                      "",
-                     "File of the rules that pick solvers; empty: ranking.json of the plugin folders"},
+                     "File of the orders of solvers; empty: ranking.json of the plugin folders"},
                     {"simulation",
                      DELASSUS_OPTION_BOOLEAN,
                      "false",
@@ -176,7 +221,7 @@ Solver make_auto(const Registry& registry, OptionTexts options) {
     return Solver(std::make_unique<AutoSolver>(registry, std::move(options)));
 }
 
-AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs, double tolerance) {
+AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs) {
     static_cast<void>(take_finish(options));
     AutoChoice choice;
     const auto add = [&](std::vector<std::string>& names, const std::string& name) {
@@ -185,29 +230,16 @@ AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint6
         names.push_back(name);
     };
     const AutoOptions chosen = read_options(registry, options);
-    const auto rules = chosen.ranking.rules({needs, tolerance, chosen.simulation});
-    const auto able = [&](const RankedStage& ranked) {
-        std::uint64_t own = needs;
-        if (const auto law = ranked.stage.law; law && (needs & sdk::cones_with_law))
-            own = (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
-        return can(registry, ranked.solver, own);
+    const auto orders = chosen.ranking.orders({needs, chosen.step});
+    const auto able = [&](const RankedSolver& ranked) {
+        return can(registry, ranked.solver, needs_under(ranked.law, needs));
     };
-    for (const auto* rule : rules) {
-        const auto start = std::find_if(rule->stages.begin(), rule->stages.end(), able);
-        if (start != rule->stages.end()) add(choice.first, start->solver);
-    }
-    bool others = false;
-    for (const auto* rule : rules) {
-        bool ends = false;
-        for (const auto& ranked : rule->stages) {
-            if (ends || !able(ranked)) continue;
-            add(choice.later, ranked.solver);
-            ends = ranked.last;
-        }
-        others = others || !ends;
-    }
-    if (others)
-        for (const auto& name : unnamed(registry, needs)) add(choice.first.empty() ? choice.first : choice.later, name);
+    for (const auto* order : orders)
+        if (const auto first = std::ranges::find_if(order->solvers, able); first != order->solvers.end())
+            add(choice.first, first->solver);
+    for (const auto* order : orders)
+        for (const auto& ranked : members_of(registry, *order, needs))
+            add(choice.first.empty() ? choice.first : choice.later, ranked.solver);
     return choice;
 }
 

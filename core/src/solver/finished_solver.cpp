@@ -42,9 +42,12 @@ public:
     std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);
-        const bool done = runner.run(main_, {.reason = "the solver that was asked for", .tolerance = finish_at_}) ||
-                          runner.run(finish_, {.reason = "its finish"});
-        if (!done) runner.run(main_, {.reason = "the finish did not reach the tolerance"});
+        const auto done = [&](Solver& solver, const Stage& stage) {
+            return runner.run(solver, stage).end == TurnEnd::Done;
+        };
+        if (!done(main_, {.reason = "the solver that was asked for", .tolerance = finish_at_}) &&
+            !done(finish_, {.reason = "its finish"}))
+            done(main_, {.reason = "the finish did not reach the tolerance"});
         report.message = runner.sentence();
         return runner.error();
     }

@@ -24,13 +24,6 @@ void check_keys(const nlohmann::json& object, const std::vector<std::string_view
             throw InputError(fmt::format("{} has no key \"{}\"{}", where, key, nearest_name_hint(key, known)));
 }
 
-Structure structure_of(const std::string& name) {
-    for (const auto structure : {Structure::Reduced, Structure::Diagonal, Structure::Blocks, Structure::Definite,
-                                 Structure::Semidefinite, Structure::Indefinite, Structure::Unsymmetric})
-        if (name == name_of(structure)) return structure;
-    throw InputError(fmt::format("there is no structure \"{}\" of H", name));
-}
-
 RowRange read_rows(const nlohmann::json& bounds) {
     RowRange range;
     range.smallest = bounds.at(0).get<std::int32_t>();
@@ -38,72 +31,49 @@ RowRange read_rows(const nlohmann::json& bounds) {
     return range;
 }
 
-RankedStage read_stage(const nlohmann::json& json) {
-    check_keys(json,
-               {"solver", "options", "tolerance", "sharper", "max_iterations", "watched", "to_goal", "patient",
-                "attempt", "last", "law", "m", "reason"},
-               "a stage");
-    RankedStage ranked;
+RankedSolver read_solver(const nlohmann::json& json) {
+    check_keys(json, {"solver", "options", "iterations", "law"}, "a solver of an order");
+    RankedSolver ranked;
     ranked.solver = json.at("solver").get<std::string>();
     if (json.contains("options")) ranked.options = json.at("options").get<OptionTexts>();
-    ranked.stage.reason = json.at("reason").get<std::string>();
-    ranked.stage.tolerance = json.value("tolerance", 0.0);
-    ranked.stage.sharper = json.value("sharper", 1.0);
-    ranked.stage.max_iterations = json.value("max_iterations", ranked.stage.max_iterations);
-    ranked.stage.watched = json.value("watched", false);
-    ranked.stage.to_goal = json.value("to_goal", false);
-    ranked.stage.patient = json.value("patient", false);
-    ranked.stage.attempt = json.value("attempt", false);
-    ranked.last = json.value("last", false);
-    if (json.contains("m")) ranked.m = read_rows(json.at("m"));
-    if (json.contains("law")) ranked.stage.law = law_of(json.at("law").get<std::string>());
+    if (json.contains("law")) ranked.law = law_of(json.at("law").get<std::string>());
+    ranked.iterations = json.at("iterations").get<std::int64_t>();
+    if (ranked.iterations < 1) throw InputError(fmt::format("{} has {} iterations", ranked.solver, ranked.iterations));
     return ranked;
 }
 
-RankingRule read_rule(const nlohmann::json& json) {
-    check_keys(json, {"name", "when", "stages"}, "a rule");
-    RankingRule rule;
-    rule.name = json.at("name").get<std::string>();
+Order read_order(const nlohmann::json& json) {
+    check_keys(json, {"name", "when", "solvers"}, "an order");
+    Order order;
+    order.name = json.at("name").get<std::string>();
     const nlohmann::json& when = json.at("when");
-    check_keys(when, {"linear", "simulation", "partitioned", "law", "structure", "m", "tolerance"},
-               fmt::format("\"when\" of \"{}\"", rule.name));
-    if (when.contains("linear")) rule.linear = when.at("linear").get<bool>();
-    if (when.contains("simulation")) rule.simulation = when.at("simulation").get<bool>();
-    if (when.contains("partitioned")) rule.partitioned = when.at("partitioned").get<bool>();
-    if (when.contains("law")) rule.law = law_of(when.at("law").get<std::string>());
-    if (when.contains("structure"))
-        for (const auto& name : when.at("structure")) rule.structures.push_back(structure_of(name));
-    if (when.contains("m")) rule.m = read_rows(when.at("m"));
-    if (when.contains("tolerance")) {
-        if (!when.at("tolerance").at(0).is_null()) rule.smallest_tolerance = when.at("tolerance").at(0).get<double>();
-        if (!when.at("tolerance").at(1).is_null()) rule.largest_tolerance = when.at("tolerance").at(1).get<double>();
-    }
-    for (const auto& stage : json.at("stages")) rule.stages.push_back(read_stage(stage));
-    return rule;
+    check_keys(when, {"linear", "step", "partitioned", "law", "m"}, fmt::format("\"when\" of \"{}\"", order.name));
+    if (when.contains("linear")) order.linear = when.at("linear").get<bool>();
+    if (when.contains("step")) order.step = when.at("step").get<bool>();
+    if (when.contains("partitioned")) order.partitioned = when.at("partitioned").get<bool>();
+    if (when.contains("law")) order.law = law_of(when.at("law").get<std::string>());
+    if (when.contains("m")) order.m = read_rows(when.at("m"));
+    for (const auto& solver : json.at("solvers")) order.solvers.push_back(read_solver(solver));
+    return order;
 }
 
 }  // namespace
 
-bool RankingRule::matches(const RankedNeeds& asked) const {
+bool Order::matches(const RankedNeeds& asked) const {
     if (linear && *linear != ((asked.needs & sdk::cones_not_linear) == 0)) return false;
-    if (simulation && *simulation != asked.simulation) return false;
+    if (step && *step != asked.step) return false;
     if (partitioned && *partitioned != ((asked.needs & DELASSUS_CAN_PARTITIONED) != 0)) return false;
-    if (law && (asked.needs & need_of(*law)) == 0) return false;
-    if (!structures.empty() && std::none_of(structures.begin(), structures.end(), [&](Structure structure) {
-            return (asked.needs & need_of(structure)) != 0;
-        }))
-        return false;
-    return asked.tolerance >= smallest_tolerance && asked.tolerance <= largest_tolerance;
+    return !law || (asked.needs & need_of(*law)) != 0;
 }
 
 Ranking::Ranking(const std::filesystem::path& file) {
     try {
         const nlohmann::json json = parse_json(read_file(file, most_bytes_of_text));
-        check_keys(json, {"format", "made_by", "rules"}, "a ranking");
-        if (json.at("format") != 1) throw InputError("its format is not 1");
-        for (const auto& rule : json.at("rules")) rules_.push_back(read_rule(rule));
-        if (rules_.empty() || !json.at("rules").back().at("when").empty())
-            throw InputError("its last rule must match everything: \"when\": {}");
+        check_keys(json, {"format", "made_by", "orders"}, "a ranking");
+        if (json.at("format") != 2) throw InputError("its format is not 2");
+        for (const auto& order : json.at("orders")) orders_.push_back(read_order(order));
+        if (orders_.empty() || !json.at("orders").back().at("when").empty())
+            throw InputError("its last order must match everything: \"when\": {}");
     } catch (const nlohmann::json::exception& error) {
         throw InputError(fmt::format("the ranking {} cannot be read: {}", file.string(), sentence_of(error)));
     } catch (const InputError& error) {
@@ -111,17 +81,17 @@ Ranking::Ranking(const std::filesystem::path& file) {
     }
 }
 
-const RankingRule& Ranking::rule(const RankedNeeds& asked, std::int32_t m) const {
-    return *std::find_if(rules_.begin(), rules_.end(),
-                         [&](const RankingRule& rule) { return rule.matches(asked) && rule.m.takes(m); });
+const Order& Ranking::order(const RankedNeeds& asked, std::int32_t m) const {
+    return *std::find_if(orders_.begin(), orders_.end(),
+                         [&](const Order& order) { return order.matches(asked) && order.m.takes(m); });
 }
 
-std::vector<const RankingRule*> Ranking::rules(const RankedNeeds& asked) const {
-    std::vector<const RankingRule*> found;
-    for (const auto& rule : rules_) {
-        if (!rule.matches(asked)) continue;
-        found.push_back(&rule);
-        if (rule.m == RowRange{}) break;  // none comes after it
+std::vector<const Order*> Ranking::orders(const RankedNeeds& asked) const {
+    std::vector<const Order*> found;
+    for (const auto& order : orders_) {
+        if (!order.matches(asked)) continue;
+        found.push_back(&order);
+        if (order.m == RowRange{}) break;  // none comes after it
     }
     return found;
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The data behind `auto`: which solvers take a problem, in which order (plugins/ranking.json, docs/solvers/auto.md).
+// The data behind `auto`: in which order solvers take turns, and how much they do in the first (plugins/ranking.json,
+// docs/solvers/auto.md).
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -9,7 +11,7 @@
 #include <vector>
 
 #include "delassus/needs.hpp"
-#include "solver/stages.hpp"
+#include "delassus/plugin_info.hpp"
 
 namespace delassus {
 
@@ -21,33 +23,31 @@ struct RowRange {
     bool operator==(const RowRange&) const = default;
 };
 
-/// A stage of the ranking: a solver and what it is to do.
-struct RankedStage {
+/// A solver with its options, and its iterations in the first round (rounds.hpp).
+struct RankedSolver {
     std::string solver;
     OptionTexts options;
-    Stage stage;
-    bool last = false;  ///< no other stage follows: where this one fails, the others would too
-    RowRange m = {};    ///< of the problems that the stage is for
+    std::int64_t iterations = 0;
+    /// The law it solves with, if it is not the problem's: then it has one turn, in which it makes a start for those
+    /// after it.
+    std::optional<Law> law = {};
 };
 
-/// What a rule looks at, apart from m.
+/// What an order looks at, apart from m.
 struct RankedNeeds {
     std::uint64_t needs = 0;  ///< DELASSUS_CAN_* bits of the problem
-    double tolerance = 0.0;
-    bool simulation = false;  ///< a step of a simulation
+    bool step = false;        ///< a step of a simulation
 };
 
-/// Stages for the problems that it matches.
-struct RankingRule {
+/// The order of solvers for the problems that it matches.
+struct Order {
     std::string name;
-    std::optional<bool> linear;         ///< free rows only, or others too
-    std::optional<bool> simulation;     ///< a step of a simulation, or a problem by itself
-    std::optional<bool> partitioned;    ///< a problem in parts, or one that every process has as a whole
-    std::optional<Law> law;             ///< of problems with friction
-    std::vector<Structure> structures;  ///< none: any
+    std::optional<bool> linear;       ///< free rows only, or others too
+    std::optional<bool> step;         ///< a step of a simulation, or a problem by itself
+    std::optional<bool> partitioned;  ///< a distributed problem, or one that every process has as a whole
+    std::optional<Law> law;           ///< of problems with friction
     RowRange m;
-    double smallest_tolerance = 0.0, largest_tolerance = std::numeric_limits<double>::infinity();
-    std::vector<RankedStage> stages;
+    std::vector<RankedSolver> solvers;
 
     /// For some m.
     [[nodiscard]] bool matches(const RankedNeeds& asked) const;
@@ -58,13 +58,13 @@ public:
     /// Reads a file. Throws InputError with the file and what is wrong in it.
     explicit Ranking(const std::filesystem::path& file);
 
-    /// The first rule that matches. The last rule of a ranking matches everything (checked when it is read).
-    [[nodiscard]] const RankingRule& rule(const RankedNeeds& asked, std::int32_t m) const;
-    /// The rules that some m leads to.
-    [[nodiscard]] std::vector<const RankingRule*> rules(const RankedNeeds& asked) const;
+    /// The first order that matches. The last one of a ranking matches everything (checked when it is read).
+    [[nodiscard]] const Order& order(const RankedNeeds& asked, std::int32_t m) const;
+    /// The orders that some m leads to.
+    [[nodiscard]] std::vector<const Order*> orders(const RankedNeeds& asked) const;
 
 private:
-    std::vector<RankingRule> rules_;
+    std::vector<Order> orders_;
 };
 
 }  // namespace delassus

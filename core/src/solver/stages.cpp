@@ -12,25 +12,31 @@
 
 namespace delassus {
 
-DecreaseWatch::DecreaseWatch(double tolerance, std::int64_t max_iterations)
-    : tolerance_(tolerance), max_iterations_(max_iterations) {}
-
-bool DecreaseWatch::hopeless(std::int64_t iteration, double natural) {
-    if (!std::isfinite(natural)) return false;
-    next_ = 2 * iteration;
-    const double now = std::log(std::max(natural, std::numeric_limits<double>::min()));
-    const bool fails =
-        measured_ >= 2 && natural > tolerance_ && !in_reach(iteration, natural, before_ - last_, last_ - now);
-    failed_ = fails ? failed_ + 1 : 0;
-    before_ = std::exchange(last_, now);
-    ++measured_;
-    return failed_ >= 2;
+Forecast::Forecast(double tolerance, std::int64_t iterations)
+    : tolerance_(tolerance), iterations_(iterations), next_(iterations) {
+    constexpr std::int64_t earliest = 16;
+    while (next_ / 2 >= earliest) next_ /= 2;
 }
 
-bool DecreaseWatch::in_reach(std::int64_t iteration, double natural, double first, double second) const {
+Forecast::Verdict Forecast::judge(std::int64_t iteration, double natural) {
+    const bool over = iteration >= iterations_;
+    if (!std::isfinite(natural)) return over ? Verdict::Exhausted : Verdict::GoOn;
+    next_ = over ? std::numeric_limits<std::int64_t>::max() : iterations_;
+    while (!over && next_ / 2 > iteration) next_ /= 2;
+    const double now = std::log(std::max(natural, std::numeric_limits<double>::min()));
+    const bool known = measured_ >= 2;
+    const bool reached = natural <= tolerance_ || (known && in_reach(iteration, natural, before_ - last_, last_ - now));
+    failed_ = known && !reached ? failed_ + 1 : 0;
+    before_ = std::exchange(last_, now);
+    ++measured_;
+    if (over) return reached ? Verdict::GoOn : Verdict::Exhausted;
+    return failed_ >= 2 ? Verdict::Pass : Verdict::GoOn;
+}
+
+bool Forecast::in_reach(std::int64_t iteration, double natural, double first, double second) const {
     if (!(second > 0.0)) return false;
     const double growth = first > 0.0 ? std::clamp(second / first, 1.0, 2.0) : 1.0;
-    const double limit = static_cast<double>(max_iterations_);
+    const double limit = 2.0 * static_cast<double>(iterations_);
     double rest = std::log(natural / tolerance_), fall = growth * second;
     for (double k = static_cast<double>(iteration); k <= limit; k *= 2.0) {
         if (rest <= fall) return k * std::exp2(rest / fall) <= limit;
@@ -73,69 +79,75 @@ bool StageRunner::solved_at_start() {
     return true;
 }
 
-const PreparedProblem& StageRunner::problem_of(const Stage& stage) {
-    const Law law = stage.law.value_or(problem_.problem().law);
-    if (law == problem_.problem().law) return problem_;
-    if (!other_) other_ = problem_.with_law(law);
+double StageRunner::worst() {
+    if (started_ && std::isnan(worst_)) worst_ = worst_of(measured_error());
+    return started_ ? worst_ : std::numeric_limits<double>::infinity();
+}
+
+const PreparedProblem& StageRunner::problem_of(std::optional<Law> law) {
+    if (!law || *law == problem_.problem().law) return problem_;
+    if (!other_) other_ = problem_.with_law(*law);
     return *other_;
 }
 
-bool StageRunner::run(Solver& solver, const Stage& stage) {
-    if (stage.patient && !of_attempt_ && worst_ <= settings_.usable) {
-        report_.near_goal = true;
-        return true;
-    }
-    const PreparedProblem& problem = problem_of(stage);
-    const bool other = &problem != &problem_;
-    const bool warm = started_ && !of_attempt_ && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
-    const double tolerance = stage.tolerance > 0.0 ? stage.tolerance : settings_.tolerance;
-    DecreaseWatch watch(tolerance, stage.max_iterations);
-    const SolveSettings settings = settings_of(stage, watch, warm, problem);
-    Solution solution = warm ? best_ : Solution{};
-    const SolveReport result = solver.solve(problem, solution, settings);
+TurnResult StageRunner::run(Solver& solver, const Stage& stage) {
+    Solution iterate = started_ ? best_ : Solution{};
+    return run(solver, stage, iterate);
+}
 
-    const Errors error = other ? problem_.meter().measure(solution.x, solution.lambda) : result.error;
+TurnResult StageRunner::run(Solver& solver, const Stage& stage, Solution& iterate) {
+    const PreparedProblem& problem = problem_of(stage.law);
+    const bool other_law = &problem != &problem_;
+    const bool warm =
+        (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0 && (!iterate.x.empty() || !iterate.lambda.empty());
+    Forecast forecast(stage.tolerance > 0.0 ? stage.tolerance : settings_.tolerance, stage.iterations);
+    Forecast::Verdict verdict = Forecast::Verdict::GoOn;
+    const SolveReport result = solver.solve(problem, iterate, settings_of(stage, problem, warm, forecast, verdict));
+
+    const Errors error = other_law ? problem_.meter().measure(iterate.x, iterate.lambda) : result.error;
+    const double tolerance =
+        stage.tolerance > 0.0 ? std::max(stage.tolerance, settings_.tolerance) : settings_.tolerance;
     // Where momenta cancel, rounding alone may leave a large balance error, which is excused where all else is solved.
-    const bool solved = result.status == Status::Solved && tolerance == settings_.tolerance && !other;
-    // A stage with the other law provides a start for the next one, whatever its error under the problem's own law.
-    if (started_ && std::isnan(worst_)) worst_ = worst_of(measured_error());
-    if (!started_ || of_attempt_ || worst_of(error) < worst_ || other || solved) {
-        of_attempt_ = stage.attempt && (!started_ || of_attempt_);
-        best_ = std::move(solution);
+    const bool solved = result.status == Status::Solved && tolerance == settings_.tolerance && !other_law;
+    if (!started_ || worst_of(error) < worst() || solved) {
+        best_ = iterate;
         error_ = error;
         worst_ = worst_of(error);
         started_ = true;
     }
-    add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, result.status, result.message,
+    const Status status = verdict == Forecast::Verdict::Exhausted ? Status::IterationLimit : result.status;
+    add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, status, result.message,
          result.iterations, result.seconds_setup + result.seconds_solve, error.natural},
         result);
-    if (result.status == Status::Cancelled || (result.status == Status::Infeasible && !other)) return true;
-    if (solved || worst_of(error) <= settings_.tolerance) {
+    return {end_of(status, verdict, other_law, solved, worst_of(error)), worst_of(error), result.iterations};
+}
+
+TurnEnd StageRunner::end_of(Status status, Forecast::Verdict verdict, bool other_law, bool solved, double error) {
+    if (status == Status::Cancelled || (status == Status::Infeasible && !other_law)) return TurnEnd::Done;
+    if (solved || error <= settings_.tolerance) {
         report_.status = Status::Solved;
-        return true;
-    }
-    if (!stage.to_goal && worst_ <= settings_.needed) {
-        report_.near_goal = true;
-        return true;
+        return TurnEnd::Done;
     }
     if (report_.iterations >= settings_.max_iterations) {
         report_.status = Status::IterationLimit;
-        return true;
+        return TurnEnd::Done;
     }
     if (report_.seconds_setup + report_.seconds_solve >= settings_.time_limit) {
         report_.status = Status::TimeLimit;
-        return true;
+        return TurnEnd::Done;
     }
     if (report_.status == Status::Solved) report_.status = Status::Stalled;  // it reached only the goal of this stage
-    return false;
+    if (status == Status::IterationLimit) return TurnEnd::Exhausted;
+    if (status == Status::Error) return TurnEnd::Retired;
+    return verdict == Forecast::Verdict::Pass ? TurnEnd::Passed : TurnEnd::Ended;
 }
 
-SolveSettings StageRunner::settings_of(const Stage& stage, DecreaseWatch& watch, bool warm,
-                                       const PreparedProblem& problem) const {
+SolveSettings StageRunner::settings_of(const Stage& stage, const PreparedProblem& problem, bool warm,
+                                       Forecast& forecast, Forecast::Verdict& verdict) const {
     SolveSettings settings = settings_;
     if (stage.tolerance > 0.0) settings.tolerance = std::max(stage.tolerance, settings_.tolerance);
-    settings.tolerance *= stage.sharper;
-    settings.max_iterations = std::min(stage.max_iterations, settings_.max_iterations - report_.iterations);
+    settings.tolerance *= stage.tighter;
+    settings.max_iterations = settings_.max_iterations - report_.iterations;
     const double seconds_before = report_.seconds_setup + report_.seconds_solve;
     settings.time_limit = settings_.time_limit - seconds_before;
     settings.warm_start = warm;
@@ -150,10 +162,20 @@ SolveSettings StageRunner::settings_of(const Stage& stage, DecreaseWatch& watch,
     if (&problem != &problem_) settings.record_curve = false;
     if (settings_.on_sample)
         settings.on_sample = [this, shifted](const CurveSample& sample) { settings_.on_sample(shifted(sample)); };
-    if (stage.watched)
-        settings.give_up = [&watch, &problem](std::int64_t iteration, const double* x, const double* lambda) {
-            return watch.due(iteration) && watch.hopeless(iteration, problem.meter().natural(x, lambda));
+    if (stage.iterations > 0) {
+        const std::int64_t twice =
+            stage.iterations > settings.max_iterations / 2 ? stage.iterations : 2 * stage.iterations;
+        settings.max_iterations = std::min(settings.max_iterations, twice);
+        settings.give_up = [&, may_pass = stage.may_pass](std::int64_t iteration, const double* x,
+                                                          const double* lambda) {
+            if (verdict != Forecast::Verdict::GoOn) return true;
+            if (forecast.due(iteration)) {
+                verdict = forecast.judge(iteration, problem.meter().natural(x, lambda));
+                if (verdict == Forecast::Verdict::Pass && !may_pass) verdict = Forecast::Verdict::GoOn;
+            }
+            return verdict != Forecast::Verdict::GoOn;
         };
+    }
     return settings;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "delassus/solver.hpp"
+#include "solver/rounds.hpp"
 
 namespace delassus {
 
@@ -15,46 +16,43 @@ namespace delassus {
 struct Stage {
     std::string reason;      ///< why this solver, now: for the report
     double tolerance = 0.0;  ///< natural error that ends the stage; 0: the one that was asked for
-    /// The stage aims at this share of the tolerance, and has done its work where it reaches the tolerance itself. In a
-    /// simulation the next steps then start within the tolerance, if they change little.
-    double sharper = 1.0;
-    std::int64_t max_iterations = std::numeric_limits<std::int64_t>::max();
-    /// The stage is given up when, at the measured decrease, it would not reach its tolerance within max_iterations
-    /// (see DecreaseWatch).
-    bool watched = false;
-    /// Where the tolerance is a goal, an error that is within what is needed (SolveSettings) does not end the solve
-    /// here.
-    bool to_goal = false;
-    /// Much work for little: not begun where the answer so far is usable (SolveSettings).
-    bool patient = false;
-    /// An attempt: where it does not solve the problem, the next stage starts as if it had not been.
-    bool attempt = false;
-    /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's own
-    /// law.
+    /// The stage aims at this fraction of the tolerance, and has done its work where it reaches the tolerance itself.
+    double tighter = 1.0;
+    /// Iterations; the forecast may allow twice as many (Forecast). 0: as many as the solve has left, unwatched.
+    std::int64_t iterations = 0;
+    bool may_pass = false;  ///< the forecast may end the stage early
+    /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's
+    /// own.
     std::optional<Law> law = {};
 };
 
-/// Forecasts by measurement whether an iteration will reach a tolerance in time. At iterations 16, 32, 64, … the
-/// natural error e is taken; let ln e fall by r₁ and then by r₂ in the last two doublings. An algebraic rate e ~ k^(−p)
-/// has r₂ = r₁, a linear one e ~ q^k has r₂ = 2 r₁; so the next doublings are taken to bring g r₂, g² r₂, … with g =
-/// r₂/r₁ held between 1 and 2. A forecast is trusted when it fails twice in a row. Iterations, not seconds: the same on
-/// every machine.
-class DecreaseWatch {
+/// Forecasts by measurement whether an iteration will reach a tolerance in twice the iterations of its turn, K. At …,
+/// K/4, K/2, K (from 16 on) the natural error e is taken; let ln e fall by r₁ and then by r₂ in the last two doublings.
+/// An algebraic rate e ~ k^(−p) has r₂ = r₁, a linear one e ~ q^k has r₂ = 2 r₁; so the next doublings are taken to
+/// bring g r₂, g² r₂, … with g = r₂/r₁ held between 1 and 2. Where that fails twice in a row before K, the turn is not
+/// worth its work; where it succeeds at K, the turn may go on to 2 K. Iterations, not seconds: the same on every
+/// machine.
+class Forecast {
 public:
-    DELASSUS_API DecreaseWatch(double tolerance, std::int64_t max_iterations);
+    DELASSUS_API Forecast(double tolerance, std::int64_t iterations);
+
+    enum class Verdict {
+        GoOn,
+        Pass,      ///< before the end of the turn: it is out of reach
+        Exhausted  ///< the turn is over, and twice its iterations would not do
+    };
 
     /// Whether this iteration is one to measure at.
     [[nodiscard]] bool due(std::int64_t iteration) const { return iteration >= next_; }
-    /// Takes the error at an iteration that is due; true if the tolerance is out of reach.
-    DELASSUS_API bool hopeless(std::int64_t iteration, double natural);
+    /// Takes the error at an iteration that is due.
+    DELASSUS_API Verdict judge(std::int64_t iteration, double natural);
 
 private:
-    /// Whether the tolerance would be reached by max_iterations, from this error after falls of r₁ and r₂.
+    /// Whether the tolerance would be reached in twice the iterations, from this error after falls of r₁ and r₂.
     [[nodiscard]] bool in_reach(std::int64_t iteration, double natural, double first, double second) const;
 
     double tolerance_;
-    std::int64_t max_iterations_;
-    std::int64_t next_ = 16;
+    std::int64_t iterations_, next_;
     int measured_ = 0, failed_ = 0;
     double before_ = 0.0, last_ = 0.0;  // ln e
 };
@@ -65,12 +63,14 @@ public:
     /// solution: the start if settings.warm_start; the best so far at any time. All must outlive the runner.
     StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings, SolveReport& report);
 
-    /// The problem that the stage's solver gets: the problem itself, or a copy under the other law, which is made once.
-    [[nodiscard]] const PreparedProblem& problem_of(const Stage& stage);
+    /// The problem that a stage with this law solves: the problem itself, or a copy under the other law, made once.
+    [[nodiscard]] const PreparedProblem& problem_of(std::optional<Law> law);
 
-    /// Runs one stage. True if nothing is left to do: solved, proven infeasible, cancelled, or a limit of the whole
-    /// solve reached.
-    bool run(Solver& solver, const Stage& stage);
+    /// Runs one stage from the iterate, if it is not empty and the solver can begin there, and leaves there what the
+    /// stage came to.
+    TurnResult run(Solver& solver, const Stage& stage, Solution& iterate);
+    /// The same from the best so far.
+    TurnResult run(Solver& solver, const Stage& stage);
 
     /// Whether the start is within the tolerance, with the velocities that go with its reactions where H gives them
     /// cheaply: then there is nothing to do. Call it before the first stage.
@@ -78,13 +78,17 @@ public:
 
     /// The errors of the solution by the meter of the problem; none if nothing was run and there was no start.
     [[nodiscard]] std::optional<Errors> error() { return started_ ? std::optional(measured_error()) : std::nullopt; }
+    /// The greater of the natural error and the balance of the best so far; infinite where there is none.
+    [[nodiscard]] double worst();
 
     /// The stages in a sentence: "ipm (9 iterations, 3.1e-07), ssn (2 iterations, 4.0e-13)".
     [[nodiscard]] std::string sentence() const;
 
 private:
-    [[nodiscard]] SolveSettings settings_of(const Stage& stage, DecreaseWatch& watch, bool warm,
-                                            const PreparedProblem& problem) const;
+    [[nodiscard]] SolveSettings settings_of(const Stage& stage, const PreparedProblem& problem, bool warm,
+                                            Forecast& forecast, Forecast::Verdict& verdict) const;
+    /// How the stage ended, whose iterate has this error.
+    [[nodiscard]] TurnEnd end_of(Status status, Forecast::Verdict verdict, bool other_law, bool solved, double error);
     void add(const StageReport& stage, const SolveReport& result);
     const Errors& measured_error();
 
@@ -97,7 +101,6 @@ private:
     std::optional<Errors> error_;
     double worst_ = std::numeric_limits<double>::quiet_NaN();
     bool started_ = false;
-    bool of_attempt_ = false;  ///< the best so far is what an attempt left: no start, and less than any other answer
 };
 
 }  // namespace delassus

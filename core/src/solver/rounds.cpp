@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "solver/rounds.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+namespace delassus {
+
+namespace {
+
+constexpr double no_iterate = std::numeric_limits<double>::infinity();
+
+/// What the rounds know of a member.
+struct Record {
+    TurnEnd last = TurnEnd::Exhausted;
+    double error = no_iterate;   // of its last iterate
+    double lowest = no_iterate;  // of all its iterates
+    std::int64_t turn = 0;       // the number of its last turn; 0: it had none
+};
+
+/// 2ᵏ w, at most the largest number.
+std::int64_t doubled(std::int64_t iterations, int round) {
+    constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max();
+    return round > 62 || iterations > (most >> round) ? most : iterations << round;
+}
+
+/// The member with the best iterate among those that others have left after this turn; none if no one has.
+std::optional<std::size_t> best_after(const std::vector<Record>& records, std::int64_t turn, std::size_t but) {
+    std::optional<std::size_t> best;
+    for (std::size_t k = 0; k < records.size(); ++k)
+        if (k != but && records[k].turn > turn && records[k].error < (best ? records[*best].error : no_iterate))
+            best = k;
+    return best;
+}
+
+}  // namespace
+
+RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnResult(const Turn&)>& take) {
+    constexpr int patience = 3;
+    constexpr double better = 0.9;
+    std::vector<Record> records(members.size());
+    std::int64_t turns = 0;
+    double work = 0.0;
+    for (int round = 0, stale = 0; stale < patience; ++round) {
+        bool worked = false, bettered = false;
+        for (std::size_t k = 0; k < members.size(); ++k) {
+            Record& own = records[k];
+            if (own.last == TurnEnd::Retired) continue;
+            Turn turn{k, round, doubled(members[k].iterations, round), work, own.last != TurnEnd::Passed, {}};
+            if (own.last == TurnEnd::Ended) {
+                turn.start = best_after(records, own.turn, k);
+                if (!turn.start || !members[k].can_start) continue;
+            } else if (members[k].local) {
+                turn.start = best_after(records, 0, members.size());
+            } else if (own.turn > 0) {
+                turn.start = k;
+            }
+            const TurnResult result = take(turn);
+            if (result.end == TurnEnd::Done) return RoundsEnd::Done;
+            worked = true;
+            work += static_cast<double>(result.iterations) / static_cast<double>(members[k].iterations);
+            own.last = result.end;
+            own.error = result.error;
+            own.turn = ++turns;
+            if (own.error < better * own.lowest) {
+                own.lowest = own.error;
+                bettered = true;
+            }
+        }
+        if (!worked) break;
+        stale = bettered ? 0 : stale + 1;
+    }
+    return RoundsEnd::Stale;
+}
+
+}  // namespace delassus
