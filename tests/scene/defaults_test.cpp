@@ -136,6 +136,32 @@ TEST(Defaults, BouncesWithoutLossTakeNothing) {
     EXPECT_GT(run.simulation.totals().solver_iterations, 100);
 }
 
+// Of several solutions the one at rest is taken: a rod that two pads hold by friction neither tilts nor sinks, although
+// other reactions within the cones would let it. They can carry 2 μ F = 1.4 F; it weighs 7.8 N.
+TEST(Defaults, AGripHoldsWhatItCanHold) {
+    for (const double force : {7.0, 12.0, 31.0})
+        for (const double turn : {90.0, 17.0}) {
+            auto run = run_of(fmt::format(
+                "step: 0.0023\nend: 2\nmaterials: {{rubber: {{friction: 0.7}}}}\nbodies:\n"
+                "- {{name: left, mass: 0.1, position: [-0.009, 0, 0.1],\n"
+                "   shapes: [{{box: {{size: [0.01, 0.03, 0.03]}}, material: rubber}}]}}\n"
+                "- {{name: right, mass: 0.1, position: [0.009, 0, 0.1],\n"
+                "   shapes: [{{box: {{size: [0.01, 0.03, 0.03]}}, material: rubber}}]}}\n"
+                "- {{name: rod, mass: 0.8, position: [0, 0, 0.1], orientation: {{axis: [1, 0, 0], angle: {0}}},\n"
+                "   shapes: [{{capsule: {{radius: 0.004, length: 0.012}}, material: rubber}}]}}\n"
+                "joints:\n"
+                "- {{name: l, kind: prismatic, second: left, point: [-0.009, 0, 0.1], axis: [1, 0, 0]}}\n"
+                "- {{name: r, kind: prismatic, second: right, point: [0.009, 0, 0.1], axis: [-1, 0, 0]}}\n"
+                "loads:\n- {{name: push, body: left, force: [{1}, 0, 0]}}\n"
+                "- {{name: pull, body: right, force: [-{1}, 0, 0]}}\n",
+                turn, force));
+            run.finish();
+            EXPECT_NEAR(run.pose("rod").position[2], 0.1, 1e-9) << force << ", " << turn;
+            const auto velocities = run.velocities("rod");
+            for (const double spin : velocities[1]) EXPECT_NEAR(spin, 0.0, 1e-9) << force << ", " << turn;
+        }
+}
+
 // ---- Contact ----
 
 TEST(Defaults, WhatPenetratesIsPushedApartSlowly) {
