@@ -176,7 +176,7 @@ std::vector<RankedSolver> members_of(const Registry& registry, const Order& orde
 std::vector<Member> traits_of(const Registry& registry, const std::vector<RankedSolver>& ranked) {
     std::vector<Member> members;
     for (const auto& one : ranked) {
-        const PluginInfo info = registry.find(one.solver);
+        const PluginInfo& info = registry.find(one.solver);
         members.push_back({one.iterations, (info.capabilities & DELASSUS_CAN_WARM_START) != 0,
                            (info.flags & DELASSUS_FLAG_LOCAL) != 0});
     }
