@@ -302,6 +302,23 @@ TEST(Auto, GoesOnWithWhoeverCan) {
     EXPECT_GE(report.stages.size(), 2U);
 }
 
+// A solver may take the other law, as a start; the problem's own law judges.
+TEST(Auto, AMemberMayTakeTheOtherLaw) {
+    const ScratchFolder scratch;
+    const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "solvers": [
+        {"solver": "apgd", "law": "associated", "iterations": 1000},
+        {"solver": "pgs", "iterations": 1000}]}])");
+    const PreparedProblem problem(point_on_plane(2.0, 10.0, 8.0, 0.5, Law::Coulomb));
+    Solution solution;
+    const auto report = solve(parse_solver("auto(ranking=" + file + ")"), problem, solution);
+    ASSERT_EQ(report.status, Status::Solved) << report.message;
+    ASSERT_EQ(report.stages.size(), 2U);
+    EXPECT_EQ(report.stages[0].law, Law::Associated);
+    EXPECT_GT(report.stages[0].natural, 1e-3) << "a sliding contact opens under the associated law";
+    EXPECT_NEAR(solution.x[1], (8.0 - 0.5 * 10.0) / 2.0, 1e-7);
+    EXPECT_NEAR(solution.x[0], 0.0, 1e-7);
+}
+
 // A plugin that is there for comparisons works only where an order names it.
 TEST(Auto, NeverTurnsToAPeerByItself) {
     const ScratchFolder scratch;

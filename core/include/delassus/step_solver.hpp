@@ -105,8 +105,8 @@ public:
     /// For each velocity, the natural error that the last solve left in its part of the problem, n; 0 where nothing was
     /// to be solved. Valid until the next solve.
     [[nodiscard]] DELASSUS_API std::span<const double> left() const;
-    /// The same as a velocity, times the velocities that the reactions had to correct, in the norm of the masses
-    /// (‖S r‖, docs/errors.md).
+    /// The same as a velocity in the norm of the masses: times that of the velocities which the reactions had to
+    /// correct (‖S r‖, docs/errors.md).
     [[nodiscard]] DELASSUS_API std::span<const double> left_in_masses() const;
 
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;

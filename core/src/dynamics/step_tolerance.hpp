@@ -12,6 +12,7 @@
 #include "delassus/plugin.h"
 #include "delassus/solver.hpp"
 #include "delassus/solver_config.hpp"
+#include "solver/judgement.hpp"
 
 namespace delassus {
 
@@ -69,7 +70,8 @@ inline double goal_of(const ErrorOfMethod& error, const PartTraits& part) {
 inline void set_step_tolerance(const SolverConfig& config, const PartTraits& part, std::optional<double> goal,
                                SolveSettings& of) {
     if (!goal) {
-        // Contacts may have no answer to a default tolerance that anybody finds.
+        // Contacts may have no answer to a default tolerance that anybody finds: no work loosens it, but there is
+        // last_resort().
         const bool only_contacts = (part.needs & DELASSUS_CAN_FRICTION) != 0 && (part.needs & DELASSUS_CAN_FREE) == 0;
         if (!config.tolerance && !config.sweeps && only_contacts) of.loosest = of.tolerance;
         return;
@@ -82,9 +84,8 @@ inline void set_step_tolerance(const SolverConfig& config, const PartTraits& par
 /// What is used where nothing better is found: nobody asked for the tolerance, and so it ends no run.
 inline bool last_resort(const SolverConfig& config, const PartTraits& part, const SolveSettings& of,
                         const SolveReport& report) {
-    const double error = std::max(report.error.natural, report.error.balance);
     return of.loosest > 0.0 && report.status != Status::Infeasible &&
-           error <= config.tolerance.value_or(usable_multiple * loosest_goal(part));
+           worst_of(report.error) <= config.tolerance.value_or(usable_multiple * loosest_goal(part));
 }
 
 }  // namespace delassus

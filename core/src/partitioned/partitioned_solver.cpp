@@ -209,8 +209,8 @@ struct PartitionedSolver::Implementation {
 
     void solve_with_plugin(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
                            SolveReport& report);
-    /// The stages of the ranking, and after them every other solver that can, each from the best so far.
-    void solve_in_stages(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
+    /// All solvers that can, in rounds (solver/rounds.hpp).
+    void solve_in_rounds(const PreparedPart& problem, Solution& own, const SolveSettings& settings,
                          SolveReport& report);
     /// The solver of a member of `auto`, made when it is first needed.
     PartitionedSolver& member(const RankedSolver& ranked);
@@ -335,7 +335,7 @@ PartitionedSolver& PartitionedSolver::Implementation::member(const RankedSolver&
         .first->second;
 }
 
-void PartitionedSolver::Implementation::solve_in_stages(const PreparedPart& problem, Solution& own,
+void PartitionedSolver::Implementation::solve_in_rounds(const PreparedPart& problem, Solution& own,
                                                         const SolveSettings& settings, SolveReport& report) {
     const Order& order = order_of(problem);
     const std::vector<RankedSolver> ranked = members_of(registry, order, problem.needs());
@@ -432,7 +432,7 @@ SolveReport PartitionedSolver::solve(const PreparedPart& problem, Solution& own,
         report.error = problem.measure(own.x, own.lambda);
         return report;
     }
-    self.ranking ? self.solve_in_stages(problem, own, settings, report)
+    self.ranking ? self.solve_in_rounds(problem, own, settings, report)
                  : self.solve_with_plugin(problem, own, settings, report);
     const SetUpCounts counts = self.counts();
     report.analyses = counts.analyses;

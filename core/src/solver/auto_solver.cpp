@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "delassus/error.hpp"
@@ -77,8 +78,7 @@ public:
         StageRunner runner(problem, solution, settings, report);
         if (chosen_.step && runner.solved_at_start()) return runner.error();
         const Order& order = order_of(problem);
-        const std::vector<RankedSolver> ranked = members_of(registry_, order, needs_of(problem, {}));
-        const std::vector<Member> members = traits_of(registry_, ranked);
+        const auto& [ranked, members] = team_of(problem, order);
         Solution start = settings.warm_start ? solution : Solution{};
         std::vector<Solution> left(members.size());
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
@@ -115,6 +115,22 @@ private:
         return chosen_.ranking.order({needs_of(problem, {}), chosen_.step}, problem.raw().m);
     }
 
+    struct Team {
+        std::vector<RankedSolver> ranked;
+        std::vector<Member> members;  // the same as the rounds see them
+    };
+
+    /// Who takes turns, found once for problems alike.
+    const Team& team_of(const PreparedProblem& problem, const Order& order) {
+        const std::uint64_t needs = needs_of(problem, {});
+        const auto [place, fresh] = teams_.try_emplace({&order, needs, registry_.plugins().size()});
+        if (fresh) {
+            place->second.ranked = members_of(registry_, order, needs);
+            place->second.members = traits_of(registry_, place->second.ranked);
+        }
+        return place->second;
+    }
+
     /// The solver of a member, kept from problem to problem; null if it cannot take the problem.
     Solver* usable(const RankedSolver& ranked, const PreparedProblem& problem) {
         const auto key = std::make_pair(ranked.solver, ranked.options);
@@ -129,6 +145,8 @@ private:
     OptionTexts options_;
     AutoOptions chosen_;
     std::map<std::pair<std::string, OptionTexts>, Solver> solvers_;
+    // By the order, the needs, and how many plugins there were, since more may come.
+    std::map<std::tuple<const Order*, std::uint64_t, std::size_t>, Team> teams_;
 };
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "delassus/error.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/sdk/blas_memory.hpp"
+#include "support/crash_signals.hpp"
 #include "support/module.hpp"
 #include "support/process_record.hpp"
 #include "support/sentence.hpp"
@@ -168,6 +169,7 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
     const auto absolute = std::filesystem::absolute(path).lexically_normal();
     if (!std::filesystem::is_regular_file(absolute))
         throw PluginError(fmt::format("there is no plugin {}", absolute.string()));
+    const CrashSignals kept;
     const ForeignCall call("the plugin " + absolute.string(), "while it was loaded", ForeignCall::patience);
     auto library = open(absolute, false);
     keep_forever(library);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "delassus/error.hpp"
+#include "support/crash_signals.hpp"
 
 namespace delassus {
 
@@ -37,6 +38,7 @@ PluginInstance::PluginInstance(std::shared_ptr<const Plugin> plugin, const Optio
         values.push_back(
             {value.key.c_str(), value.type, 0, value.integer, value.real, textual ? value.text.c_str() : nullptr});
     }
+    const CrashSignals kept;
     const auto status = guarded(
         "create", [&] { return border().create(values.data(), static_cast<std::int32_t>(values.size()), &solver_); });
     if (status != DELASSUS_SOLVED || !solver_) {

@@ -100,13 +100,12 @@ TurnResult StageRunner::run(Solver& solver, const Stage& stage, Solution& iterat
     const bool other_law = &problem != &problem_;
     const bool warm =
         (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0 && (!iterate.x.empty() || !iterate.lambda.empty());
-    Forecast forecast(stage.tolerance > 0.0 ? stage.tolerance : settings_.tolerance, stage.iterations);
+    const double tolerance = std::max(stage.tolerance, settings_.tolerance);
+    Forecast forecast(tolerance, stage.iterations);
     Forecast::Verdict verdict = Forecast::Verdict::GoOn;
     const SolveReport result = solver.solve(problem, iterate, settings_of(stage, problem, warm, forecast, verdict));
 
     const Errors error = other_law ? problem_.meter().measure(iterate.x, iterate.lambda) : result.error;
-    const double tolerance =
-        stage.tolerance > 0.0 ? std::max(stage.tolerance, settings_.tolerance) : settings_.tolerance;
     // Where momenta cancel, rounding alone may leave a large balance error, which is excused where all else is solved.
     const bool solved = result.status == Status::Solved && tolerance == settings_.tolerance && !other_law;
     if (!started_ || worst_of(error) < worst() || solved) {
@@ -145,8 +144,7 @@ TurnEnd StageRunner::end_of(Status status, Forecast::Verdict verdict, bool other
 SolveSettings StageRunner::settings_of(const Stage& stage, const PreparedProblem& problem, bool warm,
                                        Forecast& forecast, Forecast::Verdict& verdict) const {
     SolveSettings settings = settings_;
-    if (stage.tolerance > 0.0) settings.tolerance = std::max(stage.tolerance, settings_.tolerance);
-    settings.tolerance *= stage.tighter;
+    settings.tolerance = stage.tighter * std::max(stage.tolerance, settings_.tolerance);
     settings.max_iterations = settings_.max_iterations - report_.iterations;
     const double seconds_before = report_.seconds_setup + report_.seconds_solve;
     settings.time_limit = settings_.time_limit - seconds_before;

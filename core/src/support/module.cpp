@@ -6,6 +6,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/blas_memory.hpp"
+#include "support/crash_signals.hpp"
 #include "support/library_location.hpp"
 #include "support/process_record.hpp"
 
@@ -36,6 +37,7 @@ void* module_symbol(std::string_view module, const char* symbol, std::string_vie
     if (!has_module(module))
         throw InputError(
             fmt::format("{}: this build has no {} ({} is missing){}", refusal, dependency, path.string(), advice));
+    const CrashSignals kept;
     const ForeignCall call("the library " + path.string(), "while it was loaded", ForeignCall::patience);
     void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);  // the loader counts; nothing is loaded twice
     if (!handle) throw InputError(fmt::format("{}: {}", refusal, dlerror()));

@@ -52,14 +52,9 @@ void share_process_record(ProcessRecord* shared) {
     record.store(shared, std::memory_order_release);
 }
 
-// UCX, which Open MPI 5 brings along, takes these as it is loaded.
-static constexpr std::array signals_of_crashes = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
-
 ForeignCall::ForeignCall(std::string_view who, std::string_view what, double limit)
     : limit_(limit), forks_(count_of_forks()) {
     std::fegetenv(&arithmetic_);
-    if (limit == patience)
-        for (const int number : signals_of_crashes) sigaction(number, nullptr, &at_crash_.emplace_back());
     ProcessRecord& notes = process_record();
     const std::uint64_t number = notes.begun.fetch_add(1) + 1;
     for (ProcessRecord::Call& call : notes.calls) {
@@ -78,7 +73,6 @@ ForeignCall::ForeignCall(std::string_view who, std::string_view what, double lim
 ForeignCall::~ForeignCall() {
     if (count_of_forks() != forks_) _exit(0);
     std::fesetenv(&arithmetic_);
-    for (std::size_t k = 0; k < at_crash_.size(); ++k) sigaction(signals_of_crashes[k], &at_crash_[k], nullptr);
     if (!call_) return;
     call_->deadline.store(std::numeric_limits<double>::infinity(), std::memory_order_relaxed);
     call_->number.store(0, std::memory_order_release);

@@ -6,11 +6,9 @@
 #include <array>
 #include <atomic>
 #include <cfenv>
-#include <csignal>
 #include <cstdint>
 #include <limits>
 #include <string_view>
-#include <vector>
 
 #include "delassus/export.hpp"
 
@@ -45,8 +43,7 @@ DELASSUS_API ProcessRecord& process_record();
 DELASSUS_API void share_process_record(ProcessRecord* shared);
 
 /// Code of others runs while it lives: of a plugin, of a library. If that code forks and comes back twice, the copy of
-/// this process ends here without a word. Rounding, traps and flushing of tiny numbers are then as they were before,
-/// and what loads or makes something leaves what happens at a crash as it was.
+/// this process ends here without a word. Rounding, traps and flushing of tiny numbers are then as they were before.
 class ForeignCall {
 public:
     /// limit: seconds after which whoever watches this process ends it; infinity for never.
@@ -70,7 +67,6 @@ private:
     double limit_;
     unsigned forks_;
     std::fenv_t arithmetic_;
-    std::vector<struct sigaction> at_crash_;  // what each signal of a crash does; empty in short calls
 };
 
 }  // namespace delassus

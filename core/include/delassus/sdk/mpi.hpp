@@ -15,6 +15,7 @@
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "delassus/sdk/solver.hpp"
 
@@ -48,23 +49,23 @@ public:
     SingletonEnvironment() {
         for (const char* launched : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_SIZE"})
             if (std::getenv(launched)) return;
-        for (std::size_t k = 0; k < defaults.size(); ++k) {
-            if (std::getenv(defaults[k][0])) continue;
-            setenv(defaults[k][0], defaults[k][1], 0);
-            set_[k] = true;
-        }
 #if defined(OMPI_MAJOR_VERSION) && OMPI_MAJOR_VERSION >= 5
         if (const char* named = std::getenv("TMPDIR")) {
             has_temporary_ = true;
             temporary_ = named;
         }
-        std::error_code none;
-        std::string folder = (std::filesystem::temp_directory_path(none) / "delassus-mpi-XXXXXX").string();
-        if (none) folder = "/tmp/delassus-mpi-XXXXXX";
+        std::error_code failed;
+        std::string folder = (std::filesystem::temp_directory_path(failed) / "delassus-mpi-XXXXXX").string();
+        if (failed) folder = "/tmp/delassus-mpi-XXXXXX";
         if (!mkdtemp(folder.data())) throw std::runtime_error("MPI needs a folder for temporary files: set TMPDIR");
         session_folder() = folder;
         setenv("TMPDIR", folder.c_str(), 1);
 #endif
+        for (std::size_t k = 0; k < defaults.size(); ++k) {
+            if (std::getenv(defaults[k][0])) continue;
+            setenv(defaults[k][0], defaults[k][1], 0);
+            set_[k] = true;
+        }
     }
     ~SingletonEnvironment() {
         if (has_temporary_)
