@@ -78,7 +78,9 @@ public:
         StageRunner runner(problem, solution, settings, report);
         if (chosen_.step && runner.solved_at_start()) return runner.error();
         const Order& order = order_of(problem);
-        const auto& [ranked, members] = team_of(problem, order);
+        const Team& team = team_of(problem, order);
+        const std::vector<RankedSolver>& ranked = team.ranked;
+        const std::vector<Member>& members = team.members;
         Solution start = settings.warm_start ? solution : Solution{};
         std::vector<Solution> left(members.size());
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
