@@ -133,15 +133,15 @@ private:
         coulomb_ = solver.law() == Law::Coulomb;
         assemble_unilateral(state, h);
 
-        const ErrorOfStep told(solver, estimated_error(state), error_.of_solver());
+        const StepRequest request{
+            .warm_start = true, .method_error = estimated_error(state), .error_of_solves = error_.of_solver()};
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
         double scale = 0.0;
         for (const double momentum : problem_.a) scale = std::max(scale, std::abs(momentum));
         scale = solver.largest_on_all(scale);
-        solve(solver, report);
-        note_left(solver);
+        note_left(solve(solver, request, report));
         drop_negligible(scale);
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
         for (const FreeSpin* spin : untouched_)
@@ -157,22 +157,6 @@ private:
         report.multipliers = multipliers_;
     }
 
-    /// Tells the solver this method's error, for one step: the values are in this method's memory.
-    class ErrorOfStep {
-    public:
-        ErrorOfStep(StepSolver& solver, std::span<const double> error, std::span<const double> of_solver)
-            : solver_(solver) {
-            solver_.method_error = error;
-            solver_.error_of_solves = of_solver;
-        }
-        ~ErrorOfStep() { solver_.method_error = solver_.error_of_solves = {}; }
-        ErrorOfStep(const ErrorOfStep&) = delete;
-        ErrorOfStep& operator=(const ErrorOfStep&) = delete;
-
-    private:
-        StepSolver& solver_;
-    };
-
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
     std::span<const double> estimated_error(const State& state) {
         if (follows_sliding_) return {};
@@ -180,36 +164,34 @@ private:
         return error_.known();
     }
 
-    void note_left(const StepSolver& solver) {
-        const std::span<const double> left = solver.left(), in_masses = solver.left_in_masses();
-        left_now_.assign(in_masses.begin(), in_masses.end());
-        left_.resize(left.size());
-        std::ranges::transform(left_, left, left_.begin(),
+    void note_left(const StepAnswer& answer) {
+        left_now_.assign(answer.left_in_masses.begin(), answer.left_in_masses.end());
+        left_.resize(answer.left.size());
+        std::ranges::transform(left_, answer.left, left_.begin(),
                                [](double before, double now) { return std::max(before, now); });
     }
 
     // H and a are looked at once more where the linearisation is judged or contacts slide; else the problem changes
     // hands.
-    void solve(StepSolver& solver, StepReport& report) {
+    StepAnswer solve(StepSolver& solver, const StepRequest& request, StepReport& report) {
         const bool again = linearization_.wanted() || !sliding_.empty();
+        StepAnswer answer;
         const auto once = [&] {
             ++report.newton_iterations;
-            const bool solved =
-                again ? solver.solve(problem_, solution_, true) : solver.solve(std::move(problem_), solution_, true);
-            if (solved) return true;
-            report.solved = false;
-            report.message = solver.effort().unsolved;
-            return false;
+            answer = again ? solver.solve(problem_, solution_, request)
+                           : solver.solve(std::move(problem_), solution_, request);
+            return report.take(answer);
         };
-        if (!once()) return;
+        if (!once()) return answer;
         for (int i = 0; !solver.on_all(settled(i)); ++i) {
             if (i == most_iterations) {
                 report.solved = false;
                 report.message = "the speeds of sliding contacts did not settle";
-                return;
+                return answer;
             }
-            if (!once()) return;
+            if (!once()) return answer;
         }
+        return answer;
     }
 
     /// The sliding speed in the rows of a contact, at the velocities v.

@@ -88,7 +88,6 @@ private:
 
     void take_step(State& state, double h, StepSolver& solver, StepReport& report) override {
         require_step(system_, state, h, name);
-        solver.method_error = {};
         end_ = state;
         auto& [load, last, mean] = loads_;
         smooth_.set_load(load);
@@ -142,7 +141,7 @@ private:
         const bool before = report.solved;
         const int least = contacts_.any() ? 2 : 1;
         for (int iteration = 0;; ++iteration) {
-            contacts_.set_b(problem_, solution_, solution_.x, iteration, solver.effort().worst_natural);
+            contacts_.set_b(problem_, solution_, solution_.x, iteration, report.natural);
             if (iteration >= least && contacts_.settled()) break;
             if (iteration == most_iterations) {
                 report.solved = false;
@@ -151,11 +150,7 @@ private:
             }
             ++report.newton_iterations;
             report.solved = before;
-            if (!solver.solve(problem_, solution_, true)) {
-                report.solved = false;
-                report.message = solver.effort().unsolved;
-                break;
-            }
+            if (!report.take(solver.solve(problem_, solution_, {.warm_start = true}))) break;
         }
         contacts_.drop_negligible(problem_, solution_);
     }
@@ -170,10 +165,7 @@ private:
             shift_problem_.a.assign(shift_.begin(), shift_.end());
             shift_solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
             shift_solution_.lambda.clear();
-            if (!solver.solve(shift_problem_, shift_solution_, false)) {
-                report.solved = false;
-                report.message = solver.effort().unsolved;
-            }
+            report.take(solver.solve(shift_problem_, shift_solution_));
             delta_ = shift_solution_.x;
         }
         for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] += 0.5 * h * (solution_.x[i] - end_.v[i]);

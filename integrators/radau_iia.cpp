@@ -368,10 +368,7 @@ LinearSolution RadauIIA::solve(std::size_t stage, const Vector& a, const std::ve
     problem.a.assign(a.begin(), a.end());
     problem.b = b;
     problem.cones = cones_;
-    if (!solver.solve(std::move(problem), solution_, false)) {
-        report.solved = false;
-        report.message = solver.effort().unsolved;
-    }
+    report.take(solver.solve(std::move(problem), solution_));
     ++report.newton_iterations;
     return {as_vector(solution_.x), as_vector(solution_.lambda)};
 }

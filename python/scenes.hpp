@@ -72,10 +72,10 @@ public:
                 if (simulation.finished())
                     throw InputError(fmt::format("the simulation has reached its end, {} s: there is no further step",
                                                  simulation.system().end));
-                simulation.solver().cancelled = [&interrupts] { return interrupts.came(); };
+                simulation.solver().interrupt_by([&interrupts] { return interrupts.came(); });
                 struct Forget {
                     StepSolver& solver;
-                    ~Forget() { solver.cancelled = nullptr; }
+                    ~Forget() { solver.interrupt_by(nullptr); }
                 } const forget{simulation.solver()};
                 return simulation.step();
             });

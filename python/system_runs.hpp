@@ -70,10 +70,10 @@ public:
         StepRecord record;
         try {
             record = look([&](SystemRun& self) {
-                self.solver_->cancelled = [&interrupts] { return interrupts.came(); };
+                self.solver_->interrupt_by([&interrupts] { return interrupts.came(); });
                 struct Forget {
                     StepSolver& solver;
-                    ~Forget() { solver.cancelled = nullptr; }
+                    ~Forget() { solver.interrupt_by(nullptr); }
                 } const forget{*self.solver_};
                 return self.take_step();
             });

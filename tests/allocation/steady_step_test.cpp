@@ -68,7 +68,7 @@ long steady_allocations(MultibodySystem& system, const std::string& method, bool
         stepper->step(state, 1e-3, solver, report);
         EXPECT_TRUE(report.solved) << method;
     }
-    if (within_the_solver) solver.on_problem = [](const Problem&) { counting = true; };
+    if (within_the_solver) solver.watch([](const Problem&) { counting = true; });
     allocations = 0;
     for (int step = 0; step < 5; ++step) {
         counting = !within_the_solver;

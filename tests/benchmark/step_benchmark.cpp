@@ -52,11 +52,11 @@ void step_outside_the_solver(benchmark::State& state) {
     const Registry registry;
     StepSolver solver(registry, sweeps(1));
     Problem problem;
-    solver.on_problem = [&](const Problem& seen) { problem = seen; };
+    solver.watch([&](const Problem& seen) { problem = seen; });
     const auto stepper = make_timestepper("euler_implicit_linearized", system);
     State now = system.initial_state();
     for (int k = 0; k < 3; ++k) stepper->step(now, h, solver);
-    solver.on_problem = nullptr;
+    solver.watch(nullptr);
 
     double least = HUGE_VAL, contacts = 0.0;
     for (auto _ : state) {

@@ -71,12 +71,12 @@ protected:
         State state = top_.initial_state();
         stepper->step(state, h, solver_);
         std::vector<double> result;
-        solver_.on_problem = [&](const Problem& problem) {
+        solver_.watch([&](const Problem& problem) {
             result.push_back(std::hypot(Eigen::Map<const VectorXd>(problem.a.data(), problem.n()).norm(),
                                         Eigen::Map<const VectorXd>(problem.b.data(), problem.m()).norm()));
-        };
+        });
         stepper->step(state, h, solver_);
-        solver_.on_problem = nullptr;
+        solver_.watch(nullptr);
         return result;
     }
 
@@ -125,12 +125,12 @@ std::size_t matrices(const std::string& reuse, std::int64_t& problems) {
     State state = pendulum.initial_state();
     std::vector<double> last;
     std::size_t count = 0;
-    solver.on_problem = [&](const Problem& problem) {
+    solver.watch([&](const Problem& problem) {
         auto values = problem.H.value;
         values.insert(values.end(), problem.D.value.begin(), problem.D.value.end());
         if (values != last) ++count;
         last = values;
-    };
+    });
     for (int step = 0; step < 200; ++step) stepper->step(state, 2e-3, solver);
     problems = solver.effort().solves;
     return count;

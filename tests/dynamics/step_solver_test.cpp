@@ -66,7 +66,7 @@ TEST_F(StepSolverTest, SolvesUnsymmetricProblemsWithoutRowsOfAnySize) {
         for (const double diagonal : {4.0, 5.0}) {
             const Problem problem = circulating(n, diagonal);
             Solution solution;
-            EXPECT_TRUE(solver.solve(problem, solution, false));
+            EXPECT_TRUE(solver.solve(problem, solution).solved);
             std::vector<double> left = problem.a;
             problem.H.multiply_add(-1.0, solution.x.data(), left.data());
             for (const double value : left) ASSERT_NEAR(value, 0.0, 1e-14) << n;
@@ -89,7 +89,7 @@ TEST_F(StepSolverTest, LetsAMechanismFall) {
             problem.b = {rounding};
             StepSolver solver(registry, {});
             Solution solution{{0.0, 0.0}, {0.0}};
-            EXPECT_TRUE(solver.solve(problem, solution, true));
+            EXPECT_TRUE(solver.solve(problem, solution, {.warm_start = true}).solved);
             EXPECT_NEAR(solution.x[0], -h * g, 1e-15);
             EXPECT_NEAR(solution.x[1], -h * g, 1e-15);
             EXPECT_NEAR(solution.lambda[0], 0.0, 1e-15);
@@ -103,22 +103,22 @@ TEST_F(StepSolverTest, CallsNoPluginWithoutRows) {
     problem.H = tests::diagonal_matrix({2.0, 4.0});
     problem.a = {2.0, 8.0};
     Solution solution;
-    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_TRUE(solver.solve(problem, solution).solved);
     EXPECT_EQ(solution.x, (std::vector<double>{1.0, 2.0}));
     // An unsymmetric H without rows as well.
     problem.H = SparseMatrix::from_triplets(2, 2, {{0, 0, 2.0}, {0, 1, 1.0}, {1, 0, -1.0}, {1, 1, 4.0}});
     problem.a = {3.0, 3.0};
-    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_TRUE(solver.solve(problem, solution).solved);
     EXPECT_NEAR(solution.x[0], 1.0, 1e-15);
     EXPECT_NEAR(solution.x[1], 1.0, 1e-15);
     problem.a = {5.0, 2.0};  // by the factors of before
-    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_TRUE(solver.solve(problem, solution).solved);
     EXPECT_NEAR(2.0 * solution.x[0] + solution.x[1], 5.0, 1e-14);
     EXPECT_NEAR(-solution.x[0] + 4.0 * solution.x[1], 2.0, 1e-14);
     problem.H.value = {2.0, 1.0, 4.0, 2.0};
-    EXPECT_THROW(solver.solve(problem, solution, false), InputError);
+    EXPECT_THROW(static_cast<void>(solver.solve(problem, solution)), InputError);
     problem.H.value = {2.0, 1.0, -2.0, 4.0};
-    EXPECT_TRUE(solver.solve(problem, solution, false));
+    EXPECT_TRUE(solver.solve(problem, solution).solved);
     EXPECT_NEAR(-2.0 * solution.x[0] + 4.0 * solution.x[1], 2.0, 1e-14);
     EXPECT_EQ(solver.effort().solves, 5);
     EXPECT_EQ(solver.effort().plugin_solves, 0);
@@ -136,8 +136,8 @@ TEST_F(StepSolverTest, LeavesNothingOutWhereThatIsAskedFor) {
     EXPECT_EQ(parts[0].structure, Structure::Definite);
     EXPECT_EQ(apart.parts(both).size(), 2U);
     Solution expected, solution;
-    ASSERT_TRUE(apart.solve(both, expected, false));
-    ASSERT_TRUE(whole.solve(both, solution, false));
+    ASSERT_TRUE(apart.solve(both, expected).solved);
+    ASSERT_TRUE(whole.solve(both, solution).solved);
     EXPECT_EQ(whole.effort().plugin_solves, 1);
     for (std::size_t i = 0; i < expected.x.size(); ++i) EXPECT_NEAR(solution.x[i], expected.x[i], 1e-8);
 
@@ -147,7 +147,7 @@ TEST_F(StepSolverTest, LeavesNothingOutWhereThatIsAskedFor) {
     Problem free;
     free.H = tests::diagonal_matrix({2.0, 4.0});
     free.a = {2.0, 8.0};
-    ASSERT_TRUE(general.solve(free, solution, false));
+    ASSERT_TRUE(general.solve(free, solution).solved);
     EXPECT_NEAR(solution.x[0], 1.0, 1e-12);
     EXPECT_NEAR(solution.x[1], 2.0, 1e-12);
     EXPECT_EQ(general.effort().plugin_solves, 1);
@@ -160,10 +160,10 @@ TEST_F(StepSolverTest, SolvesSeparateStacksApart) {
     const Problem both = beside(one, one);
     StepSolver apart(registry, config("apgd"));
     Solution solution, whole;
-    ASSERT_TRUE(apart.solve(both, solution, false));
+    ASSERT_TRUE(apart.solve(both, solution).solved);
     const auto stacks = apart.effort().plugin_solves;
     StepSolver alone(registry, config("apgd"));
-    ASSERT_TRUE(alone.solve(one, whole, false));
+    ASSERT_TRUE(alone.solve(one, whole).solved);
     EXPECT_EQ(stacks, 2 * alone.effort().plugin_solves);
     // Each part sees the same problem and gives the same bits.
     for (std::size_t i = 0; i < whole.x.size(); ++i) {
@@ -184,9 +184,9 @@ TEST_F(StepSolverTest, LeavesOutRowsBetweenFixedBodies) {
     ++problem.D.rows;
     StepSolver solver(registry, config("apgd"));
     std::int32_t shown = 0;
-    solver.on_problem = [&](const Problem& seen) { shown = seen.m(); };
+    solver.watch([&](const Problem& seen) { shown = seen.m(); });
     Solution solution;
-    ASSERT_TRUE(solver.solve(problem, solution, false));
+    ASSERT_TRUE(solver.solve(problem, solution).solved);
     EXPECT_EQ(shown, 4) << "who asks for the step's problem sees all of it";
     ASSERT_EQ(solution.lambda.size(), 4U);
     EXPECT_EQ(solution.lambda[3], 0.0);
@@ -196,12 +196,12 @@ TEST_F(StepSolverTest, LeavesOutRowsBetweenFixedBodies) {
 TEST_F(StepSolverTest, ChoosesBySolversThatCan) {
     StepSolver solver(registry, {});
     Solution solution;
-    ASSERT_TRUE(solver.solve(generate_chain({}), solution, false));
+    ASSERT_TRUE(solver.solve(generate_chain({}), solution).solved);
     EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod"}));
-    ASSERT_TRUE(solver.solve(generate_box_stack({}), solution, false));
+    ASSERT_TRUE(solver.solve(generate_box_stack({}), solution).solved);
     EXPECT_EQ(solver.loaded(), (std::vector<std::string>{"cholmod", "pgs", "ssn"}));
     StepSolver wrong(registry, config("cholmod"));
-    EXPECT_THROW(wrong.solve(generate_box_stack({}), solution, false), Unsupported);
+    EXPECT_THROW(static_cast<void>(wrong.solve(generate_box_stack({}), solution)), Unsupported);
 }
 
 TEST_F(StepSolverTest, SaysWhatItDidNotSolve) {
@@ -209,7 +209,7 @@ TEST_F(StepSolverTest, SaysWhatItDidNotSolve) {
     chosen.max_iterations = 2;
     StepSolver solver(registry, chosen);
     Solution solution;
-    EXPECT_FALSE(solver.solve(generate_box_stack({}), solution, false));
+    EXPECT_FALSE(solver.solve(generate_box_stack({}), solution).solved);
     EXPECT_NE(solver.effort().unsolved.find("iteration_limit"), std::string::npos) << solver.effort().unsolved;
     solver.reset_effort();
     EXPECT_TRUE(solver.effort().unsolved.empty());

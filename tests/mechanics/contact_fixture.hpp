@@ -82,7 +82,7 @@ protected:
     State run(double end, double h, const std::function<void(const State&)>& each = {},
               const SolverConfig& config = exact_law()) {
         StepSolver solver(registry, config);
-        solver.on_problem = [&](const Problem& problem) { last = problem; };
+        solver.watch([&](const Problem& problem) { last = problem; });
         const auto stepper = make_timestepper("euler_implicit_linearized", *system);
         State state = system->initial_state();
         const auto steps = std::lround(end / h);

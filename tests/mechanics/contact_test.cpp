@@ -92,7 +92,7 @@ TEST_F(ContactTest, StackCarriesItsWeight) {
     system->collect_unilateral(state, h, rows);
     ASSERT_EQ(rows.contacts().size(), 16U);
     Problem seen;
-    solver.on_problem = [&](const Problem& problem) { seen = problem; };
+    solver.watch([&](const Problem& problem) { seen = problem; });
     stepper->step(state, h, solver);
     Solution solution;
     Solver pgs = make_solver(registry, config);

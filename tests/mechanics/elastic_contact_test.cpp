@@ -43,7 +43,7 @@ TEST(ElasticBlock, SlidesWithTheFrictionOfItsWeight) {
         config.law = Law::Coulomb;
         StepSolver solver(registry, config);
         Problem problem;
-        solver.on_problem = [&](const Problem& seen) { problem = seen; };
+        solver.watch([&](const Problem& seen) { problem = seen; });
         const auto stepper = make_timestepper("euler_implicit_linearized", system);
         State state = system.initial_state();
         const int steps = 300;
@@ -107,7 +107,7 @@ TEST(ElasticBlock, AnalysesItsMatrixOnceWhileContactsComeAndGo) {
     config.tolerance = 1e-8;
     StepSolver solver(registry, config);
     std::vector<Problem> problems;
-    solver.on_problem = [&](const Problem& seen) { problems.push_back(seen); };
+    solver.watch([&](const Problem& seen) { problems.push_back(seen); });
     const auto stepper = make_timestepper("euler_implicit_linearized", system);
     State state = system.initial_state();
     std::set<std::size_t> numbers;  // of contacts

@@ -7,7 +7,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/problem_files.hpp"
 #include "support/shared_problems.hpp"
 #include "support/small_problems.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "delassus/generate_partitioned.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/repartition.hpp"
 
 namespace {

@@ -8,7 +8,8 @@
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
+#include "delassus/solver_config.hpp"
 #include "support/small_problems.hpp"
 
 #ifdef DELASSUS_TEST_PLUGINS
@@ -18,10 +19,10 @@ namespace {
 
 class SolveInParts : public testing::Test {
 protected:
-    [[nodiscard]] PartitionedSolver solver(std::shared_ptr<const Communicator> communicator) const {
+    [[nodiscard]] Solver solver(std::shared_ptr<const Communicator> communicator) const {
         SolverConfig config;
         config.name = "parts_gradient";
-        return {registry, config, std::move(communicator)};
+        return make_solver(registry, config, *communicator);
     }
 
     std::shared_ptr<const Communicator> run = communicator_of_run();
@@ -62,7 +63,7 @@ TEST_F(SolveInParts, AClaimThatThereIsNoSolutionNeedsAProof) {
     SolverConfig config;
     config.name = "parts_gradient";
     config.options = {{"fault", "claim"}};
-    PartitionedSolver liar(registry, config, run);
+    Solver liar = make_solver(registry, config, *run);
     const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
     Solution own;
     SolveSettings settings;
@@ -74,7 +75,7 @@ TEST_F(SolveInParts, AClaimThatThereIsNoSolutionNeedsAProof) {
 
 TEST_F(SolveInParts, StartsFromWhatItIsGiven) {
     const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
-    PartitionedSolver gradient = solver(run);
+    Solver gradient = solver(run);
     SolveSettings settings;
     Solution own;
     ASSERT_EQ(gradient.solve(part, own, settings).status, Status::Solved);
@@ -86,7 +87,7 @@ TEST_F(SolveInParts, StartsFromWhatItIsGiven) {
 
 TEST_F(SolveInParts, LimitsEndIt) {
     const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
-    PartitionedSolver gradient = solver(run);
+    Solver gradient = solver(run);
     SolveSettings settings;
     settings.tolerance = 1e-13;
     settings.max_iterations = 3;
@@ -143,7 +144,7 @@ TEST_F(SolveInParts, WhatItCannotTakeIsRefused) {
     SolverConfig config;
     config.name = "pgs";
     if (registry.capable(0).size() > 1) {
-        PartitionedSolver serial(registry, config, run);
+        Solver serial = make_solver(registry, config, *run);
         EXPECT_THROW(serial.solve(part, own, {}), Unsupported);
     }
 }
@@ -152,7 +153,7 @@ TEST_F(SolveInParts, AutoChoosesWhatCan) {
     const PreparedPart part(run, part_of(*run, generate("box_stack", {})));
     SolverConfig config;
     config.name = "auto";
-    PartitionedSolver chooser(registry, config, run);
+    Solver chooser = make_solver(registry, config, *run);
     Solution own;
     const SolveReport report = chooser.solve(part, own, {});
     EXPECT_EQ(report.status, Status::Solved) << report.message;

@@ -9,8 +9,9 @@
 
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/problem_files.hpp"
+#include "delassus/solver_config.hpp"
 #include "support/shared_problems.hpp"
 #include "support/small_problems.hpp"
 
@@ -58,7 +59,7 @@ protected:
         SolverConfig config;
         config.name = GetParam().plugin;
         for (const auto& processes : {run, alone})
-            solvers.emplace(processes.get(), PartitionedSolver(registry, config, processes));
+            solvers.emplace(processes.get(), make_solver(registry, config, *processes));
     }
 
     Answer solve(const std::shared_ptr<const Communicator>& processes, const PreparedPart& part, double tolerance,
@@ -112,7 +113,7 @@ protected:
 
     const Registry registry;
     std::shared_ptr<const Communicator> run = communicator_of_run(), alone = single_process();
-    std::map<const Communicator*, PartitionedSolver> solvers;
+    std::map<const Communicator*, Solver> solvers;
     std::map<std::string, int> compared;
 };
 
@@ -147,7 +148,7 @@ TEST_P(PartitionedPlugins, TellWhatTheTimeGoesTo) {
     const PreparedPart part(run, part_of(*run, generate("sphere_pile", {{"contacts", 1000.0}})));
     const Answer answer = solve(run, part, 1e-3, 100);
     ASSERT_GE(answer.report.iterations, 5);
-    const SolveCost& cost = solvers.at(run.get()).cost();
+    const SolveCost& cost = answer.report.cost;
     double sum = 0.0;
     for (int k = 0; k < DELASSUS_PHASE_COUNT; ++k) {
         const double seconds = cost.phases[static_cast<std::size_t>(k)];
@@ -241,7 +242,7 @@ TEST(PartitionedInfeasible, IpmProvesIt) {
     for (const char* name : {"ipm_petsc", "auto"}) {
         SolverConfig config;
         config.name = name;
-        PartitionedSolver solver(registry, config, run);
+        Solver solver = make_solver(registry, config, *run);
         Solution own;
         const SolveReport report = solver.solve(part, own, {});
         EXPECT_EQ(name_of(report.status), name_of(Status::Infeasible)) << name << ": " << report.message;
@@ -258,7 +259,7 @@ TEST(PartitionedSchwarz, SolvesPiles) {
     SolverConfig config;
     config.name = "ipm_petsc";
     config.options = {{"preconditioner", "schwarz"}, {"subdomain", "600"}};
-    PartitionedSolver solver(registry, config, run);
+    Solver solver = make_solver(registry, config, *run);
     SolveSettings settings;
     settings.tolerance = 1e-2;
     settings.max_iterations = 40;

@@ -8,7 +8,8 @@
 
 #include "delassus/error.hpp"
 #include "delassus/generate_partitioned.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
+#include "delassus/solver_config.hpp"
 #include "support/small_problems.hpp"
 
 namespace delassus::partitioned_sweeps_test {
@@ -22,12 +23,11 @@ protected:
             GTEST_SKIP() << "pgs_petsc was not built";
     }
 
-    [[nodiscard]] PartitionedSolver solver(const std::shared_ptr<const Communicator>& processes,
-                                           OptionTexts options = {}) const {
+    [[nodiscard]] Solver solver(const std::shared_ptr<const Communicator>& processes, OptionTexts options = {}) const {
         SolverConfig config;
         config.name = "pgs_petsc";
         config.options = std::move(options);
-        return {registry, config, processes};
+        return make_solver(registry, config, *processes);
     }
 
     [[nodiscard]] PartitionedProblem pile(const Communicator& processes, std::uint64_t contacts, Law law,
@@ -85,7 +85,7 @@ TEST_F(PartitionedSweeps, OfOneProcessAreThoseOfPgs) {
 TEST_F(PartitionedSweeps, LowerTheObjective) {
     const PreparedPart part(run, pile(*run, 300, Law::Associated));
     for (const char* local : {"diagonal", "exact"}) {
-        PartitionedSolver sweeps = solver(run, {{"acceleration", "none"}, {"local_solver", local}});
+        Solver sweeps = solver(run, {{"acceleration", "none"}, {"local_solver", local}});
         Solution own;
         own.x.assign(static_cast<std::size_t>(part.problem().n()), 0.0);
         own.lambda.assign(static_cast<std::size_t>(part.problem().m()), 0.0);
@@ -108,7 +108,7 @@ TEST_F(PartitionedSweeps, LowerTheObjective) {
 TEST_F(PartitionedSweeps, OfManyProcessesAreHardlyMoreThanOfOne) {
     for (const Law law : {Law::Associated, Law::Coulomb}) {
         std::int64_t one = 0, all = 0;
-        PartitionedSolver of_run = solver(run), of_one = solver(alone);
+        Solver of_run = solver(run), of_one = solver(alone);
         for (std::uint64_t seed = 1; seed <= 2; ++seed) {
             SolveSettings settings;
             settings.tolerance = 1e-3;
@@ -132,7 +132,7 @@ TEST_F(PartitionedSweeps, OfManyProcessesAreHardlyMoreThanOfOne) {
 
 // The steps of a simulation: another pattern each time, with one solver, from what was found before.
 TEST_F(PartitionedSweeps, TakeNewPatternsOneAfterAnother) {
-    PartitionedSolver sweeps = solver(run);
+    Solver sweeps = solver(run);
     for (int step = 0; step < 4; ++step) {
         const PreparedPart part(run, pile(*run, 300 + 40 * static_cast<std::uint64_t>((7 * step) % 5), Law::Coulomb,
                                           step % 2 == 0 ? 1 : 2));
@@ -240,12 +240,12 @@ TEST_F(PartitionedSweeps, ComeFirstInStepsOfASimulation) {
         for (const bool simulation : {true, false}) {
             SolverConfig config;
             config.name = "auto";
-            if (simulation) config.options["simulation"] = "true";
             const PreparedPart part(run, pile(*run, 200, law));
             SolveSettings settings;
             settings.tolerance = 1e-2;
+            if (simulation) settings.origin = Origin::Step;
             Solution own;
-            const SolveReport report = PartitionedSolver(registry, config, run).solve(part, own, settings);
+            const SolveReport report = make_solver(registry, config, *run).solve(part, own, settings);
             ASSERT_EQ(report.status, Status::Solved) << report.message;
             ASSERT_EQ(report.stages.size(), 1U) << report.message;
             const bool sweeps = simulation || law == Law::Coulomb;

@@ -87,7 +87,7 @@ bodies:
 TEST(ContactForces, StayWhenAStepFails) {
     Running run(parse_scene(stack(""), "test"));
     for (int i = 0; i < 100; ++i) run.simulation.step();
-    run.simulation.solver().cancelled = [] { return true; };
+    run.simulation.solver().interrupt_by([] { return true; });
     EXPECT_THROW(run.simulation.step(), StepInterrupted);
     expect_weights(run);
 }

@@ -230,12 +230,12 @@ TEST(Defaults, AWallAtRestKeepsItsRowsAndCostsNothing) {
     auto run = run_of(brick_stack(5));
     std::vector<double> first;
     double largest = 0.0;
-    run.simulation.solver().on_problem = [&](const Problem& problem) {
+    run.simulation.solver().watch([&](const Problem& problem) {
         if (first.empty()) first = problem.D.value;
         ASSERT_EQ(problem.D.value.size(), first.size());
         for (std::size_t i = 0; i < first.size(); ++i)
             largest = std::max(largest, std::abs(problem.D.value[i] - first[i]));
-    };
+    });
     int busy = 0, steps = 0;
     while (!run.simulation.finished()) {
         busy += run.simulation.step().solver_iterations > 0 ? 1 : 0;

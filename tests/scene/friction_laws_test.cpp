@@ -39,7 +39,7 @@ protected:
         auto& system = *scene.systems[0].system;
         StepSolver solver(registry(), scene.systems[0].solver);
         Problem problem;
-        solver.on_problem = [&](const Problem& seen) { problem = seen; };
+        solver.watch([&](const Problem& seen) { problem = seen; });
         const auto stepper = make_timestepper("euler_implicit_linearized", system);
         state_ = system.initial_state();
         while (state_.t < until - 1e-9) {

@@ -293,14 +293,14 @@ TEST(LookAhead, AnInterruptedStepChangesNothing) {
     for (int i = 0; i < 200; ++i) {
         undisturbed.simulation.step();
         asked = 0;
-        run.simulation.solver().cancelled = [&] { return ++asked == 1 + i % 5; };
+        run.simulation.solver().interrupt_by([&] { return ++asked == 1 + i % 5; });
         const std::vector<double> before = run.simulation.save().ahead;
         try {
             run.simulation.step();
         } catch (const StepInterrupted&) {
             ++interrupted;
             EXPECT_EQ(run.simulation.save().ahead, before);
-            run.simulation.solver().cancelled = nullptr;
+            run.simulation.solver().interrupt_by(nullptr);
             run.simulation.step();
         }
     }

@@ -100,7 +100,7 @@ TEST(ExampleScene, LongChainHangsByTheWeightBelowEachPin) {
     overrides.end = 0.015;
     Running run(read_scene(example_scene("chain_1000"), overrides));
     Problem last;
-    run.simulation.solver().on_problem = [&](const Problem& problem) { last = problem; };
+    run.simulation.solver().watch([&](const Problem& problem) { last = problem; });
     run.finish();
     for (const double v : run.simulation.state().v) EXPECT_NEAR(v, 0.0, 1e-9);
     SolverConfig config;

@@ -219,10 +219,11 @@ TEST(Auto, CountsAnalysesAndFactorizationsSinceItWasMade) {
 // In a simulation a start that is within the tolerance needs no stage: what was counted before stays.
 TEST(Auto, KeepsItsCountsWhereTheStartIsTheAnswer) {
     const PreparedProblem problem(read_problem(example("box_stack")));
-    Solver solver = make_solver(registry(), parse_solver("auto(simulation=true)"));
+    Solver solver = make_solver(registry(), parse_solver("auto"));
     Solution solution;
     SolveSettings settings;
     settings.tolerance = 1e-6;
+    settings.origin = Origin::Step;
     const auto first = solver.solve(problem, solution, settings);
     ASSERT_EQ(first.status, Status::Solved) << first.message;
     settings.warm_start = true;
@@ -338,7 +339,7 @@ TEST(Auto, NeverTurnsToAPeerByItself) {
     const std::uint64_t needs = PreparedProblem(point_on_plane(2.0, 10.0, 8.0, 0.5, Law::Coulomb)).needs();
     const auto later = [&](const std::string& stages) {
         const auto file = ranking(scratch, R"([{"name": "all", "when": {}, "solvers": [)" + stages + "]}]");
-        const auto choice = auto_choice(with_both, {{"ranking", file}}, needs);
+        const auto choice = auto_choice(with_both, {{"ranking", file}}, needs, Origin::Alone);
         return std::set<std::string>(choice.later.begin(), choice.later.end());
     };
     const std::string pgs = R"({"solver": "pgs", "iterations": 10})";
@@ -397,16 +398,17 @@ TEST(Auto, OrdersLookAtTheProblemAndItsUse) {
         {"name": "coulomb", "when": {"law": "coulomb"}, "solvers": [{"solver": "admm", "iterations": 9}]},
         {"name": "small", "when": {"m": [0, 5]}, "solvers": [{"solver": "ssn", "iterations": 9}]},
         {"name": "all", "when": {}, "solvers": [{"solver": "apgd", "iterations": 9}]}])");
-    const auto first = [&](const Problem& problem, const std::string& more = "") {
+    const auto first = [&](const Problem& problem, Origin origin = Origin::Alone) {
         SolveSettings settings;
         settings.tolerance = 1e-6;
+        settings.origin = origin;
         Solution solution;
-        const auto solver = parse_solver("auto(ranking=" + file + more + ")");
+        const auto solver = parse_solver("auto(ranking=" + file + ")");
         return solve(solver, PreparedProblem(problem), solution, settings).stages.front().solver;
     };
     const Problem contact = point_on_plane(2.0, 10.0, 3.0, 0.5, Law::Associated);
     EXPECT_EQ(first(contact), "ssn");
-    EXPECT_EQ(first(contact, ",simulation=true"), "pgs");
+    EXPECT_EQ(first(contact, Origin::Step), "pgs");
     EXPECT_EQ(first(point_on_plane(2.0, 10.0, 3.0, 0.5, Law::Coulomb)), "admm");
     EXPECT_EQ(first(tied_masses()), "cholmod");
     EXPECT_EQ(first(read_problem(example("box_stack"))), "apgd");

@@ -110,10 +110,10 @@ TEST(StepsInThreads, AreInterruptedAndGoOn) {
     for (int step = 0; step < 5; ++step) simulation.step();
     const std::vector<double> before = simulation.state().v;
     std::atomic<int> questions = 0;
-    simulation.solver().cancelled = [&] { return ++questions > 4; };
+    simulation.solver().interrupt_by([&] { return ++questions > 4; });
     EXPECT_THROW(simulation.step(), StepInterrupted);
     EXPECT_EQ(simulation.state().v, before);
-    simulation.solver().cancelled = {};
+    simulation.solver().interrupt_by({});
     for (int step = 5; step < 8; ++step) simulation.step();
     const State& state = simulation.state();
     const Course one = run(islands(), 1, 8);

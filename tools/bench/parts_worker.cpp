@@ -20,8 +20,9 @@
 #include "delassus/error.hpp"
 #include "delassus/generate_partitioned.hpp"
 #include "delassus/partitioned_files.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/repartition.hpp"
+#include "delassus/solver_config.hpp"
 #include "problem/errors_json.hpp"
 #include "problem/structure.hpp"
 #include "process/child_process.hpp"
@@ -109,9 +110,9 @@ void measure_in_parts(const Channel& channel, const Json& request, const std::sh
     SolveCost cost;
     const auto solve = [&] {
         channel.send("begin");
-        PartitionedSolver solver(registry, solver_of(request), run);
+        Solver solver = make_solver(registry, solver_of(request), *run);
         SolveReport report = solver.solve(problem, own, settings);
-        cost = solver.cost();
+        cost = report.cost;
         return report;
     };
     const auto send_figures = [&] {

@@ -167,7 +167,7 @@ public:
     /// Has run() look for the largest number of rows of a problem.
     void count_rows() {
         for (auto& simulation : simulations_)
-            simulation.solver().on_problem = [this](const Problem& problem) { rows_ = std::max(rows_, problem.m()); };
+            simulation.solver().watch([this](const Problem& problem) { rows_ = std::max(rows_, problem.m()); });
     }
     [[nodiscard]] std::int32_t rows() const { return rows_; }
 

@@ -239,7 +239,7 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
     const auto folder = open_folder(run, arguments, scene, shared, simulations, every);
 
     install_interrupt_handler();
-    for (auto& simulation : simulations) simulation.solver().cancelled = interrupted;
+    for (auto& simulation : simulations) simulation.solver().interrupt_by(interrupted);
     StdoutGuard guard;
     const RunResult result = advance(run, simulations, folder.get(), arguments, every);
     if (const auto bytes = guard.release(); bytes > 0 && first)

@@ -13,9 +13,10 @@
 #include "delassus/error.hpp"
 #include "delassus/generate_partitioned.hpp"
 #include "delassus/partitioned_files.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/problem_files.hpp"
 #include "delassus/repartition.hpp"
+#include "delassus/solver_config.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "process/terminal.hpp"
@@ -156,19 +157,17 @@ std::optional<int> solve_in_parts(const std::shared_ptr<const Communicator>& run
 
     StdoutGuard guard;
     SolveReport report;
-    SolveCost cost;
     {
-        PartitionedSolver solver(registry, config.solver, run);
+        Solver solver = make_solver(registry, config.solver, *run);
         const std::string refusal = solver.refusal(problem, settings);
         if (!refusal.empty() && name == "auto") return std::nullopt;
         report = solver.solve(problem, own, settings);
-        cost = solver.cost();
     }
     if (const auto bytes = guard.release(); bytes > 0 && run->rank() == 0)
         fmt::print(stderr, "delassus: the solver {} wrote {} bytes to standard output; they were dropped\n", name,
                    bytes);
     if (terminal) show_line("");
-    const auto processes = process_reports(problem, cost);
+    const auto processes = process_reports(problem, report.cost);
     const std::string json = to_json(report, processes);
     if (!arguments.solution.empty()) {
         if (made_to_be_shared) {

@@ -53,8 +53,9 @@ public:
 /// That of this run: single_process() unless process_count() > 1. Throws InputError if this build cannot use MPI.
 [[nodiscard]] DELASSUS_API std::shared_ptr<const Communicator> communicator_of_run();
 
-/// Runs body, which must not be collective itself, on every process; if it throws on any of them, all throw: InputError
-/// with the sentence of the first process, in the order of ranks, on which it did. Collective.
+/// Runs body, which must not be collective itself, on every process; if it throws on any of several, all throw:
+/// InputError with the sentence of the first process, in the order of ranks, on which it did. Where there is one
+/// process, what it throws passes. Collective.
 DELASSUS_API void together(const Communicator& communicator, const std::function<void()>& body);
 
 /// For a process that has failed and cannot tell whether the others have too: waits for all of them to call this. Those

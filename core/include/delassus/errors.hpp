@@ -86,7 +86,7 @@ public:
     /// ‖S D v‖ for velocities v (n): how large they are for the rows, in the norm of the masses that the rows feel.
     [[nodiscard]] DELASSUS_API double norm_in_rows(std::span<const double> v) const;
 
-    /// x ← H⁻¹(a + Dᵀλ), n; throws InputError where H is not definite.
+    /// x ← H⁻¹(a + Dᵀλ), n. lambda: m, or empty for none. Throws InputError where H is not definite.
     DELASSUS_API void velocity_of(std::span<const double> lambda, std::vector<double>& x) const;
 
     /// How often measure() was called.

@@ -121,8 +121,8 @@ public:
     [[nodiscard]] DELASSUS_API bool finished() const;
 
     /// Takes one step. Throws StepFailure, Unsupported or InputError with the time in the sentence, or StepInterrupted
-    /// where solver().cancelled asks for it; everything is then as it was before the step. A step beyond the system's
-    /// limits is a StepFailure.
+    /// where solver().interrupt_by() asks for it; everything is then as it was before the step. A step beyond the
+    /// system's limits is a StepFailure.
     DELASSUS_API const StepRecord& step();
 
     /// Of the last step; of the initial state before the first.

@@ -2,6 +2,8 @@
 // Solving a problem with a plugin, from the host's side.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -40,6 +42,12 @@ struct CurveSample {
     double natural = 0.0;
 };
 
+/// Where a problem comes from. `auto` has orders of solvers for each.
+enum class Origin {
+    Alone,  ///< nothing is known of it
+    Step    ///< a step of a simulation, close to the one before
+};
+
 /// The settings of one solve.
 struct SolveSettings {
     double tolerance = 1e-8;  ///< natural error, > 0
@@ -47,8 +55,11 @@ struct SolveSettings {
     /// error (SolveReport::near_goal; acceptable_error() in solver/acceptance.hpp).
     double loosest = 0.0;
     std::int64_t max_iterations = 1000000;
+    /// Do all these iterations, whatever error they leave; the tolerance says nothing then.
+    bool fixed_iterations = false;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
+    Origin origin = Origin::Alone;
     /// Threads that the solver may share its work among; the answer is the same to the bit without them. May be null.
     std::shared_ptr<ThreadTeam> team;
 
@@ -62,8 +73,13 @@ struct SolveSettings {
     /// Asked at every progress call; true cancels the solve. May be empty.
     std::function<bool()> cancelled;
     /// Called with every iterate that the solver shows, on the solver's clock; true ends the solve as stalled. x may be
-    /// null. May be empty.
+    /// null. May be empty. Where the problem is in parts: on all processes, with the same answer.
     std::function<bool(std::int64_t iteration, const double* x, const double* lambda)> give_up;
+
+    /// What a solver is told: of a fixed number of iterations, a tolerance that it cannot reach.
+    [[nodiscard]] double told_tolerance() const {
+        return fixed_iterations ? std::numeric_limits<double>::min() : tolerance;
+    }
 };
 
 /// One solver of several that worked on a problem one after another.
@@ -80,7 +96,17 @@ struct StageReport {
     double natural = 0.0;  ///< reached, under the problem's own law
 };
 
-/// What happened. Every number in `error` was computed by the core.
+/// What a solve of a problem in parts cost one process.
+struct SolveCost {
+    double setup = 0.0, solve = 0.0;  ///< s, by the core's clock: analysis and factorisation; solving
+    /// s, by delassus_phase, as the solver says; NaN where it does not. What of `solve` is in none of them is its own
+    /// work on vectors, or unknown.
+    std::array<double, DELASSUS_PHASE_COUNT> phases = {NAN, NAN, NAN, NAN, NAN, NAN};
+    std::int64_t bytes_sent = -1;  ///< by the solver to other processes while it solved; −1 where it does not say
+};
+
+/// What happened. Every number in `error` was computed by the core. Where the problem is in parts, all but `cost` is
+/// the same on all processes, and seconds are those of the slowest.
 struct SolveReport {
     std::string problem, solver, version;
     OptionTexts options;  ///< those that were chosen
@@ -98,6 +124,7 @@ struct SolveReport {
     std::vector<StageReport> stages;  ///< empty if one solver did it all
     /// Not solved, but acceptable after the work that was spent, where the tolerance is a goal.
     bool near_goal = false;
+    SolveCost cost;  ///< where the problem is in parts
 };
 
 /// The report as JSON text, with the fields' names as a user of --json sees them (docs/report.md).
@@ -105,6 +132,11 @@ struct SolveReport {
 
 /// A solver made from a plugin, or from several in stages, for its whole life: it keeps its analysis and factorisation
 /// from one solve to the next and renews what the problem's identity says has changed. Used by one thread at a time.
+///
+/// Of a problem in parts, solve() and refusal() are collective: all processes call them with the same settings, but for
+/// the callbacks, which may be there on some alone. What they throw they throw on all. A plugin that fails on one
+/// process alone leaves the others waiting for it: the run of all then ends within seconds, with a sentence of that
+/// process, by Communicator::abort(3).
 class Solver {
 public:
     class Implementation;
@@ -121,11 +153,12 @@ public:
     [[nodiscard]] DELASSUS_API const PluginInfo& info() const;
 
     /// Empty if the solver can take the problem with these settings; else the sentence of the refusal.
-    [[nodiscard]] DELASSUS_API std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) const;
+    [[nodiscard]] DELASSUS_API std::string refusal(const Prepared& problem, const SolveSettings& settings) const;
 
-    /// Solves. solution is the starting point if settings.warm_start, and holds the result: always of the right size
-    /// and finite. Throws Unsupported with the refusal, or InputError on a bad setting. Everything else is a status.
-    DELASSUS_API SolveReport solve(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings);
+    /// Solves. solution (own entries) is the starting point if settings.warm_start, and holds the result: always of the
+    /// right size and finite. Throws Unsupported with the refusal, or InputError on a bad setting. Everything else is a
+    /// status.
+    DELASSUS_API SolveReport solve(const Prepared& problem, Solution& solution, const SolveSettings& settings);
 
 private:
     std::unique_ptr<Implementation> implementation_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "delassus/communicator.hpp"
 #include "delassus/export.hpp"
 #include "delassus/plugin_info.hpp"
 #include "delassus/problem.hpp"
@@ -55,5 +56,9 @@ DELASSUS_API void check_solver(const Registry& registry, const SolverConfig& con
 /// Loads the plugin that the configuration names and makes a solver with its options. The registry must outlive the
 /// solver.
 [[nodiscard]] DELASSUS_API Solver make_solver(const Registry& registry, const SolverConfig& config);
+/// The same for problems that these processes share: where it fails on one of them, it throws InputError on all.
+/// Collective.
+[[nodiscard]] DELASSUS_API Solver make_solver(const Registry& registry, const SolverConfig& config,
+                                              const Communicator& run);
 
 }  // namespace delassus

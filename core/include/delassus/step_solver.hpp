@@ -37,6 +37,31 @@ struct SolverEffort {
     std::string unsolved;        ///< the first message of a solve that did not end solved; empty if none
 };
 
+/// What a step asks of the solve of its problem.
+struct StepRequest {
+    bool warm_start = false;  ///< the solution holds a start
+    /// The error that the method itself makes in the velocities of this step, n, or empty where it is not known. Where
+    /// the configuration gives no tolerance, each part of the problem is solved to a share of it; where it gives one to
+    /// `auto`, to the smaller of the two (docs/tolerance.md).
+    std::span<const double> method_error = {};
+    /// What earlier solves left in method_error, n, for each velocity in the norm of the masses of its island; it is
+    /// not taken for the method's own.
+    std::span<const double> error_of_solves = {};
+};
+
+/// What came of it. The spans are valid until the next solve.
+struct StepAnswer {
+    bool solved = true;
+    std::string message;   ///< why not, of the first part that was not
+    double natural = 0.0;  ///< largest natural error of an answer that was used
+    /// For each velocity, the natural error that the solve left in its part of the problem, n; 0 where nothing was to
+    /// be solved.
+    std::span<const double> left = {};
+    /// The same as a velocity in the norm of the masses: times that of the velocities which the reactions had to
+    /// correct (‖S r‖, docs/errors.md).
+    std::span<const double> left_in_masses = {};
+};
+
 /// No solver takes a problem with cones whose H is indefinite, as strong pressure in elements makes it in a long step:
 /// H = M + h R + h² K is definite in a short one.
 class DELASSUS_API IndefiniteStep : public Unsupported {
@@ -44,7 +69,7 @@ public:
     using Unsupported::Unsupported;
 };
 
-/// The answer of StepSolver::cancelled was yes.
+/// The answer to StepSolver::interrupt_by() was yes.
 class DELASSUS_API StepInterrupted : public Error {
 public:
     using Error::Error;
@@ -85,13 +110,13 @@ public:
     /// Whether what a problem does not need is left out: false after leave_nothing_out().
     [[nodiscard]] DELASSUS_API bool leaves_out() const;
 
-    /// Solves the problem of a step. solution: the start if warm_start, then the result. Throws Unsupported if the
-    /// configured solver cannot take the problem (IndefiniteStep where H is indefinite beside cones), InputError if the
-    /// problem is not valid. A solve by a configured solver that misses its tolerance is repeated by `auto`. One that
-    /// misses it still is counted in effort() and in the answer; the best iterate is in solution.
-    DELASSUS_API bool solve(const Problem& problem, Solution& solution, bool warm_start);
+    /// Solves the problem of a step. solution: the start if one is asked for, then the result. Throws Unsupported if
+    /// the configured solver cannot take the problem (IndefiniteStep where H is indefinite beside cones), InputError if
+    /// the problem is not valid. A solve by a configured solver that misses its tolerance is repeated by `auto`. One
+    /// that misses it still is counted in effort() and in the answer; the best iterate is in solution.
+    DELASSUS_API StepAnswer solve(const Problem& problem, Solution& solution, const StepRequest& request = {});
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
-    DELASSUS_API bool solve(Problem&& problem, Solution& solution, bool warm_start);
+    DELASSUS_API StepAnswer solve(Problem&& problem, Solution& solution, const StepRequest& request = {});
 
     /// Threads in place of those that the configuration asks for, e.g. to share them with other systems. Null: none but
     /// the calling thread. Call it between solves.
@@ -102,38 +127,25 @@ public:
     /// The law of friction by which problems are solved, whatever theirs: the configured one, else law_of_scenes.
     [[nodiscard]] DELASSUS_API Law law() const;
 
-    /// For each velocity, the natural error that the last solve left in its part of the problem, n; 0 where nothing was
-    /// to be solved. Valid until the next solve.
-    [[nodiscard]] DELASSUS_API std::span<const double> left() const;
-    /// The same as a velocity in the norm of the masses: times that of the velocities which the reactions had to
-    /// correct (‖S r‖, docs/errors.md).
-    [[nodiscard]] DELASSUS_API std::span<const double> left_in_masses() const;
-
     [[nodiscard]] DELASSUS_API const SolverEffort& effort() const;
     DELASSUS_API void reset_effort();
 
-    /// Called with every problem before it is solved, e.g. to dump it. May be empty.
-    std::function<void(const Problem&)> on_problem;
+    /// Shows every problem before it is solved, e.g. to dump it. Empty: no more.
+    DELASSUS_API void watch(std::function<void(const Problem&)> look);
 
     /// Asked before each part of a problem and whenever a solver at work shows an iterate; where the answer is yes,
-    /// solve() throws StepInterrupted. Parts that are solved side by side ask from several threads at once. May be
-    /// empty.
-    std::function<bool()> cancelled;
+    /// solve() throws StepInterrupted. Parts that are solved side by side ask from several threads at once. Empty: no
+    /// more.
+    DELASSUS_API void interrupt_by(std::function<bool()> asked);
+    /// The answer now.
+    [[nodiscard]] DELASSUS_API bool interrupted() const;
 
-    /// The error that the method itself makes in the velocities of this step, n, or empty where it is not known. Where
-    /// the configuration gives no tolerance, each part of the problem is solved to a share of it; where it gives one to
-    /// `auto`, to the smaller of the two (docs/tolerance.md). Not owned.
-    std::span<const double> method_error;
-    /// What earlier solves left in method_error, n, for each velocity in the norm of the masses of its island; it is
-    /// not taken for the method's own. Not owned.
-    std::span<const double> error_of_solves;
-
-    /// Asked about each part of a problem; null: all of them are solved. Not owned.
-    RestingParts* resting = nullptr;
+    /// Who decides which parts of a problem need no solver; null: all of them are solved. Not owned.
+    DELASSUS_API void let_rest(RestingParts* parts);
 
     /// The processes that step the rest of the system, where there are several: problems are solved with them, and
     /// solve() is collective. Null: this process steps all of it. Not owned.
-    SharedSteps* shared = nullptr;
+    DELASSUS_API void share(SharedSteps* steps);
     /// Whether it is so on all of these processes. Collective.
     [[nodiscard]] DELASSUS_API bool on_all(bool own) const;
     /// The largest of these processes' values. Collective.

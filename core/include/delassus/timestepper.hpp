@@ -32,6 +32,7 @@ struct StepReport {
     std::int32_t active_blocks = 0;      ///< of these, blocks with a reaction
     bool solved = true;                  ///< false if the step rests on a solve that missed its tolerance; it is taken
     std::string message;                 ///< why not
+    double natural = 0.0;                ///< largest natural error that a solve of the step left
     // Of the fastest contact or stop that closed, that is, one that pushed in this step and not in the one before:
     double impact_speed = 0.0;  ///< with which it closed, in its unit a second; 0: none
     double impact_time = 0.0;   ///< when, after the beginning of the step
@@ -44,6 +45,8 @@ struct StepReport {
     std::vector<ContactPoint> contacts;    ///< UnilateralRows::contacts(): the last of these blocks are theirs
     std::vector<double> multipliers;       ///< λ of the bilateral constraints at the end of the step, forces; m
 
+    /// Counts a solve of the step; whether it was solved.
+    DELASSUS_API bool take(const StepAnswer& answer);
     /// Back to the beginning; the memory stays.
     DELASSUS_API void clear();
     /// Of a part of a step ← of the step so far, of which `before` is the rest: sums and extremes of both. Reactions,

@@ -41,10 +41,7 @@ LinearSolution solve_linear(Problem problem, StepSolver& solver, StepReport& rep
     problem.name = name;
     const auto n = problem.n(), m = problem.m();
     Solution solution;
-    if (!solver.solve(std::move(problem), solution, false)) {
-        report.solved = false;
-        report.message = solver.effort().unsolved;
-    }
+    report.take(solver.solve(std::move(problem), solution));
     ++report.newton_iterations;
     return {Eigen::Map<const Vector>(solution.x.data(), n), Eigen::Map<const Vector>(solution.lambda.data(), m)};
 }

@@ -118,10 +118,7 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.lambda.assign(problem_.b.size(), 0.0);
-    if (!solver.solve(problem_, solution_, true)) {
-        report.solved = false;
-        report.message = solver.effort().unsolved;
-    }
+    report.take(solver.solve(problem_, solution_, {.warm_start = true}));
     ++report.newton_iterations;
     delta_ = solution_.x;
     for (double& entry : delta_) entry *= h;

@@ -11,17 +11,15 @@
 #include <utility>
 
 #include "delassus/error.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/timestepper.hpp"
-#include "dynamics/step_tolerance.hpp"
-#include "solver/auto_solver.hpp"
-#include "solver/judgement.hpp"
 
 namespace delassus {
 
 SharedSteps::SharedSteps(std::shared_ptr<const Communicator> communicator, const Registry& registry,
                          SolverConfig config)
     : communicator_(std::move(communicator)), registry_(registry), config_(std::move(config)) {
-    solver_ = std::make_unique<PartitionedSolver>(registry_, config_, communicator_);
+    together(*communicator_, [&] { solver_ = std::make_unique<IslandSolver>(registry_, config_); });
 }
 SharedSteps::~SharedSteps() = default;
 
@@ -221,51 +219,33 @@ void SharedSteps::gather_bilateral(const std::vector<double>& own) {
 
 // ---- Solving ----
 
-double SharedSteps::goal_for(const PreparedPart& part, std::span<const double> own_error,
-                             const PartTraits& traits) const {
-    const LocalMatrix& H = part.problem().H;
-    const std::int64_t first = shares_.column_start[static_cast<std::size_t>(communicator_->rank())];
-    double square = 0.0;
-    for (std::size_t i = 0; i < own_error.size(); ++i)
-        for (auto e = static_cast<std::size_t>(H.row_start[i]); e < static_cast<std::size_t>(H.row_start[i + 1]); ++e)
-            if (H.column[e] == first + static_cast<std::int64_t>(i)) square += H.value[e] * own_error[i] * own_error[i];
-    communicator_->sum(std::span(&square, 1));
-    return goal_of({.in_masses = std::sqrt(std::abs(square)),
-                    .in_rows = part.norm_in_rows(own_error),
-                    .reference = part.reference(),
-                    .rows = static_cast<double>(part.problem().m_all()),
-                    .gathered = true},
-                   traits);
-}
-
-bool SharedSteps::solve(const Problem& local, Solution& solution, bool warm_start, const SolveSettings& settings,
-                        std::span<const double> method_error, SolverEffort& effort) {
+void SharedSteps::solve(const Problem& local, Solution& solution, const StepRequest& request,
+                        const SolveSettings& settings, IslandResult& result) {
     agree(Trouble::None, {}, false);
     // All that follows is collective: what it throws it throws on all processes.
     ended_together_ = true;
     const PreparedPart part(communicator_, part_of(local));
     Solution own;
     own.lambda.assign(own_rows_.size(), 0.0);
-    if (warm_start) {
+    if (request.warm_start) {
         own.x = own_columns(solution.x);
         for (std::size_t k = 0; k < own_rows_.size(); ++k)
             own.lambda[k] = solution.lambda[static_cast<std::size_t>(own_rows_[k])];
     }
-    bool solved = true;
     if (part.problem().m_all() == 0) {
         part.free_velocities(own.x);
     } else {
-        const std::vector<double> own_error = method_error.empty() ? std::vector<double>{} : own_columns(method_error);
-        std::int64_t known = method_error.empty() ? 0 : 1;
-        communicator_->max(std::span(&known, 1));
-        if (!warm_start) own.x.assign(part.problem().a.size(), 0.0);
         SolveSettings of = settings;
         of.team = nullptr;
-        PartTraits traits{part.needs(), amplification_of(part.problem().cones, part.problem().law)};
-        communicator_->max(std::span(&traits.amplification, 1));
-        set_step_tolerance(config_, traits,
-                           known != 0 ? std::optional(goal_for(part, own_error, traits)) : std::nullopt, of);
-        solved = solve_part(part, own, warm_start, of, traits, effort);
+        IslandRequest island{.settings = of, .warm_start = request.warm_start, .gathered = true};
+        std::int64_t known = request.method_error.empty() ? 0 : 1;
+        communicator_->max(std::span(&known, 1));
+        std::vector<double> own_error;
+        if (!request.method_error.empty()) own_error = own_columns(request.method_error);
+        if (known != 0) island.method_error = own_error;
+        for (const double left : request.error_of_solves)
+            island.error_of_solves = std::max(island.error_of_solves, left);
+        solver_->solve(part, own, island, result);
     }
     spread(own.x, solution.x);
     solution.lambda.assign(static_cast<std::size_t>(local.m()), 0.0);
@@ -275,65 +255,6 @@ bool SharedSteps::solve(const Problem& local, Solution& solution, bool warm_star
     for (std::size_t k = 0; k < shares_.rows.size(); ++k)
         solution.lambda[k] = bilateral_[static_cast<std::size_t>(shares_.rows[k])];
     ended_together_ = false;
-    return solved;
-}
-
-bool SharedSteps::solve_part(const PreparedPart& part, Solution& own, bool warm_start, const SolveSettings& settings,
-                             const PartTraits& traits, SolverEffort& effort) {
-    constexpr double slack_of_rounding = 32.0;
-    SolveReport report;
-    const auto run = [&](PartitionedSolver& solver, Solution& answer) {
-        SolveSettings of = settings;
-        of.warm_start = warm_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
-        report = solver.solve(part, answer, of);
-        if (report.status == Status::Cancelled) throw StepInterrupted("the step was interrupted");
-        ++effort.plugin_solves;
-        effort.iterations += report.iterations;
-        effort.seconds += report.seconds_setup + report.seconds_solve;
-        if (report.stages.empty() && report.solver != auto_name) loaded_.insert(report.solver);
-        for (const auto& stage : report.stages) loaded_.insert(stage.solver);
-    };
-    const auto done = [&] {
-        return report.status == Status::Solved || report.near_goal ||
-               (config_.sweeps && report.status == Status::IterationLimit);
-    };
-    const auto judge = [&] {
-        if (!done()) report.near_goal = last_resort(config_, traits, settings, report);
-    };
-    const Solution start = own;
-    run(*solver_, own);
-    // As well as rounding lets the rows hold, and balanced.
-    const bool rounding = report.error.natural <= slack_of_rounding * report.error.rounding &&
-                          report.error.balance <= rounding_limit_of_steps;
-    judge();
-    if (!done() && rounding) return true;
-    if (!done() && config_.name != auto_name && !config_.sweeps) {
-        if (!fallback_) {
-            SolverConfig other = config_;
-            other.name = auto_name;
-            other.options = {{"simulation", "true"}};
-            fallback_ = std::make_unique<PartitionedSolver>(registry_, other, communicator_);
-        }
-        const SolveReport first = report;
-        Solution second = start;
-        run(*fallback_, second);
-        judge();
-        ++effort.repeated;
-        if (done() || report.error.natural < first.error.natural)
-            own = std::move(second);
-        else
-            report = first;
-    }
-    effort.worst_natural = std::max(effort.worst_natural, report.error.natural);
-    if (report.near_goal) ++effort.near_goal;
-    if (done()) return true;
-    effort.worst_miss =
-        std::max(effort.worst_miss, worst_of(report.error) / std::max(settings.tolerance, rounding_limit_of_steps));
-    if (effort.unsolved.empty())
-        effort.unsolved =
-            fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
-                        report.error.natural, report.message.empty() ? "" : ": ", report.message);
-    return false;
 }
 
 }  // namespace delassus

@@ -12,10 +12,10 @@
 
 #include "delassus/communicator.hpp"
 #include "delassus/export.hpp"
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/partitioned.hpp"
 #include "delassus/registry.hpp"
 #include "delassus/step_solver.hpp"
-#include "dynamics/step_tolerance.hpp"
+#include "dynamics/island_solver.hpp"
 #include "partitioned/halo.hpp"
 
 namespace delassus {
@@ -57,11 +57,11 @@ public:
     /// Collective.
     void step(const std::function<void()>& body);
 
-    /// As StepSolver::solve(), of the local problem, within step(). Of rows that fall to other processes λ ← 0, but for
-    /// bilateral ones, of which all have the same. method_error: of the local columns, or empty where tolerances do not
-    /// follow it. Collective.
-    bool solve(const Problem& local, Solution& solution, bool warm_start, const SolveSettings& settings,
-               std::span<const double> method_error, SolverEffort& effort);
+    /// As StepSolver::solve(), of the local problem, within step(); request: of its columns, with a method_error where
+    /// tolerances follow it. Of rows that fall to other processes λ ← 0, but for bilateral ones, of which all have the
+    /// same. Collective.
+    void solve(const Problem& local, Solution& solution, const StepRequest& request, const SolveSettings& settings,
+               IslandResult& result);
     [[nodiscard]] bool on_all(bool own);
     [[nodiscard]] double largest_on_all(double own);
 
@@ -71,7 +71,7 @@ public:
     [[nodiscard]] const std::vector<double>& bilateral() const { return bilateral_; }
     /// Rows of D that fell to this process for each local body that decides them, as StepShares::bodies.
     [[nodiscard]] const std::vector<std::int32_t>& rows_of_bodies() const { return rows_of_bodies_; }
-    [[nodiscard]] const std::set<std::string>& loaded() const { return loaded_; }
+    [[nodiscard]] const std::set<std::string>& loaded() const { return solver_->loaded(); }
 
 private:
     enum class Trouble : std::int64_t { None, Interrupted, TooLong, Failure, Unsupported, Input };
@@ -81,10 +81,6 @@ private:
     [[nodiscard]] PartitionedProblem part_of(const Problem& local);
     /// Finds whose each cone is, and numbers the rows that fall to this process.
     void share_rows(const Problem& local);
-    [[nodiscard]] bool solve_part(const PreparedPart& part, Solution& own, bool warm_start,
-                                  const SolveSettings& settings, const PartTraits& traits, SolverEffort& effort);
-    [[nodiscard]] double goal_for(const PreparedPart& part, std::span<const double> own_error,
-                                  const PartTraits& traits) const;
     [[nodiscard]] bool is_own(const StepShares::Body& body) const { return body.owner == communicator_->rank(); }
     /// The entries of own columns of a local vector; and back, with those of ghosts from their owners.
     [[nodiscard]] std::vector<double> own_columns(std::span<const double> local) const;
@@ -96,7 +92,7 @@ private:
     const Registry& registry_;
     SolverConfig config_;
     StepShares shares_;
-    std::unique_ptr<PartitionedSolver> solver_, fallback_;
+    std::unique_ptr<IslandSolver> solver_;
     Halo columns_;
     bool ended_together_ = false;        ///< what is being thrown is thrown on all processes
     std::vector<std::int32_t> body_of_;  ///< of each local column
@@ -104,7 +100,6 @@ private:
     std::vector<std::int32_t> own_rows_;  ///< of the local problem, ascending
     std::vector<std::int32_t> rows_of_bodies_;
     std::vector<double> bilateral_;
-    std::set<std::string> loaded_;
 };
 
 }  // namespace delassus

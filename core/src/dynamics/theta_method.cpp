@@ -81,7 +81,6 @@ void ThetaMethod::load(const std::vector<double>& memory) {
 
 void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepReport& report) {
     require_step(system_, state, h, settings_.name);
-    solver.method_error = {};
     find_spins(state, h);
     if (settings_.linearly_implicit) extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
@@ -255,9 +254,8 @@ bool ThetaMethod::contacts_gain(const State& begin) {
     return gain > share * kinetic;
 }
 
-void ThetaMethod::set_b_of_contacts(int iteration, const StepSolver& solver) {
-    contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration,
-                    solver.effort().worst_natural);
+void ThetaMethod::set_b_of_contacts(int iteration, const StepReport& report) {
+    contacts_.set_b(problem_, solution_, {guess_.data(), static_cast<std::size_t>(n_)}, iteration, report.natural);
 }
 
 // Right-hand sides in √mass · speed: a by the diagonal of H, b by that of D diag(H)⁻¹ Dᵀ.
@@ -294,7 +292,7 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     bool taking = false;
     for (int iteration = 0;; ++iteration) {
         linearize(begin, h);
-        set_b_of_contacts(iteration, solver);
+        set_b_of_contacts(iteration, report);
         if (iteration > 0 && (unchanged() || (iteration >= settings_.iterations && contacts_.settled()))) return;
         if (iteration == most_iterations) {
             report.solved = false;
@@ -327,7 +325,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         linearize(begin, h);
         solved_from_ = guess_;
         solved_force_ = force_;
-        set_b_of_contacts(0, solver);
+        set_b_of_contacts(0, report);
     };
     const auto found = [&] {
         if (!solve(solver, report)) return false;
@@ -341,7 +339,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         if (!found()) return;
     }
     for (int iteration = 1; iteration <= most_iterations; ++iteration) {
-        set_b_of_contacts(iteration, solver);
+        set_b_of_contacts(iteration, report);
         if (contacts_.settled()) return;
         if (!found()) return;
     }
@@ -351,10 +349,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
 
 bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
     ++report.newton_iterations;
-    if (solver.solve(problem_, solution_, true)) return true;
-    report.solved = false;
-    report.message = solver.effort().unsolved;
-    return false;
+    return report.take(solver.solve(problem_, solution_, {.warm_start = true}));
 }
 
 // The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).

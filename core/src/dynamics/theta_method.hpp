@@ -50,7 +50,7 @@ private:
     void linearize(const State& begin, double h);
     void set_constraint_rows(const State& begin, double h);
     void impulse_of_forces(double h);
-    void set_b_of_contacts(int iteration, const StepSolver& solver);
+    void set_b_of_contacts(int iteration, const StepReport& report);
     [[nodiscard]] bool contacts_gain(const State& begin);
     void scale();
     [[nodiscard]] bool unchanged() const;

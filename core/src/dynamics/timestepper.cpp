@@ -40,12 +40,21 @@ void StepReport::clear() {
     *this = std::move(empty);
 }
 
+bool StepReport::take(const StepAnswer& answer) {
+    natural = std::max(natural, answer.natural);
+    if (answer.solved) return true;
+    solved = false;
+    message = answer.message;
+    return false;
+}
+
 void StepReport::follow(const StepReport& before) {
     newton_iterations += before.newton_iterations;
     unilateral_blocks = std::max(unilateral_blocks, before.unilateral_blocks);
     linearization = std::max(linearization, before.linearization);
     linearization_rounding = std::max(linearization_rounding, before.linearization_rounding);
     recovered += before.recovered;
+    natural = std::max(natural, before.natural);
     if (before.solved) return;
     solved = false;
     message = before.message;

@@ -6,7 +6,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/sdk/mpi.hpp"
-#include "partitioned/mpi_module.hpp"
+#include "support/mpi_module.hpp"
 
 namespace delassus {
 

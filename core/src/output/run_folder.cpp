@@ -104,20 +104,20 @@ void RunFolder::open(const Scene& scene, std::optional<Checkpoint> resumed, cons
 void RunFolder::dump_problems() {
     folder_.add_folder("problems");
     for (auto& simulation : simulations_) {
-        simulation.solver().on_problem = [this, &simulation, step = std::int64_t{-1},
-                                          solve = 0](const Problem& problem) mutable {
-            const std::int64_t now = simulation.record().step + 1;
-            if (now % *dump_ != 0 || problem.m() == 0) return;
-            solve = now == step ? solve + 1 : 1;
-            step = now;
-            const auto name = solve == 1 ? fmt::format("{}_{:06}", simulation.system().name, now)
-                                         : fmt::format("{}_{:06}_{}", simulation.system().name, now, solve);
-            Problem copy = problem;
-            copy.name = name;
-            copy.source = fmt::format("step {} of system {} from t = {:.17g} s, solve {}", now,
-                                      simulation.system().name, simulation.state().t, solve);
-            write_problem(copy, folder_.add("problems/" + name));
-        };
+        simulation.solver().watch(
+            [this, &simulation, step = std::int64_t{-1}, solve = 0](const Problem& problem) mutable {
+                const std::int64_t now = simulation.record().step + 1;
+                if (now % *dump_ != 0 || problem.m() == 0) return;
+                solve = now == step ? solve + 1 : 1;
+                step = now;
+                const auto name = solve == 1 ? fmt::format("{}_{:06}", simulation.system().name, now)
+                                             : fmt::format("{}_{:06}_{}", simulation.system().name, now, solve);
+                Problem copy = problem;
+                copy.name = name;
+                copy.source = fmt::format("step {} of system {} from t = {:.17g} s, solve {}", now,
+                                          simulation.system().name, simulation.state().t, solve);
+                write_problem(copy, folder_.add("problems/" + name));
+            });
     }
 }
 

@@ -261,18 +261,10 @@ Errors PartMeter::measure(const double* x, const double* lambda) {
 }
 
 double PartMeter::natural(const double* x, const double* lambda) {
-    const auto& problem = part_.problem;
     std::vector<double> own;
     if (!x && part_.structure != Structure::Reduced) {
         if (part_.stands_in()) return std::numeric_limits<double>::quiet_NaN();
-        impulse_.assign(part_.columns.size(), 0.0);
-        for (std::int64_t row = 0; row < problem.m(); ++row)
-            for_entries(problem.D, row,
-                        [&](std::int64_t j, double value) { impulse_[part_.columns.place(j)] += value * lambda[row]; });
-        part_.columns.add(*part_.communicator, impulse_);
-        own = problem.a;
-        for (std::size_t i = 0; i < own.size(); ++i) own[i] += impulse_[i];
-        part_.apply_inverse(own);
+        part_.velocity_of(lambda, own);
         x = own.data();
     }
     take_x(x);

@@ -8,7 +8,9 @@
 
 #include "delassus/error.hpp"
 #include "partitioned/bytes.hpp"
+#include "partitioned/local_entries.hpp"
 #include "partitioned/part_meter.hpp"
+#include "partitioned/part_proof.hpp"
 #include "problem/cone_kinds.hpp"
 #include "problem/need_of.hpp"
 #include "problem/parallel_rows.hpp"
@@ -188,12 +190,47 @@ double PreparedPart::norm_in_rows(std::span<const double> v) const {
     return implementation_->measuring().norm_in_rows(v.data());
 }
 
+void PreparedPart::velocity_of(std::span<const double> lambda, std::vector<double>& x) const {
+    if (!is_definite()) throw Unsupported("several processes find velocities from reactions only where H is definite");
+    implementation_->velocity_of(lambda.data(), x);
+}
+
 void PreparedPart::free_velocities(std::vector<double>& x) const {
-    const auto& self = *implementation_;
-    if (!self.inverse && !self.factors)
+    if (!is_definite())
         throw Unsupported("several processes find velocities without reactions only where H is definite");
-    x = self.problem.a;
-    self.apply_inverse(x);
+    x = problem().a;
+    if (structure() != Structure::Reduced) implementation_->apply_inverse(x);
+}
+
+RoundingOfBalance PreparedPart::rounding_of_balance(const Solution& solution) const {
+    if (structure() == Structure::Reduced) return {};
+    return implementation_->measuring().rounding_of_balance(solution.x.data(), solution.lambda.data());
+}
+
+double PreparedPart::proven_size(const Solution& answer) const {
+    return PartProof(*implementation_).size(answer.x, answer.lambda);
+}
+
+double PreparedPart::diagonal(std::size_t i) const {
+    const auto& self = *implementation_;
+    const auto row = static_cast<std::int64_t>(i);
+    return entry_of(self.problem.H, row,
+                    self.problem.column_start[static_cast<std::size_t>(self.communicator->rank())] + row);
+}
+
+std::unique_ptr<Prepared> PreparedPart::under(Law) const {
+    return nullptr;
+}
+
+void PreparedPart::Implementation::velocity_of(const double* lambda, std::vector<double>& x) const {
+    x = problem.a;
+    std::vector<double> impulse(columns.size(), 0.0);
+    for (std::int64_t row = 0; row < problem.m(); ++row)
+        for_entries(problem.D, row,
+                    [&](std::int64_t j, double value) { impulse[columns.place(j)] += value * lambda[row]; });
+    columns.add(*communicator, impulse);
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += impulse[i];
+    if (structure != Structure::Reduced) apply_inverse(x);
 }
 
 PartMeter& PreparedPart::Implementation::measuring() const {
@@ -211,12 +248,6 @@ double PreparedPart::Implementation::largest(double value) const {
 std::int64_t PreparedPart::Implementation::largest(std::int64_t value) const {
     communicator->max(std::span(&value, 1));
     return value;
-}
-
-bool PreparedPart::Implementation::only_cones() const {
-    for (const auto& kind : sdk::cone_table)
-        if (!kind.is_cone && counts[static_cast<std::size_t>(kind.kind)] > 0) return false;
-    return true;
 }
 
 void PreparedPart::Implementation::count_cones() {
@@ -331,10 +362,8 @@ std::vector<double> PreparedPart::Implementation::magnitude_of_diagonal() const 
     const std::int64_t first = problem.column_start[static_cast<std::size_t>(communicator->rank())];
     std::array<double, 2> sums = {0.0, 0.0};
     for (std::size_t i = 0; i < magnitude.size(); ++i) {
-        for (auto k = static_cast<std::size_t>(problem.H.row_start[i]);
-             k < static_cast<std::size_t>(problem.H.row_start[i + 1]); ++k)
-            if (problem.H.column[k] == first + static_cast<std::int64_t>(i))
-                magnitude[i] = std::abs(problem.H.value[k]);
+        const auto row = static_cast<std::int64_t>(i);
+        magnitude[i] = std::abs(entry_of(problem.H, row, first + row));
         sums[0] += magnitude[i];
         sums[1] += magnitude[i] > 0.0 ? 1.0 : 0.0;
     }

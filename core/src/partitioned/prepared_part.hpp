@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "partitioned/coupled_inverse.hpp"
 #include "partitioned/halo.hpp"
@@ -47,6 +47,8 @@ struct PreparedPart::Implementation {
     void factorize_coupled();
     /// v ← H⁻¹ v, own entries. Collective.
     void apply_inverse(std::vector<double>& v) const;
+    /// x ← H⁻¹(a + Dᵀλ), own entries, where H has an inverse. Collective.
+    void velocity_of(const double* lambda, std::vector<double>& x) const;
     /// |diag H| with the mean of the others for a zero, own entries; 1 where all are zero.
     [[nodiscard]] std::vector<double> magnitude_of_diagonal() const;
     /// s of each own cone from the own rows' diagonal of N: sdk::block_scaling() with the mean over the cones of all
@@ -63,7 +65,6 @@ struct PreparedPart::Implementation {
     [[nodiscard]] bool stands_in() const {
         return structure == Structure::Semidefinite || structure == Structure::Indefinite;
     }
-    [[nodiscard]] bool only_cones() const;
     /// The largest on all processes.
     [[nodiscard]] double largest(double value) const;
     [[nodiscard]] std::int64_t largest(std::int64_t value) const;

@@ -3,7 +3,7 @@
 
 #include <bit>
 
-#include "delassus/partitioned_solver.hpp"
+#include "delassus/prepared_part.hpp"
 #include "problem/errors_json.hpp"
 #include "solver/report_json.hpp"
 

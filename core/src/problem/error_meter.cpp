@@ -305,12 +305,12 @@ void ErrorMeter::velocity_of(std::span<const double> lambda_values, std::vector<
     const auto& self = *implementation_;
     if (self.view.n > 0 && !self.prepared.mobility)
         throw InputError("velocities follow from reactions alone only where H is definite");
-    if (static_cast<Eigen::Index>(lambda_values.size()) != self.view.m)
+    if (!lambda_values.empty() && static_cast<Eigen::Index>(lambda_values.size()) != self.view.m)
         throw InputError(
             fmt::format("{} reactions do not fit a problem with m = {}", lambda_values.size(), self.view.m));
     x.resize(static_cast<std::size_t>(self.view.n));
     if (x.empty()) return;
-    self.prepared.mobility->velocity(self.view, lambda_values.data(), self.momentum);
+    self.prepared.mobility->velocity(self.view, lambda_values.empty() ? nullptr : lambda_values.data(), self.momentum);
     std::copy(self.momentum.begin(), self.momentum.end(), x.begin());
 }
 

@@ -13,6 +13,20 @@
 
 namespace delassus {
 
+Prepared::~Prepared() = default;
+
+bool Prepared::is_definite() const {
+    switch (structure()) {
+        case Structure::Reduced:
+        case Structure::Diagonal:
+        case Structure::Blocks:
+        case Structure::Definite:
+            return true;
+        default:
+            return false;
+    }
+}
+
 namespace {
 
 struct Capability {

@@ -9,7 +9,9 @@
 
 #include "delassus/error.hpp"
 #include "problem/cone_kinds.hpp"
+#include "problem/infeasibility.hpp"
 #include "problem/need_of.hpp"
+#include "problem/symmetry.hpp"
 #include "problem/validate.hpp"
 #include "support/finite.hpp"
 
@@ -81,6 +83,44 @@ std::uint64_t PreparedProblem::needs() const {
 }
 const delassus_problem& PreparedProblem::raw() const {
     return implementation_->raw;
+}
+const Communicator& PreparedProblem::communicator() const {
+    static const std::shared_ptr<const Communicator> alone = single_process();
+    return *alone;
+}
+std::span<const double> PreparedProblem::a() const {
+    return {implementation_->raw.a, static_cast<std::size_t>(implementation_->raw.n)};
+}
+std::span<const double> PreparedProblem::b() const {
+    return {implementation_->raw.b, static_cast<std::size_t>(implementation_->raw.m)};
+}
+double PreparedProblem::diagonal(std::size_t i) const {
+    const auto column = static_cast<std::int32_t>(i);
+    return entry_of(problem().H, column, column);
+}
+Errors PreparedProblem::measure(std::span<const double> x, std::span<const double> lambda) const {
+    return meter().measure(x, lambda);
+}
+double PreparedProblem::natural(const double* x, const double* lambda) const {
+    return meter().natural(x, lambda);
+}
+double PreparedProblem::reference() const {
+    return meter().reference();
+}
+double PreparedProblem::norm_in_rows(std::span<const double> v) const {
+    return meter().norm_in_rows(v);
+}
+void PreparedProblem::velocity_of(std::span<const double> lambda, std::vector<double>& x) const {
+    meter().velocity_of(lambda, x);
+}
+void PreparedProblem::free_velocities(std::vector<double>& x) const {
+    meter().velocity_of({}, x);
+}
+double PreparedProblem::proven_size(const Solution& answer) const {
+    return delassus::proven_size(*this, answer.x, answer.lambda);
+}
+std::unique_ptr<Prepared> PreparedProblem::under(Law law) const {
+    return std::make_unique<PreparedProblem>(with_law(law));
 }
 
 void PreparedProblem::set_right_hand_side(Array<double> a, Array<double> b) {

@@ -52,7 +52,7 @@ public:
           rule_(system.equilibrium.value_or(EquilibriumRule{})),
           solver_(registry, system.solver),
           relaxation_(*system.system, {.tolerance = rule_.tolerance}) {
-        solver_.cancelled = cancelled;
+        solver_.interrupt_by(cancelled);
         if (!system.leave_out) solver_.leave_nothing_out();
         for (const BodyParameters& body : system.bodies)
             if (body.massless)
@@ -118,7 +118,7 @@ public:
         for (const double q : start.state.q) farthest = std::max(farthest, std::abs(q));
         farthest *= 1e6;
         follower.on_point = [&](const LoadPathPoint& point, PathEvent event) {
-            if (solver_.cancelled && solver_.cancelled()) throw StepInterrupted("the search was interrupted");
+            if (solver_.interrupted()) throw StepInterrupted("the search was interrupted");
             mechanics_.set_load_factor(point.load);
             require_nothing_touches(mechanics_, point.state, rows_, point.load);
             if (std::any_of(point.state.q.begin(), point.state.q.end(),

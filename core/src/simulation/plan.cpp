@@ -57,7 +57,7 @@ private:
 
     void first_step() {
         const double end = std::exchange(system_.end, std::max(system_.end, system_.step));  // at least one step
-        simulation_.solver().on_problem = [this](const Problem& problem) {
+        simulation_.solver().watch([this](const Problem& problem) {
             std::int32_t parts = 0;
             for (const auto& part : simulation_.solver().parts(problem)) {
                 sparse_ = sparse_ || part.structure > Structure::Blocks;
@@ -66,7 +66,7 @@ private:
                 needs_ |= part.needs;
             }
             plan_.parts = std::max(plan_.parts, parts);
-        };
+        });
         simulation_.step();
         system_.end = end;
         plan_.solvers = simulation_.solver().loaded();
@@ -325,9 +325,7 @@ private:
     void find_later_solvers(std::uint64_t needs) {
         const SolverConfig& solver = system_.solver;
         if (!solver.name.empty() && solver.name != auto_name) return;
-        OptionTexts options = solver.options;
-        options.try_emplace("simulation", "true");
-        for (auto& name : auto_choice(registry_, options, needs).later)
+        for (auto& name : auto_choice(registry_, solver.options, needs, Origin::Step).later)
             if (std::find(plan_.solvers.begin(), plan_.solvers.end(), name) == plan_.solvers.end())
                 plan_.later_solvers.push_back(std::move(name));
     }

@@ -53,7 +53,7 @@ SharedRun::SharedRun(SceneSystem& system, std::shared_ptr<const Communicator> co
       steps_(communicator_, registry, solver.config()),
       domains_(system),
       weights_(domains_.moving().size(), 1.0) {
-    solver.shared = &steps_;
+    solver.share(&steps_);
 }
 SharedRun::~SharedRun() = default;
 

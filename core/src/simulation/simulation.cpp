@@ -142,7 +142,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
             if (system.control)
                 throw InputError("bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
             sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
-            solver_->resting = sleeping_.get();
+            solver_->let_rest(sleeping_.get());
         }
     });
     if (system.equilibrium) {

@@ -36,135 +36,25 @@ fs::path ranking_file(const Registry& registry) {
                     registry.folders().back().string()));
 }
 
-struct AutoOptions {
-    Ranking ranking;
-    bool step;  // the problems are steps of a simulation
-};
-
-AutoOptions read_options(const Registry& registry, const OptionTexts& options) {
+Ranking ranking_of(const Registry& registry, const OptionTexts& options) {
     const auto values = resolve_options(auto_name, auto_info(registry).options, options);
-    return {Ranking(values[0].text.empty() ? ranking_file(registry) : fs::path(values[0].text)),
-            values[1].integer != 0};
+    return Ranking(values[0].text.empty() ? ranking_file(registry) : fs::path(values[0].text));
 }
 
-class AutoSolver : public Solver::Implementation {
-public:
-    AutoSolver(const Registry& registry, OptionTexts options)
-        : registry_(registry),
-          info_(auto_info(registry)),
-          options_(std::move(options)),
-          chosen_(read_options(registry, options_)) {}
-
-    [[nodiscard]] const PluginInfo& info() const override { return info_; }
-    [[nodiscard]] const OptionTexts& options() const override { return options_; }
-
-    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings&) override {
-        const std::uint64_t needs = needs_of(problem, {});
-        if (!unnamed(registry_, needs).empty()) return {};
-        for (const auto& ranked : order_of(problem).solvers)
-            if (can(registry_, ranked.solver, needs)) return {};
-        return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
-                           problem.describe(needs));
-    }
-
-    [[nodiscard]] SetUpCounts counts() const override {
-        SetUpCounts sum;
-        for (const auto& [key, solver] : solvers_) sum += counts_of(solver);
-        return sum;
-    }
-
-    std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
-                              SolveReport& report) override {
-        StageRunner runner(problem, solution, settings, report);
-        if (chosen_.step && runner.solved_at_start()) return runner.error();
-        const Order& order = order_of(problem);
-        const Team& team = team_of(problem, order);
-        const std::vector<RankedSolver>& ranked = team.ranked;
-        const std::vector<Member>& members = team.members;
-        Solution start = settings.warm_start ? solution : Solution{};
-        std::vector<Solution> left(members.size());
-        const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
-            const RankedSolver& own = ranked[turn.member];
-            report.near_goal = turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work);
-            if (report.near_goal) return {TurnEnd::Done, runner.worst()};
-            Solver* solver = usable(own, runner.problem_of(own.law));
-            if (!solver) return {TurnEnd::Retired, std::numeric_limits<double>::infinity()};
-            Stage stage{.reason = fmt::format("round {}", turn.round + 1),
-                        .iterations = turn.iterations,
-                        .may_pass = turn.may_pass && !members[turn.member].local,
-                        .law = own.law};
-            // At rest, and where nothing is known of the step, the next steps begin within the tolerance if they change
-            // little. What Newton's method gains with its last iteration costs nothing.
-            constexpr double at_rest = 1e-6;
-            if (chosen_.step && (members[turn.member].local || settings.tolerance <= at_rest)) stage.tighter = 1e-3;
-            Solution& iterate = left[turn.member];
-            iterate = turn.start ? left[*turn.start] : start;
-            TurnResult result = runner.run(*solver, stage, iterate);
-            if (own.law && result.end != TurnEnd::Done) {
-                start = iterate;
-                result.end = TurnEnd::Retired;
-            }
-            return result;
-        });
-        if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
-        report.message = fmt::format("{}: {}{}", order.name, runner.sentence(),
-                                     end == RoundsEnd::Stale ? "; no solver got nearer in three rounds" : "");
-        return runner.error();
-    }
-
-private:
-    [[nodiscard]] const Order& order_of(const PreparedProblem& problem) const {
-        return chosen_.ranking.order({needs_of(problem, {}), chosen_.step}, problem.raw().m);
-    }
-
-    struct Team {
-        std::vector<RankedSolver> ranked;
-        std::vector<Member> members;  // the same as the rounds see them
-    };
-
-    /// Who takes turns, found once for problems alike.
-    const Team& team_of(const PreparedProblem& problem, const Order& order) {
-        const std::uint64_t needs = needs_of(problem, {});
-        const auto [place, fresh] = teams_.try_emplace({&order, needs, registry_.plugins().size()});
-        if (fresh) {
-            place->second.ranked = members_of(registry_, order, needs);
-            place->second.members = traits_of(registry_, place->second.ranked);
-        }
-        return place->second;
-    }
-
-    /// The solver of a member, kept from problem to problem; null if it cannot take the problem.
-    Solver* usable(const RankedSolver& ranked, const PreparedProblem& problem) {
-        const auto key = std::make_pair(ranked.solver, ranked.options);
-        auto place = solvers_.find(key);
-        if (place == solvers_.end())
-            place = solvers_.emplace(key, Solver(registry_.load(ranked.solver), ranked.options, &registry_)).first;
-        return place->second.refusal(problem, {}).empty() ? &place->second : nullptr;
-    }
-
-    const Registry& registry_;
-    PluginInfo info_;
-    OptionTexts options_;
-    AutoOptions chosen_;
-    std::map<std::pair<std::string, OptionTexts>, Solver> solvers_;
-    // By the order, the needs, and how many plugins there were, since more may come.
-    std::map<std::tuple<const Order*, std::uint64_t, std::size_t>, Team> teams_;
-};
-
-}  // namespace
-
 /// The needs of a problem with these under the other law, if there is one.
-static std::uint64_t needs_under(std::optional<Law> law, std::uint64_t needs) {
+std::uint64_t needs_under(std::optional<Law> law, std::uint64_t needs) {
     if (!law || (needs & sdk::cones_with_law) == 0) return needs;
     return (needs & ~(need_of(Law::Associated) | need_of(Law::Coulomb))) | need_of(*law);
 }
 
+/// Whether this plugin is installed and has all these capabilities.
 bool can(const Registry& registry, const std::string& name, std::uint64_t needs) {
     const auto& plugins = registry.plugins();
     return std::any_of(plugins.begin(), plugins.end(),
                        [&](const PluginInfo& plugin) { return plugin.name == name && plugin.missing(needs) == 0; });
 }
 
+/// The plugins, by ascending name, that can take problems with these needs and work without being named by the user.
 std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) {
     std::vector<std::string> names = registry.capable(needs);
     std::erase_if(names, [&](const std::string& name) {
@@ -177,10 +67,11 @@ std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs) 
 
 /// Only free rows, in a step: what a factorisation leaves there is rounding, often of rows that repeat each other,
 /// which no other solver removes. So the first that can is the only one.
-static bool is_linear_step(const Order& order) {
+bool is_linear_step(const Order& order) {
     return order.linear.value_or(false) && order.step.value_or(false);
 }
 
+/// The solvers of the order that can take problems with these needs, then all others that can but for peers.
 std::vector<RankedSolver> members_of(const Registry& registry, const Order& order, std::uint64_t needs) {
     constexpr std::int64_t of_a_stranger = 100;  // iterations of a solver of which nothing is known
     std::vector<RankedSolver> members;
@@ -193,6 +84,7 @@ std::vector<RankedSolver> members_of(const Registry& registry, const Order& orde
     return members;
 }
 
+/// What the rounds need of these.
 std::vector<Member> traits_of(const Registry& registry, const std::vector<RankedSolver>& ranked) {
     std::vector<Member> members;
     for (const auto& one : ranked) {
@@ -203,13 +95,120 @@ std::vector<Member> traits_of(const Registry& registry, const std::vector<Ranked
     return members;
 }
 
-bool of_steps(const Registry& registry, const OptionTexts& options) {
-    return read_options(registry, options).step;
-}
+class AutoSolver : public Solver::Implementation {
+public:
+    AutoSolver(const Registry& registry, OptionTexts options)
+        : registry_(registry),
+          info_(auto_info(registry)),
+          options_(std::move(options)),
+          ranking_(ranking_of(registry, options_)) {}
 
-Ranking ranking_of(const Registry& registry, const OptionTexts& options) {
-    return read_options(registry, options).ranking;
-}
+    [[nodiscard]] const PluginInfo& info() const override { return info_; }
+    [[nodiscard]] const OptionTexts& options() const override { return options_; }
+
+    [[nodiscard]] std::string refusal(const Prepared& problem, const SolveSettings& settings) override {
+        const std::uint64_t needs = needs_of(problem, {});
+        if (!unnamed(registry_, needs).empty()) return {};
+        for (const auto& ranked : order_of(problem, settings.origin).solvers)
+            if (can(registry_, ranked.solver, needs)) return {};
+        return fmt::format("auto cannot solve {}: no installed solver can take {}.", quoted_name(problem),
+                           problem.describe(needs));
+    }
+
+    [[nodiscard]] SetUpCounts counts() const override {
+        SetUpCounts sum;
+        for (const auto& [key, solver] : solvers_) sum += counts_of(solver);
+        return sum;
+    }
+
+    std::optional<Errors> run(const Prepared& problem, Solution& solution, const SolveSettings& settings,
+                              SolveReport& report) override {
+        StageRunner runner(problem, solution, settings, report);
+        const bool step = settings.origin == Origin::Step;
+        if (step && runner.solved_at_start()) return runner.error();
+        const Order& order = order_of(problem, settings.origin);
+        const Team& team = team_of(problem, order);
+        const std::vector<RankedSolver>& ranked = team.ranked;
+        const std::vector<Member>& members = team.members;
+        Solution start = solution;
+        bool has_start = settings.warm_start;
+        std::vector<Solution> left(members.size());
+        const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
+            const RankedSolver& own = ranked[turn.member];
+            report.near_goal = turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work);
+            if (report.near_goal) return {TurnEnd::Done, runner.worst()};
+            const Prepared* solvable = runner.problem_of(own.law);
+            Solver* solver = solvable ? usable(own, *solvable) : nullptr;
+            if (!solver) return {TurnEnd::Retired, std::numeric_limits<double>::infinity()};
+            Stage stage{.reason = fmt::format("round {}", turn.round + 1),
+                        .iterations = turn.iterations,
+                        .may_pass = turn.may_pass && !members[turn.member].local,
+                        .law = own.law};
+            // At rest, and where nothing is known of the step, the next steps begin within the tolerance if they change
+            // little. What Newton's method gains with its last iteration costs nothing.
+            constexpr double at_rest = 1e-6;
+            if (step && (members[turn.member].local || settings.tolerance <= at_rest)) stage.tighter = 1e-3;
+            Solution& iterate = left[turn.member];
+            iterate = turn.start ? left[*turn.start] : start;
+            TurnResult result = runner.run(*solver, stage, iterate, turn.start || has_start);
+            if (own.law && result.end != TurnEnd::Done) {
+                start = iterate;
+                has_start = true;
+                result.end = TurnEnd::Retired;
+            }
+            return result;
+        });
+        if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
+        report.message = fmt::format("{}: {}{}", order.name, runner.sentence(),
+                                     end == RoundsEnd::Stale ? "; no solver got nearer in three rounds" : "");
+        return runner.error();
+    }
+
+private:
+    [[nodiscard]] const Order& order_of(const Prepared& problem, Origin origin) const {
+        const auto rows = std::min<std::int64_t>(problem.all_rows(), std::numeric_limits<std::int32_t>::max());
+        return ranking_.order({needs_of(problem, {}), origin == Origin::Step}, static_cast<std::int32_t>(rows));
+    }
+
+    struct Team {
+        std::vector<RankedSolver> ranked;
+        std::vector<Member> members;  // the same as the rounds see them
+    };
+
+    /// Who takes turns, found once for problems alike.
+    const Team& team_of(const Prepared& problem, const Order& order) {
+        const std::uint64_t needs = needs_of(problem, {});
+        const auto [place, fresh] = teams_.try_emplace({&order, needs, registry_.plugins().size()});
+        if (fresh) {
+            place->second.ranked = members_of(registry_, order, needs);
+            place->second.members = traits_of(registry_, place->second.ranked);
+        }
+        return place->second;
+    }
+
+    /// The solver of a member, kept from problem to problem; null if it cannot take the problem.
+    Solver* usable(const RankedSolver& ranked, const Prepared& problem) {
+        const auto key = std::make_pair(ranked.solver, ranked.options);
+        auto place = solvers_.find(key);
+        if (place == solvers_.end()) {
+            const auto make = [&] {
+                place = solvers_.emplace(key, Solver(registry_.load(ranked.solver), ranked.options, &registry_)).first;
+            };
+            together(problem.communicator(), make);
+        }
+        return place->second.refusal(problem, {}).empty() ? &place->second : nullptr;
+    }
+
+    const Registry& registry_;
+    PluginInfo info_;
+    OptionTexts options_;
+    Ranking ranking_;
+    std::map<std::pair<std::string, OptionTexts>, Solver> solvers_;
+    // By the order, the needs, and how many plugins there were, since more may come.
+    std::map<std::tuple<const Order*, std::uint64_t, std::size_t>, Team> teams_;
+};
+
+}  // namespace
 
 PluginInfo auto_info(const Registry& registry) {
     PluginInfo info;
@@ -224,15 +223,7 @@ PluginInfo auto_info(const Registry& registry) {
                      0.0,
                      {},
                      "",
-                     "File of the orders of solvers; empty: ranking.json of the plugin folders"},
-                    {"simulation",
-                     DELASSUS_OPTION_BOOLEAN,
-                     "false",
-                     0.0,
-                     0.0,
-                     {},
-                     "",
-                     "The problems are steps of a simulation, each close to the one before"}};
+                     "File of the orders of solvers; empty: ranking.json of the plugin folders"}};
     for (const auto& plugin : registry.plugins()) info.capabilities |= plugin.capabilities;
     return info;
 }
@@ -241,7 +232,7 @@ Solver make_auto(const Registry& registry, OptionTexts options) {
     return Solver(std::make_unique<AutoSolver>(registry, std::move(options)));
 }
 
-AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs) {
+AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs, Origin origin) {
     static_cast<void>(take_finish(options));
     AutoChoice choice;
     const auto add = [&](std::vector<std::string>& names, const std::string& name) {
@@ -249,8 +240,8 @@ AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint6
             if (std::find(list->begin(), list->end(), name) != list->end()) return;
         names.push_back(name);
     };
-    const AutoOptions chosen = read_options(registry, options);
-    const auto orders = chosen.ranking.orders({needs, chosen.step});
+    const Ranking ranking = ranking_of(registry, options);
+    const auto orders = ranking.orders({needs, origin == Origin::Step});
     const auto able = [&](const RankedSolver& ranked) {
         return can(registry, ranked.solver, needs_under(ranked.law, needs));
     };

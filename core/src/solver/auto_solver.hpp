@@ -27,23 +27,7 @@ struct AutoChoice {
     std::vector<std::string> later;  ///< that are loaded if those before them do not reach the tolerance
 };
 /// options: as configured. Throws as make_auto.
-[[nodiscard]] DELASSUS_API AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs);
-
-/// What `auto` of distributed problems needs of the above.
-class Ranking;
-struct Order;
-struct Member;
-struct RankedSolver;
-/// The solvers of the order that can take problems with these needs, then all others that can but for peers.
-[[nodiscard]] std::vector<RankedSolver> members_of(const Registry& registry, const Order& order, std::uint64_t needs);
-/// What the rounds need of these (rounds.hpp).
-[[nodiscard]] std::vector<Member> traits_of(const Registry& registry, const std::vector<RankedSolver>& ranked);
-[[nodiscard]] Ranking ranking_of(const Registry& registry, const OptionTexts& options);
-/// Whether `auto` with these options solves steps of a simulation. Throws InputError on a bad option.
-[[nodiscard]] bool of_steps(const Registry& registry, const OptionTexts& options);
-/// Whether this plugin is installed and has all these capabilities.
-[[nodiscard]] bool can(const Registry& registry, const std::string& name, std::uint64_t needs);
-/// The plugins, by ascending name, that can take problems with these needs and work without being named by the user.
-[[nodiscard]] std::vector<std::string> unnamed(const Registry& registry, std::uint64_t needs);
+[[nodiscard]] DELASSUS_API AutoChoice auto_choice(const Registry& registry, OptionTexts options, std::uint64_t needs,
+                                                  Origin origin);
 
 }  // namespace delassus

@@ -27,7 +27,7 @@ public:
     [[nodiscard]] const PluginInfo& info() const override { return main_.info(); }
     [[nodiscard]] const OptionTexts& options() const override { return chosen_; }
 
-    [[nodiscard]] std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) override {
+    [[nodiscard]] std::string refusal(const Prepared& problem, const SolveSettings& settings) override {
         if (std::string sentence = main_.refusal(problem, settings); !sentence.empty()) return sentence;
         SolveSettings warm = settings;
         warm.warm_start = true;
@@ -39,7 +39,7 @@ public:
         return sum += counts_of(finish_);
     }
 
-    std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+    std::optional<Errors> run(const Prepared& problem, Solution& solution, const SolveSettings& settings,
                               SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);
         const auto done = [&](Solver& solver, const Stage& stage) {

@@ -8,19 +8,9 @@
 
 namespace delassus {
 
-/// What rounding alone may contribute to Errors::balance at this (x, λ): ε ‖|H||x| + |D|ᵀ|λ| + |a|‖ over the divisor of
-/// the balance, with the unit roundoff ε. With a stiff H, ‖|H||x|‖ is far above ‖Hx‖, and x rounded to double cannot
-/// balance better. `reactions` is the part of |D|ᵀ|λ|: what reactions that cancel one another leave.
-struct RoundingOfBalance {
-    double all = 0.0, reactions = 0.0;
-};
-
 /// The greatest of the natural error, its lower bound `dual`, which counts where reactions are so large that they
 /// swallow velocities, and the balance; infinite where any measure is not finite, so that nothing is known.
 [[nodiscard]] DELASSUS_API double worst_of(const Errors& error);
-
-/// Of a problem as a whole. Zero where it has no H, and where nothing moves.
-[[nodiscard]] DELASSUS_API RoundingOfBalance rounding_of_balance(const Problem& problem, const Solution& solution);
 
 /// For a problem whose errors cannot be measured (ErrorMeter::reference is NaN): what it ends with, and no solver is
 /// asked.

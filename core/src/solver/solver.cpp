@@ -7,10 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <span>
 
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
-#include "problem/cone_kinds.hpp"
+#include "delassus/sdk/cones.hpp"
 #include "solver/judgement.hpp"
 #include "solver/solver_implementation.hpp"
 #include "support/finite.hpp"
@@ -41,15 +42,14 @@ std::string_view name_of(Status status) {
     return "error";
 }
 
-std::string quoted_name(const PreparedProblem& problem) {
-    const std::string& name = problem.problem().name;
-    return name.empty() ? "the problem" : fmt::format("\"{}\"", name);
+std::string quoted_name(const Prepared& problem) {
+    return problem.name().empty() ? "the problem" : fmt::format("\"{}\"", problem.name());
 }
 
-std::uint64_t needs_of(const PreparedProblem& problem, const SolveSettings& settings) {
+std::uint64_t needs_of(const Prepared& problem, const SolveSettings& settings) {
     std::uint64_t needs = problem.needs();
     if (settings.warm_start) needs |= DELASSUS_CAN_WARM_START;
-    if (process_count() > 1) needs |= DELASSUS_CAN_DISTRIBUTED;
+    if (problem.whole() && process_count() > 1) needs |= DELASSUS_CAN_DISTRIBUTED;
     return needs;
 }
 
@@ -71,37 +71,41 @@ const PluginInfo& Solver::info() const {
     return implementation_->info();
 }
 
-std::string Solver::refusal(const PreparedProblem& problem, const SolveSettings& settings) const {
+std::string Solver::refusal(const Prepared& problem, const SolveSettings& settings) const {
     return implementation_->refusal(problem, settings);
 }
 
-SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings) {
+SolveReport Solver::solve(const Prepared& problem, Solution& solution, const SolveSettings& settings) {
     check_settings(settings);
     if (const std::string sentence = refusal(problem, settings); !sentence.empty()) throw Unsupported(sentence);
 
-    const auto n = static_cast<std::size_t>(problem.problem().n());
-    const auto m = static_cast<std::size_t>(problem.problem().m());
-    if (settings.warm_start) {
+    const Communicator& run = problem.communicator();
+    const std::size_t n = problem.a().size(), m = problem.b().size();
+    const auto check_start = [&] {
         if (solution.x.size() != n || solution.lambda.size() != m)
-            throw InputError(fmt::format("the warm start has {} and {} entries; the problem has n = {} and m = {}",
-                                         solution.x.size(), solution.lambda.size(), n, m));
+            throw InputError(fmt::format("the warm start has {} and {} entries; the {} has n = {} and m = {}",
+                                         solution.x.size(), solution.lambda.size(),
+                                         problem.whole() ? "problem" : "part", n, m));
         if (!all_finite(solution.x) || !all_finite(solution.lambda))
             throw InputError("the warm start holds a value that is not finite");
+    };
+    if (settings.warm_start) {
+        together(run, std::ref(check_start));  // a std::function that allocates nothing
     } else {
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
     }
 
     SolveReport report;
-    report.problem = problem.problem().name;
+    report.problem = problem.name();
     report.solver = info().name;
     report.version = info().version;
     report.options = implementation_->options();
-    report.law = problem.problem().law;
-    report.tolerance = settings.tolerance;
-    if (std::isnan(problem.meter().reference())) {
+    report.law = problem.law();
+    report.tolerance = settings.told_tolerance();
+    if (std::isnan(problem.reference())) {
         refuse_to_judge(report);
-        report.error = problem.meter().measure(solution.x, solution.lambda);
+        report.error = problem.measure(solution.x, solution.lambda);
         return report;
     }
     const std::optional<Errors> measured = implementation_->run(problem, solution, settings, report);
@@ -109,19 +113,19 @@ SolveReport Solver::solve(const PreparedProblem& problem, Solution& solution, co
     report.analyses = counts.analyses;
     report.factorizations = counts.factorizations;
 
-    if (!measured && (!all_finite(solution.x) || !all_finite(solution.lambda))) {
+    double broken = measured || (all_finite(solution.x) && all_finite(solution.lambda)) ? 0.0 : 1.0;
+    run.max(std::span(&broken, 1));
+    if (broken > 0.0) {
         report.status = Status::NumericalFailure;
         report.message =
             fmt::format("{} returned values that are not finite; they were replaced by zeros", info().name);
         solution.x.assign(n, 0.0);
         solution.lambda.assign(m, 0.0);
     }
-    report.error = measured ? *measured : problem.meter().measure(solution.x, solution.lambda);
-    const auto& cones = problem.problem().cones;
-    const bool only_cones =
-        std::all_of(cones.begin(), cones.end(), [](const Cone& cone) { return operations_of(cone).is_cone; });
-    const auto rounding = [&] { return rounding_of_balance(problem.problem(), solution); };
-    judge(report, only_cones, std::ref(rounding));  // a std::function that allocates nothing
+    report.error = measured ? *measured : problem.measure(solution.x, solution.lambda);
+    constexpr std::uint64_t no_cones = sdk::cones_that([](const sdk::ConeOperations& row) { return !row.is_cone; });
+    const auto rounding = [&] { return problem.rounding_of_balance(solution); };
+    judge(report, (problem.needs() & no_cones) == 0, std::ref(rounding));
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
     return report;
 }

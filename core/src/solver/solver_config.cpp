@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <limits>
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
@@ -21,7 +20,7 @@ SolveSettings SolverConfig::settings() const {
     settings.team = ThreadTeam::for_threads(threads);
     if (sweeps) {
         settings.max_iterations = *sweeps;
-        settings.tolerance = std::numeric_limits<double>::min();
+        settings.fixed_iterations = true;
     }
     return settings;
 }
@@ -101,6 +100,12 @@ Solver make_solver(const Registry& registry, const SolverConfig& config) {
     if (finish.solver.empty()) return main;
     const SolverConfig last = parse_solver(finish.solver);
     return make_finished(std::move(main), make_one(last.name, last.options), finish.tolerance, config.options);
+}
+
+Solver make_solver(const Registry& registry, const SolverConfig& config, const Communicator& run) {
+    std::optional<Solver> solver;
+    together(run, [&] { solver = make_solver(registry, config); });
+    return std::move(*solver);
 }
 
 }  // namespace delassus

@@ -31,12 +31,12 @@ public:
     /// The options that were chosen.
     [[nodiscard]] virtual const OptionTexts& options() const = 0;
     /// See Solver::refusal.
-    [[nodiscard]] virtual std::string refusal(const PreparedProblem& problem, const SolveSettings& settings) = 0;
+    [[nodiscard]] virtual std::string refusal(const Prepared& problem, const SolveSettings& settings) = 0;
     /// Of all solves so far. Solver::solve writes it into the report.
     [[nodiscard]] virtual SetUpCounts counts() const = 0;
     /// Solves; fills the report's status, message, iterations, times, curve and stages. Returns the errors of the
     /// result if they have been measured; the result is then finite.
-    virtual std::optional<Errors> run(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+    virtual std::optional<Errors> run(const Prepared& problem, Solution& solution, const SolveSettings& settings,
                                       SolveReport& report) = 0;
 
 protected:
@@ -45,10 +45,10 @@ protected:
 };
 
 /// "\"pile\"", or "the problem" if it has no name.
-[[nodiscard]] std::string quoted_name(const PreparedProblem& problem);
+[[nodiscard]] std::string quoted_name(const Prepared& problem);
 
 /// What a solver must be able to do for this problem and these settings: DELASSUS_CAN_* bits.
-[[nodiscard]] std::uint64_t needs_of(const PreparedProblem& problem, const SolveSettings& settings);
+[[nodiscard]] std::uint64_t needs_of(const Prepared& problem, const SolveSettings& settings);
 
 /// ". Can: a, b" or ". No installed solver can", for the end of a refusal.
 [[nodiscard]] std::string who_can(const Registry& registry, std::uint64_t needs);

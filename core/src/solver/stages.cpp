@@ -46,12 +46,24 @@ bool Forecast::in_reach(std::int64_t iteration, double natural, double first, do
     return false;
 }
 
-StageRunner::StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings,
+namespace {
+
+/// What one stage does not tell, the sum does not know.
+void add_cost(SolveCost& total, const SolveCost& stage) {
+    total.setup += stage.setup;
+    total.solve += stage.solve;
+    for (std::size_t k = 0; k < total.phases.size(); ++k) total.phases[k] += stage.phases[k];
+    total.bytes_sent = total.bytes_sent < 0 || stage.bytes_sent < 0 ? -1 : total.bytes_sent + stage.bytes_sent;
+}
+
+}  // namespace
+
+StageRunner::StageRunner(const Prepared& problem, Solution& solution, const SolveSettings& settings,
                          SolveReport& report)
     : problem_(problem), best_(solution), settings_(settings), report_(report), started_(settings.warm_start) {}
 
 const Errors& StageRunner::measured_error() {
-    if (!error_) error_ = problem_.meter().measure(best_.x, best_.lambda);
+    if (!error_) error_ = problem_.measure(best_.x, best_.lambda);
     return *error_;
 }
 
@@ -64,8 +76,8 @@ bool StageRunner::solved_at_start() {
         // the two counts: at rest either alone lets rounding grow from step to step.
         constexpr double near = 100.0;
         std::vector<double> x;
-        problem_.meter().velocity_of(best_.lambda, x);
-        worst_ = problem_.meter().natural(x.data(), best_.lambda.data());
+        problem_.velocity_of(best_.lambda, x);
+        worst_ = problem_.natural(x.data(), best_.lambda.data());
         const bool given = worst_ <= near * settings_.tolerance && worst_of(measured_error()) <= worst_;
         if (!given) {
             best_.x = std::move(x);
@@ -84,28 +96,27 @@ double StageRunner::worst() {
     return started_ ? worst_ : std::numeric_limits<double>::infinity();
 }
 
-const PreparedProblem& StageRunner::problem_of(std::optional<Law> law) {
-    if (!law || *law == problem_.problem().law) return problem_;
-    if (!other_) other_ = problem_.with_law(*law);
-    return *other_;
+const Prepared* StageRunner::problem_of(std::optional<Law> law) {
+    if (!law || *law == problem_.law()) return &problem_;
+    if (!other_) other_ = problem_.under(*law);
+    return other_.get();
 }
 
 TurnResult StageRunner::run(Solver& solver, const Stage& stage) {
-    Solution iterate = started_ ? best_ : Solution{};
-    return run(solver, stage, iterate);
+    Solution iterate = best_;
+    return run(solver, stage, iterate, started_);
 }
 
-TurnResult StageRunner::run(Solver& solver, const Stage& stage, Solution& iterate) {
-    const PreparedProblem& problem = problem_of(stage.law);
+TurnResult StageRunner::run(Solver& solver, const Stage& stage, Solution& iterate, bool is_start) {
+    const Prepared& problem = *problem_of(stage.law);
     const bool other_law = &problem != &problem_;
-    const bool warm =
-        (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0 && (!iterate.x.empty() || !iterate.lambda.empty());
+    const bool warm = is_start && (solver.info().capabilities & DELASSUS_CAN_WARM_START) != 0;
     const double tolerance = std::max(stage.tolerance, settings_.tolerance);
     Forecast forecast(tolerance, stage.iterations);
     Forecast::Verdict verdict = Forecast::Verdict::GoOn;
     const SolveReport result = solver.solve(problem, iterate, settings_of(stage, problem, warm, forecast, verdict));
 
-    const Errors error = other_law ? problem_.meter().measure(iterate.x, iterate.lambda) : result.error;
+    const Errors error = other_law ? problem_.measure(iterate.x, iterate.lambda) : result.error;
     // Where momenta cancel, rounding alone may leave a large balance error, which is excused where all else is solved.
     const bool solved = result.status == Status::Solved && tolerance == settings_.tolerance && !other_law;
     if (!started_ || worst_of(error) < worst() || solved) {
@@ -115,7 +126,7 @@ TurnResult StageRunner::run(Solver& solver, const Stage& stage, Solution& iterat
         started_ = true;
     }
     const Status status = verdict == Forecast::Verdict::Exhausted ? Status::IterationLimit : result.status;
-    add({result.solver, result.options, problem.problem().law, stage.reason, tolerance, status, result.message,
+    add({result.solver, result.options, problem.law(), stage.reason, tolerance, status, result.message,
          result.iterations, result.seconds_setup + result.seconds_solve, error.natural},
         result);
     return {end_of(status, verdict, other_law, solved, worst_of(error)), worst_of(error), result.iterations};
@@ -141,8 +152,8 @@ TurnEnd StageRunner::end_of(Status status, Forecast::Verdict verdict, bool other
     return verdict == Forecast::Verdict::Pass ? TurnEnd::Passed : TurnEnd::Ended;
 }
 
-SolveSettings StageRunner::settings_of(const Stage& stage, const PreparedProblem& problem, bool warm,
-                                       Forecast& forecast, Forecast::Verdict& verdict) const {
+SolveSettings StageRunner::settings_of(const Stage& stage, const Prepared& problem, bool warm, Forecast& forecast,
+                                       Forecast::Verdict& verdict) const {
     SolveSettings settings = settings_;
     settings.tolerance = stage.tighter * std::max(stage.tolerance, settings_.tolerance);
     settings.max_iterations = settings_.max_iterations - report_.iterations;
@@ -168,7 +179,7 @@ SolveSettings StageRunner::settings_of(const Stage& stage, const PreparedProblem
                                                           const double* lambda) {
             if (verdict != Forecast::Verdict::GoOn) return true;
             if (forecast.due(iteration)) {
-                verdict = forecast.judge(iteration, problem.meter().natural(x, lambda));
+                verdict = forecast.judge(iteration, problem.natural(x, lambda));
                 if (verdict == Forecast::Verdict::Pass && !may_pass) verdict = Forecast::Verdict::GoOn;
             }
             return verdict != Forecast::Verdict::GoOn;
@@ -191,6 +202,7 @@ void StageRunner::add(const StageReport& stage, const SolveReport& result) {
     report_.seconds_setup += result.seconds_setup;
     report_.seconds_solve += result.seconds_solve;
     report_.claimed_residual = result.claimed_residual;
+    report_.stages.empty() ? void(report_.cost = result.cost) : add_cost(report_.cost, result.cost);
     report_.stages.push_back(stage);
 }
 
@@ -199,7 +211,7 @@ std::string StageRunner::sentence() const {
     for (const auto& stage : report_.stages) {
         if (!text.empty()) text += ", ";
         text += fmt::format("{} ({}{} iterations, {:.1e}{})", stage.solver,
-                            stage.law == problem_.problem().law ? "" : fmt::format("{}, ", name_of(stage.law)),
+                            stage.law == problem_.law() ? "" : fmt::format("{}, ", name_of(stage.law)),
                             stage.iterations, stage.natural,
                             stage.status == Status::Solved ? "" : fmt::format(", {}", name_of(stage.status)));
     }

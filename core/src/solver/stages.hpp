@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -61,14 +62,15 @@ private:
 class StageRunner {
 public:
     /// solution: the start if settings.warm_start; the best so far at any time. All must outlive the runner.
-    StageRunner(const PreparedProblem& problem, Solution& solution, const SolveSettings& settings, SolveReport& report);
+    StageRunner(const Prepared& problem, Solution& solution, const SolveSettings& settings, SolveReport& report);
 
-    /// The problem that a stage with this law solves: the problem itself, or a copy under the other law, made once.
-    [[nodiscard]] const PreparedProblem& problem_of(std::optional<Law> law);
+    /// The problem that a stage with this law solves: the problem itself, or a copy under the other law, made once;
+    /// null where there is no copy (Prepared::under).
+    [[nodiscard]] const Prepared* problem_of(std::optional<Law> law);
 
-    /// Runs one stage from the iterate, if it is not empty and the solver can begin there, and leaves there what the
-    /// stage came to.
-    TurnResult run(Solver& solver, const Stage& stage, Solution& iterate);
+    /// Runs one stage, whose law has a problem, from the iterate, if it is a start and the solver can begin there, and
+    /// leaves there what the stage came to.
+    TurnResult run(Solver& solver, const Stage& stage, Solution& iterate, bool is_start);
     /// The same from the best so far.
     TurnResult run(Solver& solver, const Stage& stage);
 
@@ -85,15 +87,15 @@ public:
     [[nodiscard]] std::string sentence() const;
 
 private:
-    [[nodiscard]] SolveSettings settings_of(const Stage& stage, const PreparedProblem& problem, bool warm,
-                                            Forecast& forecast, Forecast::Verdict& verdict) const;
+    [[nodiscard]] SolveSettings settings_of(const Stage& stage, const Prepared& problem, bool warm, Forecast& forecast,
+                                            Forecast::Verdict& verdict) const;
     /// How the stage ended, whose iterate has this error.
     [[nodiscard]] TurnEnd end_of(Status status, Forecast::Verdict verdict, bool other_law, bool solved, double error);
     void add(const StageReport& stage, const SolveReport& result);
     const Errors& measured_error();
 
-    const PreparedProblem& problem_;
-    std::optional<PreparedProblem> other_;  // problem_ under the other law
+    const Prepared& problem_;
+    std::unique_ptr<Prepared> other_;  // problem_ under the other law
     Solution& best_;
     const SolveSettings& settings_;
     SolveReport& report_;

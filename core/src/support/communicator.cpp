@@ -5,8 +5,8 @@
 
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
-#include "partitioned/mpi_module.hpp"
 #include "support/module.hpp"
+#include "support/mpi_module.hpp"
 #include "support/sentence.hpp"
 
 namespace delassus {
@@ -50,6 +50,7 @@ std::shared_ptr<const Communicator> communicator_of_run() {
 }
 
 void together(const Communicator& communicator, const std::function<void()>& body) {
+    if (communicator.size() == 1) return body();
     std::string sentence;
     bool failed = false;
     try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "partitioned/alone.hpp"
+#include "support/alone.hpp"
 
 #include <fmt/format.h>
 
