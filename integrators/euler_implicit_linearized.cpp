@@ -2,11 +2,11 @@
 // The linearised implicit Euler method for differential variational inequalities (seed eq. 123, 148): one linear or
 // cone problem a step, contacts and impacts included. Order 1.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
 #include "delassus/timestepper.hpp"
+#include "dynamics/gap_resolution.hpp"
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
@@ -40,11 +40,7 @@ namespace {
 //
 //     u = D v⁺ + Φ/h + Φ_t ≥ 0,      recovering a penetration (Φ < 0) with at most the speed η_s (seed footnote 5)
 //
-// and |Φ| taken less by the resolution of gaps: what a solver leaves of the velocities adds up in the gaps, and as Φ/h
-// it would come back as a motion, so that nothing came to rest. A natural error ε is one of velocities relative to
-// those without reactions, which at rest are h g: a step leaves some ε g h² in the gaps, and in a wall of bricks ten to
-// twenty times that. So the resolution is 20 ε g h², where ε is the largest natural error, up to 10⁻², that any step
-// has left in the bodies of the contact, and at least what the system gives.
+// and |Φ| taken less by the resolution of gaps (dynamics/gap_resolution.hpp).
 //
 // Rows with a compliance c (of a servo with limits) have u = D v⁺ + Φ_t + c λ/h, λ/h being the force: E = c/h.
 //
@@ -66,8 +62,7 @@ public:
         : system_(system),
           recovery_speed_(values[0].real < 0.0 ? system.recovery_speed() : values[0].real),
           restitution_speed_(values[1].real),
-          gap_resolution_(system.gap_resolution()),
-          free_fall_(system.free_fall()),
+          resolution_(system),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
           linearization_(system, values[4].real),
@@ -85,8 +80,8 @@ public:
         kept_.clear();
         last_h_ = 0.0;
         error_.forget();
+        resolution_.forget();
         left_.clear();
-        left_now_.clear();
     }
 
     // h; the errors of the last steps' velocities and the errors that solves left; the multipliers.
@@ -94,8 +89,8 @@ public:
         StepMemory memory;
         memory.numbers = {last_h_};
         for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
+        memory.of_columns.push_back(resolution_.left());
         memory.of_columns.push_back(left_);
-        memory.of_columns.push_back(left_now_);
         memory.of_rows = {multipliers_};
         memory.impulses = kept_;
         return memory;
@@ -103,11 +98,9 @@ public:
     void set_memory(StepMemory&& memory) override {
         restart();
         last_h_ = memory.numbers.at(0);
-        std::array<std::vector<double>, StepError::kept> errors;
-        for (std::size_t k = 0; k < errors.size(); ++k) errors[k] = std::move(memory.of_columns.at(k));
-        error_.load(std::move(errors));
-        left_ = std::move(memory.of_columns.at(StepError::kept));
-        left_now_ = std::move(memory.of_columns.at(StepError::kept + 1));
+        error_.load(std::span(memory.of_columns).first(error_.kept()));
+        resolution_.load(std::move(memory.of_columns.at(error_.kept())));
+        left_ = std::move(memory.of_columns.at(error_.kept() + 1));
         multipliers_ = std::move(memory.of_rows.at(0));
         kept_ = std::move(memory.impulses);
     }
@@ -160,15 +153,13 @@ private:
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
     std::span<const double> estimated_error(const State& state) {
         if (follows_sliding_) return {};
-        error_.note(state.v, left_now_);
+        error_.note(state.v, left_);
         return error_.known();
     }
 
     void note_left(const StepAnswer& answer) {
-        left_now_.assign(answer.left_in_masses.begin(), answer.left_in_masses.end());
-        left_.resize(answer.left.size());
-        std::ranges::transform(left_, answer.left, left_.begin(),
-                               [](double before, double now) { return std::max(before, now); });
+        left_.assign(answer.left_in_masses.begin(), answer.left_in_masses.end());
+        resolution_.note(answer.left);
     }
 
     // H and a are looked at once more where the linearisation is judged or contacts slide; else the problem changes
@@ -316,12 +307,10 @@ private:
 
     /// Of the gap of a contact whose row of the problem this is.
     [[nodiscard]] double gap_resolution(std::int32_t row, double h) const {
-        constexpr double share = 20.0, most = 1e-2;
-        if (left_.empty() || free_fall_ == 0.0) return gap_resolution_;
-        const SparseMatrix& D = problem_.D;
-        double error = 0.0;
-        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) error = std::max(error, left_[D.column[e]]);
-        return std::max(gap_resolution_, share * std::min(error, most) * free_fall_ * h * h);
+        const auto first = problem_.D.row_start[row], last = problem_.D.row_start[row + 1];
+        return resolution_.of(std::span(problem_.D.column)
+                                  .subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first)),
+                              h);
     }
 
     // One walk over the blocks collects their cones, b, their impulses of the last step as a start, and what is needed
@@ -355,7 +344,7 @@ private:
             const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
             for (std::int32_t i = 0; i < block.cone.rows; ++i) {
                 const auto& [gap, rate] = rows_.rows()[row + i];
-                const double resolution = contact && i == 0 ? gap_resolution(m_ + row, h) : gap_resolution_;
+                const double resolution = contact && i == 0 ? gap_resolution(m_ + row, h) : resolution_.least();
                 const double resolved = gap - std::clamp(gap, -resolution, resolution);
                 problem_.b[m_ + row + i] = rate + std::max(resolved / h, -recovery_speed_);
             }
@@ -440,7 +429,8 @@ private:
     }
 
     DynamicalSystem& system_;
-    double recovery_speed_, restitution_speed_, gap_resolution_, free_fall_;
+    double recovery_speed_, restitution_speed_;
+    GapResolution resolution_;
     bool exact_;
     bool constraint_stiffness_;
     Linearization linearization_;
@@ -449,9 +439,8 @@ private:
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
     std::vector<double> delta_, impulse_, force_;
-    StepError error_;
-    std::vector<double> left_;  ///< largest natural error that a step left in the part of each velocity, n, or empty
-    std::vector<double> left_now_;  ///< what the last solve left, in the norm of the masses, n, or empty
+    StepError error_{1};
+    std::vector<double> left_;  ///< what the last solve left, in the norm of the masses, n, or empty
     double last_h_ = 0.0;
     KeptImpulses kept_;
     bool coulomb_ = false;                 // the law that the solver was told

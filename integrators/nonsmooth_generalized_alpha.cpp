@@ -59,7 +59,7 @@ public:
         std::vector<double> memory = {static_cast<double>(smooth.size())};
         memory.insert(memory.end(), smooth.begin(), smooth.end());
         for (const Vector& load : loads_) memory.insert(memory.end(), load.begin(), load.end());
-        contacts_.append_to(memory);
+        contacts_.kept().append_to(memory);
         return memory;
     }
     void load(const std::vector<double>& memory) override {
@@ -79,7 +79,9 @@ public:
             load = Eigen::Map<const Vector>(rest.data(), n_);
             rest = rest.subspan(static_cast<std::size_t>(n_));
         }
-        contacts_.load(rest);
+        KeptImpulses impulses;
+        impulses.load(rest);
+        contacts_.keep(std::move(impulses));
     }
 
 private:

@@ -7,57 +7,71 @@
 
 namespace delassus {
 
-// The error of a step of implicit Euler in the velocities, ½ h² v̈, is about half of the second difference of the
-// velocities: what the last steps show of it is taken for this one. A single impact shows in two differences, and the
-// steps after it are smooth: so the least of three counts, which is 0 in the first steps.
+// The error of a step in the velocities is, to leading order, ½ h² v̈ for implicit Euler and h³ v‴/12 for the
+// trapezoidal rule. That is ½ of their second difference, or 1/12 of their third: what the last steps show of it is
+// taken for this one. A single impact shows in p + 1 differences of order p + 1, and the steps after it are smooth: so
+// the least of p + 2 counts, which is 0 in the first steps.
 //
-// Solves that leave the errors ε₀, ε₁, ε₂ in the last three velocities leave ½(ε₀ − 2 ε₁ + ε₂) in that half difference.
-// They have nothing to do with one another, so that their squares add up: ¼(|ε₀|² + 4 |ε₁|² + |ε₂|²). If that were
-// taken for the method's error, one solve that ends far above its tolerance would loosen the tolerances of the next,
-// and so on.
+// Solves that leave the errors ε₀, ε₁, … in the last velocities leave Σ c_i ε_i in that difference, with the
+// coefficients c_i = ±1, ∓2, ±1 or ±1, ∓3, ±3, ∓1. They have nothing to do with one another, so that their squares add
+// up. If that were taken for the method's error, one solve that ends far above its tolerance would loosen the
+// tolerances of the next, and so on.
+StepError::StepError(int order)
+    : constant_(order == 1 ? 0.5 : 1.0 / 12.0),
+      coefficients_(order == 1 ? std::vector{1.0, 4.0, 1.0} : std::vector{1.0, 9.0, 9.0, 1.0}),
+      differences_(static_cast<std::size_t>(order)),
+      jumps_(static_cast<std::size_t>(order) + 2),
+      left_(static_cast<std::size_t>(order) + 2) {}
+
 void StepError::note(const std::vector<double>& v, std::span<const double> left) {
     const std::size_t n = v.size();
-    const auto all = {&change_, &jumps_[0], &jumps_[1], &jumps_[2], &left_[0], &left_[1], &left_[2], &error_, &noise_};
     if (before_.empty()) {
         before_ = v;
-        for (auto* part : all) part->assign(n, 0.0);
+        for (auto* list : {&differences_, &jumps_, &left_})
+            for (auto& part : *list) part.assign(n, 0.0);
+        error_.assign(n, 0.0);
+        noise_.assign(n, 0.0);
         return;
     }
-    for (auto* last : {&jumps_, &left_}) {
-        (*last)[2].swap((*last)[1]);
-        (*last)[1].swap((*last)[0]);
-    }
+    for (auto* list : {&jumps_, &left_}) std::rotate(list->begin(), list->end() - 1, list->end());
     for (std::size_t i = 0; i < n; ++i) {
-        const double change = v[i] - before_[i];
-        jumps_[0][i] = 0.5 * std::abs(change - change_[i]);
-        change_[i] = change;
-        error_[i] = std::min({jumps_[0][i], jumps_[1][i], jumps_[2][i]});
+        double difference = v[i] - before_[i];
+        for (auto& last : differences_) difference -= std::exchange(last[i], difference);
+        jumps_[0][i] = constant_ * std::abs(difference);
         left_[0][i] = left.empty() ? 0.0 : left[i];
-        noise_[i] = 0.5 * std::hypot(left_[0][i], 2.0 * left_[1][i], left_[2][i]);
+        double least = jumps_[0][i], squares = 0.0;
+        for (const auto& jump : jumps_) least = std::min(least, jump[i]);
+        for (std::size_t k = 0; k < coefficients_.size(); ++k) squares += coefficients_[k] * left_[k][i] * left_[k][i];
+        error_[i] = least;
+        noise_[i] = constant_ * std::sqrt(squares);
     }
     before_ = v;
 }
 
 void StepError::forget() {
-    for (auto* part :
-         {&before_, &change_, &jumps_[0], &jumps_[1], &jumps_[2], &left_[0], &left_[1], &left_[2], &error_, &noise_})
-        part->clear();
+    for (auto* list : {&differences_, &jumps_, &left_})
+        for (auto& part : *list) part.clear();
+    for (auto* part : {&before_, &error_, &noise_}) part->clear();
 }
 
-std::array<std::vector<double>, StepError::kept> StepError::save() const {
-    return {before_, change_, jumps_[0], jumps_[1], left_[0], left_[1], left_[2]};
+std::vector<std::vector<double>> StepError::save() const {
+    std::vector<std::vector<double>> memory = {before_};
+    memory.insert(memory.end(), differences_.begin(), differences_.end());
+    memory.insert(memory.end(), jumps_.begin(), jumps_.end() - 1);
+    memory.insert(memory.end(), left_.begin(), left_.end());
+    return memory;
 }
 
-void StepError::load(std::array<std::vector<double>, kept> memory) {
+void StepError::load(std::span<std::vector<double>> memory) {
     forget();
     const std::size_t n = memory[0].size();
     if (n == 0) return;
-    before_ = std::move(memory[0]);
-    change_ = std::move(memory[1]);
-    jumps_[0] = std::move(memory[2]);
-    jumps_[1] = std::move(memory[3]);
-    for (std::size_t k = 0; k < 3; ++k) left_[k] = std::move(memory[4 + k]);
-    jumps_[2].assign(n, 0.0);
+    auto next = memory.begin();
+    before_ = std::move(*next++);
+    for (auto& part : differences_) part = std::move(*next++);
+    for (std::size_t k = 0; k + 1 < jumps_.size(); ++k) jumps_[k] = std::move(*next++);
+    for (auto& part : left_) part = std::move(*next++);
+    jumps_.back().assign(n, 0.0);
     error_.assign(n, 0.0);
     noise_.assign(n, 0.0);
 }

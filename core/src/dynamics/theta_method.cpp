@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "dynamics/memory.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -40,47 +39,54 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
       projection_(system),
       cones_(free_cones(system)),
       n_(system.n()),
-      m_(system.m()) {}
+      m_(system.m()),
+      error_(order()) {}
 
 void ThetaMethod::restart() {
     multipliers_.clear();
     contacts_.restart();
     for (auto& change : changes_) change.clear();
+    error_.forget();
+    left_.clear();
     last_h_ = 0.0;
 }
 
-// h, whether there are multipliers, how many changes, all of these, and the impulses of unilateral blocks.
-std::vector<double> ThetaMethod::save() const {
-    double known = 0.0;
-    for (const auto& change : changes_) known += change.empty() ? 0.0 : 1.0;
-    std::vector<double> memory = {last_h_, multipliers_.empty() ? 0.0 : 1.0, known};
-    memory.insert(memory.end(), multipliers_.begin(), multipliers_.end());
-    for (const auto& change : changes_) memory.insert(memory.end(), change.begin(), change.end());
-    contacts_.append_to(memory);
+// h; the changes of the last steps, their errors and what the last solve left; the multipliers.
+StepMemory ThetaMethod::memory() const {
+    StepMemory memory;
+    memory.numbers = {last_h_};
+    memory.of_columns.assign(changes_.begin(), changes_.end());
+    for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
+    memory.of_columns.push_back(left_);
+    memory.of_columns.push_back(contacts_.resolution().left());
+    memory.of_rows = {multipliers_};
+    memory.impulses = contacts_.kept();
     return memory;
 }
 
-void ThetaMethod::load(const std::vector<double>& memory) {
+void ThetaMethod::set_memory(StepMemory&& memory) {
     restart();
-    std::span<const double> rest = memory;
-    const auto take = [&](std::size_t count) { return take_from(rest, count, settings_.name); };
-    const auto head = take(3);
-    last_h_ = head[0];
-    if (head[1] != 0.0) {
-        const auto multipliers = take(static_cast<std::size_t>(m_));
-        multipliers_.assign(multipliers.begin(), multipliers.end());
-    }
-    double known = head[2];
-    for (auto& change : changes_)
-        if (known-- > 0.0) {
-            const auto values = take(static_cast<std::size_t>(n_));
-            change.assign(values.begin(), values.end());
-        }
-    contacts_.load(rest);
+    last_h_ = memory.numbers.at(0);
+    for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] = std::move(memory.of_columns.at(k));
+    error_.load(std::span(memory.of_columns).subspan(changes_.size(), error_.kept()));
+    left_ = std::move(memory.of_columns.at(changes_.size() + error_.kept()));
+    contacts_.resolution().load(std::move(memory.of_columns.at(changes_.size() + error_.kept() + 1)));
+    multipliers_ = std::move(memory.of_rows.at(0));
+    contacts_.keep(std::move(memory.impulses));
+}
+
+std::vector<double> ThetaMethod::save() const {
+    return flat(memory());
+}
+
+void ThetaMethod::load(const std::vector<double>& memory) {
+    set_memory(unflattened(memory, this->memory(), static_cast<std::size_t>(n_), static_cast<std::size_t>(m_),
+                           settings_.name));
 }
 
 void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepReport& report) {
     require_step(system_, state, h, settings_.name);
+    note_error(state, h);
     find_spins(state, h);
     if (settings_.linearly_implicit) extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
@@ -349,7 +355,20 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
 
 bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
     ++report.newton_iterations;
-    return report.take(solver.solve(problem_, solution_, {.warm_start = true}));
+    const StepAnswer answer = solver.solve(problem_, solution_, request_);
+    left_.assign(answer.left_in_masses.begin(), answer.left_in_masses.end());
+    if (settings_.linearly_implicit) contacts_.resolution().note(answer.left);
+    return report.take(answer);
+}
+
+// What the last steps of this size show. Where steps are chosen by their error, the solver must not disturb it.
+void ThetaMethod::note_error(const State& begin, double h) {
+    request_ = {.warm_start = true};
+    if (chooses_steps_) return;
+    if (h != last_h_) error_.forget();
+    error_.note(begin.v, left_);
+    request_.method_error = error_.known();
+    request_.error_of_solves = error_.of_solver();
 }
 
 // The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).

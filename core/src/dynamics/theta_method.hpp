@@ -12,6 +12,8 @@
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/position_projection.hpp"
+#include "dynamics/step_error.hpp"
+#include "dynamics/step_memory.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 
@@ -35,7 +37,10 @@ public:
     ThetaMethod(DynamicalSystem& system, ThetaSettings settings);
 
     [[nodiscard]] int order() const override { return settings_.theta == 0.5 ? 2 : 1; }
+    void choose_steps(double /*tolerance*/) override { chooses_steps_ = true; }
     void restart() override;
+    [[nodiscard]] StepMemory memory() const override;
+    void set_memory(StepMemory&& memory) override;
     [[nodiscard]] std::vector<double> save() const override;
     void load(const std::vector<double>& memory) override;
 
@@ -56,6 +61,7 @@ private:
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
+    void note_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
     void judge_constraints(const State& begin, double h);
     void judge_linearization(const State& begin, double h, const Vector& result, StepReport& report);
@@ -71,6 +77,10 @@ private:
     std::vector<Cone> cones_;
     std::int32_t n_, m_;
     double last_h_ = 0.0;
+    StepError error_;
+    StepRequest request_{.warm_start = true};
+    std::vector<double> left_;    ///< by the last solve, in the norm of the masses, n, or empty
+    bool chooses_steps_ = false;  ///< steps are chosen by their error
     MatrixAssembler H_, D_;
     Problem problem_;
     Solution solution_;

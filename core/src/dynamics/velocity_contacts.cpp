@@ -135,10 +135,7 @@ void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blo
 }
 
 VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
-    : system_(system),
-      settings_(settings),
-      gap_resolution_(system.gap_resolution()),
-      bilateral_cones_(system.constraint_blocks().size()) {}
+    : system_(system), settings_(settings), resolution_(system), bilateral_cones_(system.constraint_blocks().size()) {}
 
 void VelocityContacts::collect(const State& begin, double h, double theta) {
     h_ = h;
@@ -246,7 +243,7 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
 }
 
 void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const {
-    const double gap = contact.gap - std::clamp(contact.gap, -gap_resolution_, gap_resolution_);
+    const double gap = contact.resolved_gap();
     const double speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
     contact.normal = 0.0;
     const bool corrects = settings_.once && contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap);
@@ -303,6 +300,10 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.gap = rows_.rows()[row].gap - theta_ * h_ * block.speed;
             contact.approach = -block.speed;
         }
+        const auto entry = static_cast<std::size_t>(rows_.row_start()[row]);
+        const auto entries = static_cast<std::size_t>(rows_.row_start()[row + 1]) - entry;
+        contact.resolution =
+            point ? resolution_.of(std::span(rows_.column()).subspan(entry, entries), h_) : resolution_.least();
         if (contact.along_normal) set_normal(block, contact, block.speed);
         compliances_.push_back(block.compliance > 0.0 ? set_servo(block.key, contact) : 0.0);
         if (block.cone.kind == ConeKind::Friction && block.cone.parameters[0] > 0.0 && !coulomb)
@@ -428,7 +429,7 @@ bool VelocityContacts::only_take() {
         contact.turns = contact.bounces = false;
         contact.moved = contact.wanted = 0.0;
         contact.sliding = -1.0;
-        const double gap = contact.gap - std::clamp(contact.gap, -gap_resolution_, gap_resolution_);
+        const double gap = contact.resolved_gap();
         contact.normal = gap > 0.0 ? std::max(gap - (1.0 - theta_) * h_ * contact.approach, 0.0) / (theta_ * h_) : 0.0;
     }
     return changed;
@@ -450,7 +451,7 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
 // A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.
 void VelocityContacts::report_closing(const Contact& contact, StepReport& report) const {
     const double begin = -contact.approach, end = contact.end_speed;
-    if (!(contact.gap > 0.0) || contact.gap + 0.5 * h_ * (begin + end) >= -gap_resolution_) return;
+    if (!(contact.gap > 0.0) || contact.gap + 0.5 * h_ * (begin + end) >= -contact.resolution) return;
     const double curvature = (end - begin) / h_;
     const double root = std::sqrt(std::max(begin * begin - 2.0 * curvature * contact.gap, 0.0));
     if (root <= report.impact_speed) return;
@@ -463,7 +464,7 @@ bool VelocityContacts::landed(const Solution& solution) const {
         if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.forced())
             return false;
         const double gap = contact.gap + h_ * ((theta_ - 1.0) * contact.approach + theta_ * contact.end_speed);
-        return gap < std::min(contact.gap, 0.0) - gap_resolution_;
+        return gap < std::min(contact.gap, 0.0) - contact.resolution;
     });
 }
 

@@ -2,6 +2,7 @@
 // Contacts, stops and bounded motors on the level of velocities, for timesteppers of order 2 (internal).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -9,6 +10,7 @@
 
 #include "delassus/export.hpp"
 #include "delassus/timestepper.hpp"
+#include "dynamics/gap_resolution.hpp"
 #include "dynamics/kept_impulses.hpp"
 
 namespace delassus {
@@ -37,7 +39,10 @@ public:
     /// system outlives it.
     VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings);
 
-    void restart() { kept_.clear(); }
+    void restart() {
+        kept_.clear();
+        resolution_.forget();
+    }
 
     /// Collects the rows of a step of size h from `begin`: their gaps there, D at begin.q ∘ exp(θ h v); θ in (0, 1].
     /// Throws StepFailure if a body would go through another one before the contacts at that place are known.
@@ -76,11 +81,15 @@ public:
     [[nodiscard]] double least_gap(std::uint64_t key) const;
 
     /// Whether something penetrated at the beginning of the step, beyond the resolution of gaps.
-    [[nodiscard]] bool begins_deep() const { return deepest_ < -gap_resolution_; }
+    [[nodiscard]] bool begins_deep() const { return deepest_ < -resolution_.least(); }
+
+    /// Of gaps; told what solves leave, it counts smaller ones as closed.
+    [[nodiscard]] GapResolution& resolution() { return resolution_; }
+    [[nodiscard]] const GapResolution& resolution() const { return resolution_; }
 
     /// The impulses kept from step to step, for checkpoints.
-    void append_to(std::vector<double>& memory) const { kept_.append_to(memory); }
-    void load(std::span<const double> memory) { kept_.load(memory); }
+    [[nodiscard]] const KeptImpulses& kept() const { return kept_; }
+    void keep(KeptImpulses impulses) { kept_ = std::move(impulses); }
 
 private:
     void require_same_side(const State& begin, double h) const;
@@ -95,18 +104,19 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
-        bool known = false;      ///< it is in before_
-        bool turns = false;      ///< b has what its rows turn until the end of the step
-        double gap = 0.0;        ///< at the beginning
-        double approach = 0.0;   ///< speed with which it closes there
-        double normal = 0.0;     ///< b of the first row but for what follows from the guess
-        double friction = 0.0;   ///< of a contact with De Saxcé's term
-        double sliding = -1.0;   ///< the term; negative: not known yet
-        double moved = 0.0;      ///< by which it changed last
-        double wanted = 0.0;     ///< what it should have been before
-        double end_speed = 0.0;  ///< of the normal row
-        double change = 0.0;     ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
-        double recovery = 0.0;   ///< speed with which it is pushed apart
+        bool known = false;       ///< it is in before_
+        bool turns = false;       ///< b has what its rows turn until the end of the step
+        double gap = 0.0;         ///< at the beginning
+        double resolution = 0.0;  ///< of it
+        double approach = 0.0;    ///< speed with which it closes there
+        double normal = 0.0;      ///< b of the first row but for what follows from the guess
+        double friction = 0.0;    ///< of a contact with De Saxcé's term
+        double sliding = -1.0;    ///< the term; negative: not known yet
+        double moved = 0.0;       ///< by which it changed last
+        double wanted = 0.0;      ///< what it should have been before
+        double end_speed = 0.0;   ///< of the normal row
+        double change = 0.0;      ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        double recovery = 0.0;    ///< speed with which it is pushed apart
         const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
         bool pushed = false;                         ///< in the step before
         bool bounces = false;                        ///< b has restitution
@@ -115,6 +125,7 @@ private:
         /// due to that. Of a contact that pushes.
         [[nodiscard]] bool forced() const { return approach <= 0.25 * change; }
         [[nodiscard]] bool steady() const { return pushed && forced(); }
+        [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
@@ -126,7 +137,7 @@ private:
 
     DynamicalSystem& system_;
     VelocityContactSettings settings_;
-    double gap_resolution_;
+    GapResolution resolution_;
     std::size_t bilateral_cones_;
     double h_ = 0.0, theta_ = 0.5;
     UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken

@@ -123,11 +123,16 @@ bool can_be_in_a_tree(const SceneSystem& system, const JointParameters& joint) {
     return !row_alone && !told(joint.first) && !told(joint.second);
 }
 
+/// Why its problems have to be those of maximal coordinates; empty: others will do.
+std::string why_maximal(const SceneSystem& system) {
+    if (!system.solver.name.empty() && system.solver.name != "auto") return "the scene names a solver for its problems";
+    if (!system.leave_out) return "leave_out is false";
+    return {};
+}
+
 /// Why only the default of all systems takes it; empty: others do.
 std::string why_default(const SceneSystem& system) {
     const MultibodySystem& mechanics = *system.system;
-    if (!system.solver.name.empty() && system.solver.name != "auto") return "the scene names a solver for its problems";
-    if (!system.leave_out) return "leave_out is false";
     if (system.sleeping) return "bodies may sleep";
     if (mechanics.n() == 0) return "nothing moves";
     if (!mechanics.cables().empty()) return "it has cables, which go slack";
@@ -176,15 +181,23 @@ std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
     return fmt::format("forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
 }
 
+/// For bodies that may touch, in maximal coordinates. Between impacts a method of order 2 takes rolling, sliding and
+/// turning bodies for the price of the linearised Euler method, one problem a step, with errors smaller by orders.
+void choose_in_touch(SceneSystem& system, const std::string& reason) {
+    const std::string stiff = why_stiff(system, {most_rate_of_order_2, most_rate_of_order_2});
+    if (stiff.empty()) system.integrator = "linearly_implicit_trapezoidal";
+    system.method_reason = reason + ", and " + (stiff.empty() ? "no force is stiff" : stiff);
+}
+
 /// For a system with contacts, stops or forces with limits.
 void choose_with_unilateral(SceneSystem& system, bool in_joints) {
     const bool touching = system.system->detects_contacts();
-    if (!in_joints || (system.control && !touching)) {
-        system.method_reason = touching ? "bodies may touch" : "joints have stops, dry friction or forces with limits";
+    if (touching && (!in_joints || mostly_without_joints(system))) {
+        choose_in_touch(system, in_joints ? "bodies may touch, most of these have no joints" : "bodies may touch");
         return;
     }
-    if (touching && mostly_without_joints(system)) {
-        system.method_reason = "bodies may touch, and most of these have no joints";
+    if (!in_joints || (system.control && !touching)) {
+        system.method_reason = "joints have stops, dry friction or forces with limits";
         return;
     }
     const bool switches = touching && !system.control, flies = switches && !always_acts(system);
@@ -217,6 +230,11 @@ void choose_method(SceneSystem& system) {
     system.integrator = "euler_implicit_linearized";
     system.method_reason = why_default(system);
     if (!system.method_reason.empty()) return;
+    if (const std::string reason = why_maximal(system); !reason.empty()) {
+        system.method_reason = reason;
+        if (system.system->detects_contacts()) choose_in_touch(system, reason);
+        return;
+    }
     // Joint coordinates take rigid bodies alone, with masses of their own.
     const bool in_joints = (system.coordinates_chosen || system.coordinates == Coordinates::Joint) &&
                            system.system->node_count() == 0 && !system.system->has_consistent_mass() &&

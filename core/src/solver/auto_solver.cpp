@@ -125,11 +125,18 @@ public:
                               SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);
         const bool step = settings.origin == Origin::Step;
-        if (step && runner.solved_at_start()) return runner.error();
+        const bool at_start = step && runner.solved_at_start();
         const Order& order = order_of(problem, settings.origin);
         const Team& team = team_of(problem, order);
         const std::vector<RankedSolver>& ranked = team.ranked;
         const std::vector<Member>& members = team.members;
+        // At rest, and where nothing is known of the step, an answer far within the tolerance leaves the next steps
+        // nothing to do, if they change little. Newton's method gets there from any answer with an iteration or two.
+        constexpr double at_rest = 1e-6, sharper = 1e-3;
+        const bool sharpens = step && settings.tolerance <= at_rest && std::ranges::any_of(members, &Member::local);
+        const double sharp = sharpens ? sharper * settings.tolerance : settings.tolerance;
+        if (at_start && runner.worst() <= sharp) return runner.error();
+        bool answered = at_start;  // within the tolerance, and to be sharpened
         Solution start = solution;
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
@@ -137,6 +144,10 @@ public:
             const RankedSolver& own = ranked[turn.member];
             report.near_goal = turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work);
             if (report.near_goal) return {TurnEnd::Done, runner.worst()};
+            if (answered && !members[turn.member].local) {
+                left[turn.member] = solution;
+                return {TurnEnd::Exhausted, runner.worst()};
+            }
             const Prepared* solvable = runner.problem_of(own.law);
             Solver* solver = solvable ? usable(own, *solvable) : nullptr;
             if (!solver) return {TurnEnd::Retired, std::numeric_limits<double>::infinity()};
@@ -144,10 +155,8 @@ public:
                         .iterations = turn.iterations,
                         .may_pass = turn.may_pass && !members[turn.member].local,
                         .law = own.law};
-            // At rest, and where nothing is known of the step, the next steps begin within the tolerance if they change
-            // little. What Newton's method gains with its last iteration costs nothing.
-            constexpr double at_rest = 1e-6;
-            if (step && (members[turn.member].local || settings.tolerance <= at_rest)) stage.tighter = 1e-3;
+            // What Newton's method gains with its last iteration costs nothing.
+            if (step && (members[turn.member].local || sharpens)) stage.tighter = sharper;
             Solution& iterate = left[turn.member];
             iterate = turn.start ? left[*turn.start] : start;
             TurnResult result = runner.run(*solver, stage, iterate, turn.start || has_start);
@@ -156,8 +165,15 @@ public:
                 has_start = true;
                 result.end = TurnEnd::Retired;
             }
+            if (answered) result.end = TurnEnd::Done;
+            const bool done = result.end == TurnEnd::Done && report.status == Status::Solved;
+            if (done && !answered && result.error > sharp) {
+                answered = true;
+                if (!members[turn.member].local) result.end = TurnEnd::Exhausted;
+            }
             return result;
         });
+        if (answered) report.status = Status::Solved;
         if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
         report.message = fmt::format("{}: {}{}", order.name, runner.sentence(),
                                      end == RoundsEnd::Stale ? "; no solver got nearer in three rounds" : "");
