@@ -117,6 +117,48 @@ TEST(KinematicBody, TurnsABoxBelowTheBoundOfFriction) {
     EXPECT_NEAR(run.velocities("box")[1][2], 3.0, 1e-5);
 }
 
+// Along the tangent of its place it would go outwards by r ω² h/2 a second.
+TEST(KinematicBody, CarriesABoxRoundForGood) {
+    const auto grows = [](const std::string& integrator, double step) {
+        SceneOverrides overrides;
+        overrides.integrator = integrator;
+        Running run(parse_scene(
+            fmt::format(
+                "step: {}\nend: 10\nmaterials: {{m: {{friction: 0.5}}}}\nbodies:\n"
+                "  - {{name: disc, position: [0, 0, -0.05], motion: {{rotation: {{axis: [0, 0, 1],\n"
+                "     angle: {{linear: {{rate: 2}}}}}}}}, shapes: [{{cylinder: {{radius: 2, length: 0.1}},\n"
+                "     material: m}}]}}\n"
+                "  - {{name: box, mass: 13.5, position: [1, 0, 0.15], velocity: [0, 2, 0],\n"
+                "     angular_velocity: [0, 0, 2], shapes: [{{box: {{size: [0.3, 0.3, 0.3]}}, material: m}}]}}\n",
+                step),
+            "s", overrides));
+        run.finish();
+        const auto x = run.pose("box").position;
+        return std::abs(std::hypot(x[0], x[1]) - 1.0);
+    };
+    for (const double step : {1.0 / 60.0, 0.005}) {
+        EXPECT_LT(grows("euler_implicit_linearized", step), 1e-8) << step;
+        for (const char* integrator : {"moreau_jean", "linearly_implicit_trapezoidal", "switching"})
+            EXPECT_LT(grows(integrator, step), 2.0 * step * step) << integrator << ' ' << step;
+    }
+}
+
+// A drum that turns about a level axis: what rides on its inside, as far from the axis, keeps its gap as well.
+TEST(KinematicBody, HoldsWhatRidesInADrum) {
+    Running run(
+        parse_scene("step: 0.01\nend: 6\ngravity: [0, 0, 0]\nmaterials: {m: {friction: 0.5}}\nbodies:\n"
+                    "  - {name: drum, position: [0, 0, 0], motion: {rotation: {axis: [0, 1, 0],\n"
+                    "     angle: {linear: {rate: 3}}}}, shapes: [{box: {size: [1, 1, 0.2]}, position: [0, 0, -1.1],\n"
+                    "     material: m}]}\n"
+                    "  - {name: box, mass: 2, position: [0, 0, -0.8], velocity: [-2.4, 0, 0],\n"
+                    "     angular_velocity: [0, 3, 0], shapes: [{box: {size: [0.4, 0.4, 0.4]}, material: m}]}\n",
+                    "s"));
+    run.finish();
+    const auto x = run.pose("box").position;
+    EXPECT_NEAR(std::hypot(x[0], x[2]), 0.8, 1e-6);
+    EXPECT_NEAR(std::remainder(std::atan2(-x[0], -x[2]) - 18.0, 2.0 * pi), 0.0, 1e-6);
+}
+
 TEST(KinematicBody, ThrowsABoxOffAboveTheBound) {
     Running run(parse_scene(turntable(3.5), "s"));  // ω² r = 4.9 m/s²
     run_to(run, 1.0);

@@ -256,7 +256,7 @@ struct MultibodySystem::Implementation {
         std::int32_t column;           ///< −1 if fixed
         const mechanics::Matrix3d* A;  ///< null for a node
         mechanics::Vector3d arm;       ///< from the mass centre, world frame
-        mechanics::Vector3d velocity;  ///< of the point where it is prescribed, else 0
+        mechanics::Vector3d center;    ///< what its velocity moves along a straight line: the mass centre, or the node
         const mechanics::ReducedSolid* reduced =
             nullptr;            ///< of a node of a reduced body, from whose centre the arm is
         Eigen::Index node = 0;  ///< its number in the mesh
@@ -265,6 +265,10 @@ struct MultibodySystem::Implementation {
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;
     };
     [[nodiscard]] PointOfOwner point_of(std::int32_t owner, const mechanics::Vector3d& point) const;
+    /// Of a point of an owner's surface, its mean over a step of length h (s) as what has this center meets it; 0 where
+    /// the owner's motion is not prescribed. place_for_step() has been called.
+    [[nodiscard]] mechanics::Vector3d prescribed_velocity(std::int32_t owner, const mechanics::Vector3d& point,
+                                                          const mechanics::Vector3d& center, double h) const;
     /// Of the pair where it was given, else from both: the geometric mean of friction, the larger restitution.
     [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
     [[nodiscard]] Pose pose_of(std::size_t body, const State& state) const;
@@ -286,7 +290,7 @@ struct MultibodySystem::Implementation {
     void collect_frictions(UnilateralRows& rows) const;
     void collect_motors(double t, UnilateralRows& rows) const;
     void collect_actuators(double t, double h, UnilateralRows& rows) const;
-    void collect_contacts(UnilateralRows& rows);
+    void collect_contacts(double h, UnilateralRows& rows);
     /// Appends the contacts between meshes, and their rows.
     void collect_mesh_contacts(const State& state, double h, UnilateralRows& rows);
 };

@@ -92,7 +92,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
                 return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&
                        self.point_of(self.owner_of(contact.shape_b), {}).column < 0;
             });
-        self.collect_contacts(rows);
+        self.collect_contacts(h, rows);
     }
     if (self.mesh_touching) self.collect_mesh_contacts(state, h, rows);
 }
@@ -248,18 +248,32 @@ MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::p
     const auto count = static_cast<std::int32_t>(bodies.size());
     if (owner >= count) {
         const auto& node = nodes[static_cast<std::size_t>(owner - count)];
-        if (node.reduced < 0) return {node.column, nullptr, Vector3d::Zero(), Vector3d::Zero()};
+        if (node.reduced < 0)
+            return {node.column, nullptr, Vector3d::Zero(), vector(poses[static_cast<std::size_t>(owner)].position)};
         const auto& body = reduced[static_cast<std::size_t>(node.reduced)];
         const auto& place = modal_at[static_cast<std::size_t>(node.reduced)];
         const Eigen::Index local = owner - count - body.first_node;
         const auto shape = body.model.shapes.middleRows(3 * local, 3);
-        return {place.column,     &place.A, place.A * (body.model.places.col(local) + shape * place.s),
-                Vector3d::Zero(), &body,    local};
+        return {place.column, &place.A, place.A * (body.model.places.col(local) + shape * place.s),
+                place.x,      &body,    local};
     }
     const auto& place = at[owner];
-    const Vector3d arm = point - place.x;
-    if (!place.prescribed()) return {place.column, &place.A, arm, Vector3d::Zero()};
-    return {place.column, &place.A, arm, place.v + (place.A * place.omega).cross(arm)};
+    return {place.column, &place.A, point - place.x, place.x};
+}
+
+// In a step of length h the velocity v of a body takes its centre c along a straight line, and its spin ω turns the
+// rest about c. So a surface whose motion is prescribed goes there along the chord, from its place below c to that at
+// the end of the step, and beside it as the body would that rides on it: what rests on the surface has D v + rate = 0
+// at all its points, and stays where it is on it. Along the tangent it would be carried outwards by r (ω h)²/2 in each
+// step.
+Vector3d MultibodySystem::Implementation::prescribed_velocity(std::int32_t owner, const Vector3d& point,
+                                                              const Vector3d& center, double h) const {
+    if (owner >= static_cast<std::int32_t>(bodies.size()) || !at[owner].prescribed()) return Vector3d::Zero();
+    const auto& place = at[owner];
+    const Vector3d spin = place.A * place.omega, arm = center - place.x;
+    const mechanics::Quaterniond turn = mechanics::exponential(h * spin);
+    const Vector3d across = turn.vec().cross(arm);
+    return place.v + 2.0 / h * (turn.w() * across + turn.vec().cross(across)) + spin.cross(point - center);
 }
 
 // Inline in the loop over contacts, which calls it six times for each.
@@ -289,7 +303,7 @@ std::array<std::int32_t, 2> MultibodySystem::contact_bodies(const ContactPoint& 
     return {implementation_->owner_of(contact.shape_a), implementation_->owner_of(contact.shape_b)};
 }
 
-void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
+void MultibodySystem::Implementation::collect_contacts(double h, UnilateralRows& rows) {
     std::int32_t last_a = -1, last_b = -1;  // neighbouring contacts are of the same materials as a rule
     ContactMaterial material;
     for (const auto& contact : rows.contacts()) {
@@ -299,12 +313,17 @@ void MultibodySystem::Implementation::collect_contacts(UnilateralRows& rows) {
         last_a = material_a;
         last_b = material_b;
         const Vector3d normal = vector(contact.normal);
-        const PointOfOwner a = point_of(owner_of(contact.shape_a), vector(contact.point_a));
-        const PointOfOwner b = point_of(owner_of(contact.shape_b), vector(contact.point_b));
+        const std::int32_t owner_a = owner_of(contact.shape_a), owner_b = owner_of(contact.shape_b);
+        const PointOfOwner a = point_of(owner_a, vector(contact.point_a));
+        const PointOfOwner b = point_of(owner_b, vector(contact.point_b));
+        const Vector3d prescribed_speed =
+            prescribed.empty() ? Vector3d(Vector3d::Zero())
+                               : Vector3d(prescribed_velocity(owner_b, vector(contact.point_b), a.center, h) -
+                                          prescribed_velocity(owner_a, vector(contact.point_a), b.center, h));
         const auto put_row = [&](const Vector3d& direction, double gap) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
-            rows.end_row(gap, prescribed.empty() ? 0.0 : direction.dot(b.velocity - a.velocity));
+            rows.end_row(gap, direction.dot(prescribed_speed));
         };
         const auto key = key_of(contact, numbers.shapes);
         put_row(normal, contact.gap);
