@@ -131,14 +131,19 @@ TEST(Detector, FindsWhatANewOneFindsWhileShapesMove) {
 }
 
 TEST(Detector, FindsWhatAllPairsFind) {
-    const CollisionSetup setup = heap(40);
-    const auto poses = heap_poses(40, 3);
+    CollisionSetup setup = heap(40);
+    auto poses = heap_poses(40, 3);
+    // Each body by itself, so that none covers what another one has: the box of the world becomes one.
+    setup.shapes[1].body = 40;
+    setup.fixed.push_back(true);
+    poses.emplace_back();
+    setup.solid.assign(41, -1);
     std::vector<ContactPoint> contacts;
     make_collision_detector(setup)->detect(poses, 0.02, contacts);
     std::size_t expected = 0;
     for (std::size_t i = 0; i < setup.shapes.size(); ++i) {
         for (std::size_t j = i + 1; j < setup.shapes.size(); ++j) {
-            CollisionSetup pair{{setup.shapes[i], setup.shapes[j]}, setup.fixed, {}};
+            CollisionSetup pair{{setup.shapes[i], setup.shapes[j]}, setup.fixed, {}, {}, setup.solid};
             std::vector<ContactPoint> alone;
             make_collision_detector(pair)->detect(poses, 0.02, alone);
             expected += alone.size();

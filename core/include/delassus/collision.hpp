@@ -68,7 +68,7 @@ public:
     /// All points nearer than envelope (m, ε_e of seed section 5), for shapes of different bodies that are not
     /// excluded, at least one of them not fixed. Ordered by (shape_a, shape_b, feature): equal inputs give equal
     /// outputs, bit for bit. poses: of the bodies by index. Pairs of flat faces give up to four points or more, edges
-    /// two, the rest one.
+    /// two, the rest one. What neighbours of one solid cover of a shape has none (docs/mechanics.md).
     /// team: threads that share the work where there is enough of it.
     /// displacements: of the bodies by index, or none. Shapes that could meet on their way are found too, farther away
     /// than the envelope: their points are where they would meet, the normal is that of the meeting, and the gap is
@@ -85,6 +85,10 @@ struct CollisionSetup {
     /// Of bodies: those of one group, a number from 0 on, never touch one another (the nodes of a mesh); −1: no group.
     /// Empty: no groups at all.
     std::vector<std::int32_t> group{};
+    /// Of bodies: those of one number ≥ 0 are one solid, which has no edges where their shapes lie flush. They do not
+    /// move against one another, but for those of number 0, the world's: all whose place is given, fixed or not. −1: a
+    /// solid by itself. Empty: the fixed ones are of the world's, the others by themselves.
+    std::vector<std::int32_t> solid{};
 };
 
 /// Loads the collision module and makes a detector. Throws InputError where this build has no FCL, for sizes that are

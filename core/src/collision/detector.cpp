@@ -25,8 +25,9 @@ bool rotation_of(const Quaternion& orientation, Matrix3d& rotation) {
 }  // namespace
 
 Detector::Detector(CollisionSetup setup)
-    : setup_(std::move(setup)),
-      broad_phase_([this](std::int32_t a, std::int32_t b) { return may_touch(bounded_[a], bounded_[b]); }) {
+    : setup_(std::move(setup)), broad_phase_([this](std::int32_t a, std::int32_t b) {
+          return may_touch(bounded_[a], bounded_[b]) || pass_flush(bounded_[a], bounded_[b]);
+      }) {
     for (auto& [first, second] : setup_.apart) {
         if (first > second) std::swap(first, second);
     }
@@ -41,11 +42,18 @@ Detector::Detector(CollisionSetup setup)
         solids_.push_back(make_solid(shape, i));
         placed_[i].solid = &solids_[i];
         rotation_of(shape.pose.orientation, local_rotations_[i]);
+        const bool by_itself =
+            !setup_.solid.empty() && shape.body >= 0 ? setup_.solid[shape.body] < 0 : !is_fixed(shape.body);
+        const bool numbered = !by_itself && !setup_.solid.empty() && shape.body >= 0;
+        solid_.push_back(by_itself ? -1 - shape.body : numbered ? setup_.solid[shape.body] : 0);
+        given_moves_ = given_moves_ || (solid_[i] == 0 && !is_fixed(shape.body));
+        in_bounded_.push_back(-1);
         if (shape.kind == ShapeKind::Plane) {
             planes_.push_back(i);
         } else if (solids_[i].terrain) {
             terrains_.push_back(i);
         } else {
+            in_bounded_[i] = static_cast<std::int32_t>(bounded_.size());
             bounded_.push_back(i);
             slack_ += 0.1 * solids_[i].reach;
         }
@@ -65,6 +73,67 @@ bool Detector::may_touch(std::int32_t shape_a, std::int32_t shape_b) const {
     if (!setup_.group.empty() && a >= 0 && b >= 0 && setup_.group[a] >= 0 && setup_.group[a] == setup_.group[b])
         return false;
     return !std::binary_search(setup_.apart.begin(), setup_.apart.end(), std::pair(std::min(a, b), std::max(a, b)));
+}
+
+bool Detector::may_be_flush(std::int32_t shape_a, std::int32_t shape_b) const {
+    return solid_[shape_a] == solid_[shape_b] && has_flat_faces(solids_[shape_a]) && has_flat_faces(solids_[shape_b]);
+}
+
+bool Detector::pass_flush(std::int32_t shape_a, std::int32_t shape_b) const {
+    if (!given_moves_ || solid_[shape_a] != 0 || solid_[shape_b] != 0) return false;
+    const std::int32_t a = setup_.shapes[shape_a].body, b = setup_.shapes[shape_b].body;
+    return a != b && !(is_fixed(a) && is_fixed(b)) && may_be_flush(shape_a, shape_b);
+}
+
+void Detector::find_neighbours() {
+    knows_neighbours_ = true;
+    std::vector<BroadPhase::Box> boxes;
+    for (const std::int32_t shape : bounded_) {
+        const Vector3d half = half_extent(placed_[shape]) + Vector3d::Constant(kFlush * placed_[shape].solid->reach);
+        boxes.emplace_back(placed_[shape].position - half, placed_[shape].position + half);
+    }
+    BroadPhase near([this](std::int32_t a, std::int32_t b) {
+        return may_be_flush(bounded_[a], bounded_[b]) && !pass_flush(bounded_[a], bounded_[b]);
+    });
+    for (const auto& [a, b] : near.near_pairs(boxes, 0.0)) {
+        neighbours_.emplace_back(bounded_[a], bounded_[b]);
+        neighbours_.emplace_back(bounded_[b], bounded_[a]);
+    }
+    std::sort(neighbours_.begin(), neighbours_.end());
+}
+
+void Detector::collect_neighbours(std::int32_t shape, std::int32_t other,
+                                  std::vector<const Placed*>& neighbours) const {
+    neighbours.clear();
+    // A half-space leads to no edge. Shapes that the other one does not come near are not in its way.
+    if (solids_[other].kind == ShapeKind::Plane) return;
+    const std::int32_t place = in_bounded_[other];
+    for (const auto* all : {&neighbours_, &passing_}) {
+        auto next = std::lower_bound(all->begin(), all->end(), BroadPhase::Pair(shape, -1));
+        for (; next != all->end() && next->first == shape; ++next)
+            if ((place < 0 || boxes_[place].overlap(boxes_[in_bounded_[next->second]])) &&
+                may_touch(other, next->second))
+                neighbours.push_back(&placed_[next->second]);
+    }
+    for (const std::int32_t plane : planes_)
+        if (plane != shape && may_be_flush(shape, plane) && may_touch(other, plane))
+            neighbours.push_back(&placed_[plane]);
+}
+
+void Detector::leave_out_covered(std::int32_t a, std::int32_t b, std::size_t first, Worker& by,
+                                 std::vector<ContactPoint>& contacts) const {
+    if (contacts.size() == first) return;
+    collect_neighbours(a, b, by.of_a);
+    collect_neighbours(b, a, by.of_b);
+    if (by.of_a.empty() && by.of_b.empty()) return;
+    const Placed &of_a = placed_[a], &of_b = placed_[b];
+    const auto covered = [&](const ContactPoint& contact) {
+        const Vector3d normal = vector(contact.normal);
+        return is_covered(of_a, by.of_a, vector(contact.point_a), normal, of_b.solid->reach) ||
+               is_covered(of_b, by.of_b, vector(contact.point_b), -normal, of_a.solid->reach);
+    };
+    contacts.erase(std::remove_if(contacts.begin() + static_cast<std::ptrdiff_t>(first), contacts.end(), covered),
+                   contacts.end());
 }
 
 void Detector::place(std::span<const Pose> poses) {
@@ -123,6 +192,7 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         throw InputError(
             fmt::format("The envelope of contacts is {} m; it should be finite and not negative.", envelope));
     place(poses);
+    if (!knows_neighbours_) find_neighbours();
     sweep(poses, displacements);
     // Of shapes that move less than half of the envelope, two cannot come nearer by more than it.
     for (std::size_t i = 0; i < bounded_.size(); ++i) {
@@ -140,11 +210,18 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         balls_[i].radius += way;
     }
     pairs_.clear();
+    passing_.clear();
     for (const auto& [a, b] : broad_phase_.near_pairs(boxes_, slack_)) {
+        if (pass_flush(bounded_[a], bounded_[b])) {
+            passing_.emplace_back(bounded_[a], bounded_[b]);
+            passing_.emplace_back(bounded_[b], bounded_[a]);
+            if (!may_touch(bounded_[a], bounded_[b])) continue;
+        }
         const double far = balls_[a].radius + balls_[b].radius;
         if ((balls_[a].center - balls_[b].center).squaredNorm() < far * far && boxes_[a].overlap(boxes_[b]))
             pairs_.emplace_back(bounded_[a], bounded_[b]);
     }
+    std::sort(passing_.begin(), passing_.end());
     with_ground_.clear();
     for (const std::int32_t plane : planes_) {
         const Vector3d normal = placed_[plane].axis();
@@ -200,6 +277,7 @@ void Detector::collide_pairs(std::size_t first, std::size_t last, double envelop
         } else {
             by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], envelope, contacts);
         }
+        leave_out_covered(a, b, before, by, contacts);
         for (std::size_t i = before; i < contacts.size(); ++i) {
             contacts[i].shape_a = a;
             contacts[i].shape_b = b;

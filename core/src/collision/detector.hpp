@@ -2,6 +2,7 @@
 #pragma once
 
 #include "collision/broad_phase.hpp"
+#include "collision/flush_neighbours.hpp"
 #include "collision/swept_pair.hpp"
 
 namespace delassus::collision {
@@ -21,12 +22,23 @@ private:
     struct Worker {
         NarrowPhase still;
         SweptPair swept;
+        std::vector<const Placed*> of_a, of_b;  ///< neighbours of the pair's shapes
     };
     /// Appends the contacts of pairs_[first] to pairs_[last − 1].
     void collide_pairs(std::size_t first, std::size_t last, double envelope, Worker& by,
                        std::vector<ContactPoint>& contacts);
     [[nodiscard]] bool may_touch(std::int32_t shape_a, std::int32_t shape_b) const;
     [[nodiscard]] bool is_fixed(std::int32_t body) const;
+    /// Whether two shapes of one solid may be flush, and whether that changes while they move past each other.
+    [[nodiscard]] bool may_be_flush(std::int32_t shape_a, std::int32_t shape_b) const;
+    [[nodiscard]] bool pass_flush(std::int32_t shape_a, std::int32_t shape_b) const;
+    /// neighbours_ from the places of all shapes.
+    void find_neighbours();
+    /// Those of a shape that another one may touch.
+    void collect_neighbours(std::int32_t shape, std::int32_t other, std::vector<const Placed*>& neighbours) const;
+    /// Leaves out those of a pair's contacts from `first` on that neighbours cover.
+    void leave_out_covered(std::int32_t a, std::int32_t b, std::size_t first, Worker& by,
+                           std::vector<ContactPoint>& contacts) const;
 
     CollisionSetup setup_;
     std::vector<Solid> solids_;
@@ -34,7 +46,8 @@ private:
     std::vector<Placed> placed_;
     std::vector<Sweep> sweeps_;
     std::vector<Matrix3d> body_rotations_;
-    std::vector<std::int32_t> bounded_;  ///< shapes that are neither planes nor terrains
+    std::vector<std::int32_t> bounded_;     ///< shapes that are neither planes nor terrains
+    std::vector<std::int32_t> in_bounded_;  ///< of shapes: their place in bounded_, or −1
     std::vector<std::int32_t> planes_, terrains_;
     std::vector<BroadPhase::Box> boxes_;  ///< of bounded_
     struct Ball {
@@ -44,6 +57,11 @@ private:
     std::vector<Ball> balls_;  ///< about bounded_: each holds its shape
     double slack_ = 0.0;       ///< a tenth of the mean reach, m
     std::vector<std::pair<std::int32_t, std::int32_t>> pairs_, with_ground_, merged_;
+    std::vector<std::int32_t> solid_;  ///< of shapes
+    bool given_moves_ = false;         ///< a body that is of the world's solid but not fixed
+    /// Shapes and neighbours, both ways round, ascending: those that stay flush, and those of this detection.
+    std::vector<BroadPhase::Pair> neighbours_, passing_;
+    bool knows_neighbours_ = false;
     BroadPhase broad_phase_;
     std::vector<Worker> workers_;
     std::vector<std::vector<ContactPoint>> found_;  ///< by runs of pairs

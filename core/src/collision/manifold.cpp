@@ -12,9 +12,6 @@
 namespace delassus::collision {
 namespace {
 
-// A normal within this angle of a face's counts as the face's. The distances of a manifold are measured along the
-// face's own normal and are exact for it; against another normal they differ by half of the square of the angle.
-constexpr double kFlatAngle = 1e-3;
 // Features of a cylinder that its prism does not have: the ends of the generator (or rim points) that supports a
 // direction, and the generator.
 constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc;

@@ -13,6 +13,10 @@
 
 namespace delassus::collision {
 
+/// A normal within this angle (rad) of a face's counts as the face's. The distances of a manifold are measured along
+/// the face's own normal and are exact for it; against another normal they differ by half of the square of the angle.
+constexpr double kFlatAngle = 1e-3;
+
 struct Separation {
     double distance = 0.0;               ///< s of the normal, m
     Vector3d normal = Vector3d::Zero();  ///< unit, from a to b

@@ -31,8 +31,6 @@ namespace delassus::collision {
 
 namespace {
 
-// As in Manifold: directions this near to a face's normal are of the face.
-constexpr double kFlatAngle = 1e-3;
 constexpr double kRoundingAngle = 1e-9;
 
 bool has_point_core(const Solid& solid) {

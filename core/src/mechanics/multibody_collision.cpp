@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The shapes of a multibody system as the collision detector sees them.
 #include <algorithm>
+#include <numeric>
 
 #include "delassus/error.hpp"
 #include "mechanics/multibody_implementation.hpp"
@@ -54,10 +55,32 @@ std::int32_t MultibodySystem::Implementation::owner_of(std::int32_t shape) const
     return count + first_node_of_surface(node - node_contacts.size());
 }
 
+/// Of bodies: a number that welded ones share, 0 of those whose place is given or that are welded to them.
+std::vector<std::int32_t> MultibodySystem::Implementation::solids() const {
+    std::vector<std::int32_t> parent(bodies.size() + 1);  // the world first
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](BodyIndex body) {
+        std::int32_t place = body == world_body ? 0 : body + 1;
+        while (parent[static_cast<std::size_t>(place)] != place) place = parent[static_cast<std::size_t>(place)];
+        return place;
+    };
+    const auto join = [&](BodyIndex a, BodyIndex b) {
+        const std::int32_t first = root(a), second = root(b);
+        parent[static_cast<std::size_t>(std::max(first, second))] = std::min(first, second);
+    };
+    for (std::size_t k = 0; k < bodies.size(); ++k)
+        if (bodies[k].column < 0) join(world_body, static_cast<BodyIndex>(k));
+    for (const auto& joint : joints)
+        if (joint.parameters.kind == JointKind::Fixed) join(joint.parameters.first, joint.parameters.second);
+    std::vector<std::int32_t> result;
+    for (std::size_t k = 0; k < bodies.size(); ++k) result.push_back(root(static_cast<BodyIndex>(k)));
+    return result;
+}
+
 // Bodies whose motion is prescribed do not touch one another, nor fixed ones.
 // For the detector a node is a body that does not turn, after the bodies; its sphere comes after their shapes.
 void MultibodySystem::Implementation::make_detector() {
-    CollisionSetup setup{shapes, {}, {apart.begin(), apart.end()}, {}};
+    CollisionSetup setup{shapes, {}, {apart.begin(), apart.end()}, {}, solids()};
     for (const auto& body : bodies) {
         setup.fixed.push_back(body.column < 0 && !body.prescribed);
         setup.group.push_back(prescribed.empty() || body.column >= 0 ? -1 : 1);
@@ -65,6 +88,7 @@ void MultibodySystem::Implementation::make_detector() {
     for (const auto& node : nodes) {
         setup.fixed.push_back(!node.moves());
         setup.group.push_back(0);
+        setup.solid.push_back(-1);
     }
     for (const auto& one : attachments)
         setup.apart.emplace_back(one.body, static_cast<std::int32_t>(bodies.size()) + one.node);

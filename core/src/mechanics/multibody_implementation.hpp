@@ -276,6 +276,7 @@ struct MultibodySystem::Implementation {
     void place_shapes(const State& state);
     /// displacements ← of a step of length h (s).
     void predict_displacements(double h, const State& state);
+    [[nodiscard]] std::vector<std::int32_t> solids() const;
     void make_detector();
     void make_mesh_contacts();
     /// The first node of a surface that touches other meshes.
