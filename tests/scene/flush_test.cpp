@@ -123,6 +123,25 @@ TEST(FlushTiles, WallsAndStepsStop) {
     }
 }
 
+// In the middle of a step the box is in the wall, where another brick may be the one that it has gone into.
+TEST(FlushTiles, AWallOfBricksStopsEveryMethod) {
+    std::string wall;
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j)
+            wall += fmt::format(
+                "  - {{name: w_{}_{}, fixed: true, position: [0.1, {}, {}],\n"
+                "     shapes: [{{box: {{size: [0.2, 0.25, 0.1]}}, material: m}}]}}\n",
+                i, j, 0.25 * (j - 1.5), 0.1 * i + 0.05);
+    for (const char* integrator : {"moreau_jean", "linearly_implicit_trapezoidal", "switching"}) {
+        SceneOverrides overrides;
+        overrides.integrator = integrator;
+        Running run(parse_scene(scene(slab + wall, box, 0.1, 0.001, 0.8), "s", overrides));
+        run.finish();
+        EXPECT_LT(run.pose("slider").position[0], -0.09) << integrator;
+        EXPECT_GT(run.pose("slider").position[0], -0.4) << integrator;
+    }
+}
+
 }  // namespace
 }  // namespace delassus::tests::flush_test
 #endif

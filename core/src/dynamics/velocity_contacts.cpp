@@ -172,9 +172,11 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
 }
 
 // What closes before the middle of the step is as deep there as at the end of the step: the position moves on with (1 −
-// θ) of the old velocity. So the same shapes must touch there, and on the same side.
+// θ) of the old velocity. So the same shapes must touch there, and on the same side; or one of them and a shape in
+// which the surface of the other one goes on, since at a seam of flush shapes the contact passes from one to the next.
 void VelocityContacts::require_same_side(const State& begin, double h) const {
-    constexpr double least_cosine = 0.5;
+    constexpr double least_cosine = 0.5, flush_cosine = 1.0 - 1e-6;
+    constexpr double flush_share = 1e-2;  // of the way to the middle
     const auto& contacts = before_.contacts();
     const auto& later = rows_.contacts();
     const std::size_t first = before_.blocks().size() - contacts.size();
@@ -192,7 +194,20 @@ void VelocityContacts::require_same_side(const State& begin, double h) const {
             for (std::size_t i = 0; i < 3; ++i) cosine += contact.normal[i] * same->normal[i];
             found = cosine > least_cosine;
         }
-        if (!found)
+        const auto goes_on = [&](const ContactPoint& one) {
+            const bool of_a = one.shape_a == contact.shape_a || one.shape_b == contact.shape_a;
+            if (!of_a && one.shape_a != contact.shape_b && one.shape_b != contact.shape_b) return false;
+            const bool turned = one.shape_a == contact.shape_b || one.shape_b == contact.shape_a;
+            const Vector3& before = of_a ? contact.point_b : contact.point_a;
+            const Vector3& now = of_a == turned ? one.point_a : one.point_b;
+            double cosine = 0.0, height = 0.0;
+            for (std::size_t i = 0; i < 3; ++i) {
+                cosine += (turned ? -contact.normal[i] : contact.normal[i]) * one.normal[i];
+                height += contact.normal[i] * (now[i] - before[i]);
+            }
+            return cosine > flush_cosine && std::abs(height) < flush_share * theta_ * h * -speed;
+        };
+        if (!found && std::none_of(later.begin(), later.end(), goes_on))
             throw StepTooLong(fmt::format(
                 "the step from t = {:.9g} with h = {:.9g} is too long: a body would go through another one, which it "
                 "meets after {:.3g} s at {:.3g} m/s, before the method looks for contacts in the middle of the step; "
