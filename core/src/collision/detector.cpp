@@ -86,7 +86,7 @@ bool Detector::pass_flush(std::int32_t shape_a, std::int32_t shape_b) const {
 }
 
 void Detector::find_neighbours() {
-    knows_neighbours_ = true;
+    has_neighbours_.assign(placed_.size(), 0);
     std::vector<BroadPhase::Box> boxes;
     for (const std::int32_t shape : bounded_) {
         const Vector3d half = half_extent(placed_[shape]) + Vector3d::Constant(kFlush * placed_[shape].solid->reach);
@@ -100,6 +100,10 @@ void Detector::find_neighbours() {
         neighbours_.emplace_back(bounded_[b], bounded_[a]);
     }
     std::sort(neighbours_.begin(), neighbours_.end());
+    const bool others_come = given_moves_ || !planes_.empty();
+    for (const std::int32_t shape : bounded_)
+        has_neighbours_[shape] = others_come && solid_[shape] == 0 && has_flat_faces(solids_[shape]) ? 1 : 0;
+    for (const auto& pair : neighbours_) has_neighbours_[pair.first] = 1;
 }
 
 void Detector::collect_neighbours(std::int32_t shape, std::int32_t other,
@@ -122,7 +126,7 @@ void Detector::collect_neighbours(std::int32_t shape, std::int32_t other,
 
 void Detector::leave_out_covered(std::int32_t a, std::int32_t b, std::size_t first, Worker& by,
                                  std::vector<ContactPoint>& contacts) const {
-    if (contacts.size() == first) return;
+    if (contacts.size() == first || (has_neighbours_[a] == 0 && has_neighbours_[b] == 0)) return;
     collect_neighbours(a, b, by.of_a);
     collect_neighbours(b, a, by.of_b);
     if (by.of_a.empty() && by.of_b.empty()) return;
@@ -192,7 +196,7 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         throw InputError(
             fmt::format("The envelope of contacts is {} m; it should be finite and not negative.", envelope));
     place(poses);
-    if (!knows_neighbours_) find_neighbours();
+    if (has_neighbours_.empty()) find_neighbours();
     sweep(poses, displacements);
     // Of shapes that move less than half of the envelope, two cannot come nearer by more than it.
     for (std::size_t i = 0; i < bounded_.size(); ++i) {
@@ -212,7 +216,7 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
     pairs_.clear();
     passing_.clear();
     for (const auto& [a, b] : broad_phase_.near_pairs(boxes_, slack_)) {
-        if (pass_flush(bounded_[a], bounded_[b])) {
+        if (given_moves_ && pass_flush(bounded_[a], bounded_[b])) {
             passing_.emplace_back(bounded_[a], bounded_[b]);
             passing_.emplace_back(bounded_[b], bounded_[a]);
             if (!may_touch(bounded_[a], bounded_[b])) continue;

@@ -32,7 +32,7 @@ private:
     /// Whether two shapes of one solid may be flush, and whether that changes while they move past each other.
     [[nodiscard]] bool may_be_flush(std::int32_t shape_a, std::int32_t shape_b) const;
     [[nodiscard]] bool pass_flush(std::int32_t shape_a, std::int32_t shape_b) const;
-    /// neighbours_ from the places of all shapes.
+    /// neighbours_ and has_neighbours_ from the places of all shapes.
     void find_neighbours();
     /// Those of a shape that another one may touch.
     void collect_neighbours(std::int32_t shape, std::int32_t other, std::vector<const Placed*>& neighbours) const;
@@ -61,7 +61,7 @@ private:
     bool given_moves_ = false;         ///< a body that is of the world's solid but not fixed
     /// Shapes and neighbours, both ways round, ascending: those that stay flush, and those of this detection.
     std::vector<BroadPhase::Pair> neighbours_, passing_;
-    bool knows_neighbours_ = false;
+    std::vector<char> has_neighbours_;  ///< of shapes: whether they may have any; empty before the first detection
     BroadPhase broad_phase_;
     std::vector<Worker> workers_;
     std::vector<std::vector<ContactPoint>> found_;  ///< by runs of pairs
