@@ -147,7 +147,8 @@ class Simulation:
 
     @property
     def positions(self) -> np.ndarray:
-        """The coordinates q of all that can move, in the system's order (of scenes m, and unit quaternions w, x, y, z)."""
+        """The coordinates q of all that can move, in the system's order (of scenes m, unit quaternions w, x, y, z, and
+        angles of joints, rad, at the end)."""
         return self._run.positions
 
     @property

@@ -170,7 +170,7 @@ TEST(Joints, HoldAtTheStartWithTheirNumberOfRows) {
     }
 }
 
-MultibodySystem& with_revolute(MultibodySystem& system, JointKind kind, std::int32_t& joint_index) {
+MultibodySystem& with_joint(MultibodySystem& system, JointKind kind, std::int32_t& joint_index) {
     JointParameters joint;
     joint.kind = kind;
     joint.first = system.add_body(tumbling("a", {0.0, 0.1, 0.2}));
@@ -181,18 +181,36 @@ MultibodySystem& with_revolute(MultibodySystem& system, JointKind kind, std::int
     return system;
 }
 
-TEST(Motors, HaveTheDerivativesTheyClaim) {
-    for (const JointKind kind : {JointKind::Revolute, JointKind::Prismatic})
-        for (const bool speed : {false, true}) {
-            MultibodySystem system;
-            MotorParameters motor;
-            with_revolute(system, kind, motor.joint);
-            motor.speed = speed;
-            motor.motion = Motion::sine(0.4, 0.7, 0.2, 0.1);
-            system.add_motor(motor);
-            EXPECT_NO_THROW(check(system));
-            EXPECT_EQ(system.m(), 6);
-        }
+TEST(Motors, OfSlidesHaveTheDerivativesTheyClaim) {
+    for (const bool speed : {false, true}) {
+        MultibodySystem system;
+        MotorParameters motor;
+        with_joint(system, JointKind::Prismatic, motor.joint);
+        motor.speed = speed;
+        motor.motion = Motion::sine(0.4, 0.7, 0.2, 0.1);
+        system.add_motor(motor);
+        EXPECT_NO_THROW(check(system));
+        EXPECT_EQ(system.m(), 6);
+    }
+}
+
+TEST(Motors, OfAnglesHaveTheDerivativesTheyClaimWhileTheirJointsHold) {
+    for (const bool speed : {false, true}) {
+        MultibodySystem system;
+        MotorParameters motor;
+        with_joint(system, JointKind::Revolute, motor.joint);
+        motor.speed = speed;
+        motor.motion = Motion::sine(0.4, 0.7, 0.2, 0.1);
+        system.add_motor(motor);
+        system.finish();
+        // Both bodies turn alike, and the second one beside that about the axis.
+        State state = system.initial_state();
+        const Quaternion& q = system.body(1).pose.orientation;
+        const Eigen::Vector3d axis =
+            Eigen::Quaterniond(q[0], q[1], q[2], q[3]).conjugate() * Eigen::Vector3d(1.0, 2.0, -0.5).normalized();
+        Eigen::Map<Eigen::Vector3d>(state.v.data() + 9) += 0.8 * axis;
+        expect_derivatives(system, state, some_lambda(system));
+    }
 }
 
 TEST(Gears, HaveTheDerivativesTheyClaimWhileTheirJointsHold) {

@@ -130,10 +130,6 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"StartBeyondTheLimits",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, upper: 1, start: 1.2}\n",
              "s.yaml, line 6: the start of the joint \"j\" lies beyond its limits"},
-        Case{"StartOfMoreThanHalfATurn",
-             head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, start: 4}\n",
-             "s.yaml, line 6: the start of the joint \"j\" must lie in [-pi, pi] rad: whole turns do not change where "
-             "bodies are"},
         Case{"StartOfASphericalJoint",
              head + bodies + "joints:\n  - {name: j, kind: spherical, second: ball, start: 1}\n",
              "s.yaml, line 6: the joint \"j\" has no single angle for a spring, friction or start: spherical and "

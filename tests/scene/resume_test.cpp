@@ -93,10 +93,9 @@ TEST(Checkpoint, HasTheTurnsOfSprings) {
     resumed.simulation.load(read_checkpoint(file).systems[0].simulation);
     for (int i = first; i < all; ++i) resumed.simulation.step();
     const auto expected = whole.simulation.save(), got = resumed.simulation.save();
-    EXPECT_GE(stopped.simulation.save().turns.at(0), 2.0);
+    EXPECT_GT(stopped.simulation.state().q.at(7), 4.0 * M_PI);
     EXPECT_EQ(bits(got.state.q), bits(expected.state.q));
     EXPECT_EQ(bits(got.state.v), bits(expected.state.v));
-    EXPECT_EQ(bits(got.turns), bits(expected.turns));
     EXPECT_EQ(got.totals.energy, expected.totals.energy);
 }
 
@@ -117,9 +116,9 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
               "the checkpoint cannot be used: it is not a checkpoint of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 1}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 6}"),
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 8}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 8, \"scene\": \"\", \"systems\": []}"),
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 9, \"scene\": \"\", \"systems\": []}"),
               "the checkpoint cannot be used: it is damaged: its checksum is not that of its content");
 }
 

@@ -38,6 +38,7 @@ struct TreeJoint {
 ///                  the body that carries it
 ///     planar       two slides along axes fixed in the body that carries it, then the angle
 ///     none         as of a body in MultibodySystem: mass centre and quaternion
+/// At the end of q stand those of MultibodySystem::angle_position() whose joints no tree holds.
 class DELASSUS_API JointCoordinates : public DynamicalSystem {
 public:
     /// bodies: after assemble(); it outlives this. From now on it keeps only rows that the trees do not hold, so that
@@ -65,8 +66,11 @@ public:
     [[nodiscard]] State bodies_of(const State& state) const;
     /// The same where memory serves again.
     void bodies_of(const State& state, State& bodies) const;
-    /// The inverse, for bodies that are placed and move as the trees allow; angles in (−π, π].
+    /// The inverse, for bodies that are placed and move as the trees allow. Angles are those that the system counts
+    /// (MultibodySystem::angle_position()), others in (−π, π].
     [[nodiscard]] State coordinates_of(const State& bodies) const;
+    /// MultibodySystem::settle_turns() for the angles at the end of q.
+    void settle_turns(State& state) const;
 
     // ---- DynamicalSystem ----
     [[nodiscard]] std::int32_t n() const override;

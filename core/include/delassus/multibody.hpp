@@ -3,7 +3,8 @@
 //
 // A moving body has 7 positions (mass centre, unit quaternion w x y z) and 6 velocities (of the mass centre in the
 // world frame, angular velocity in the body frame). A node has 3 and 3. Fixed ones have none. A reduced body has as
-// many more as it has modes, after those. Bodies come first, then nodes, then reduced bodies.
+// many more as it has modes, after those. Bodies come first, then nodes, then reduced bodies. At the end of q stand
+// angles of joints (MultibodySystem::angle_position()).
 #pragma once
 
 #include <array>
@@ -128,8 +129,8 @@ struct JointCoordinate {
     /// The inertia of a rotor behind a gear, which turns with the coordinate and adds ½ armature ċ² to the kinetic
     /// energy: kg or kg m². Joint coordinates alone take it (needs_joint_coordinates()).
     double armature = 0.0;
-    /// Where MultibodySystem::assemble() puts it and how fast it moves then: m and m/s, or rad in [−π, π] and rad/s.
-    /// Without a value it is as the bodies are given.
+    /// Where MultibodySystem::assemble() puts it and how fast it moves then: m and m/s, or rad and rad/s, whole turns
+    /// counted. Without a value it is as the bodies are given.
     std::optional<double> start = std::nullopt, start_rate = std::nullopt;
 };
 
@@ -145,7 +146,7 @@ struct JointParameters {
     std::int32_t gear_first = -1, gear_second = -1;  ///< indices of two revolute or two prismatic joints; Gear only
     /// Coordinate of the second = ratio · coordinate of the first; of angles a fraction with terms below 1000.
     double gear_ratio = 1.0;
-    /// Limits of the coordinate of a revolute (rad, in (−π, π)) or prismatic (m) joint; not a number: none.
+    /// Limits of the coordinate of a revolute (rad, whole turns counted) or prismatic (m) joint; not a number: none.
     double lower, upper;
     JointCoordinate slide;  ///< along the axis; Prismatic and Cylindrical
     JointCoordinate turn;   ///< about the axis; Revolute and Cylindrical; Spherical and Universal: damping alone, of
@@ -538,14 +539,15 @@ public:
     void all_constraints(const State& state, double* C) const;
     /// D += C_q of all rows of joints, kept or not, but those of gears; constraint_rows() × n().
     void add_joint_jacobian(const State& state, MatrixAssembler& D) const;
-    // ---- Whole turns of joints with a spring or an actuator: an orientation does not tell them ----
-    /// The whole turns at a state that is within half a turn of the last one that was followed; one for each such
-    /// joint.
-    [[nodiscard]] std::vector<double> turns(const State& state) const;
-    /// Sets the turns at this state; none given: all are 0.
-    void set_turns(const State& state, const std::vector<double>& turns);
-    /// Counts turns on to this state. Whoever takes steps calls it after each that is kept.
-    void follow(const State& state);
+    // ---- Whole turns of joints: two orientations do not tell them ----
+    /// Where q has the angle of a revolute or cylindrical joint, rad, whole turns counted, 0 where the bodies are
+    /// given; without what bodies whose motion is prescribed have turned it by. −1: nothing acts on that angle.
+    [[nodiscard]] std::int32_t angle_position(std::int32_t joint) const;
+    /// The angles of `result` ← those of q, δ (n()) further, at the bodies of `result`. increment() does it.
+    void add_turns(const double* q, const double* delta, double* result) const;
+    /// Sets the angles in q to those of the bodies, each to the value nearest to what it was. Increments know no time,
+    /// so that at a body whose motion is prescribed they leave what a method's steps miss.
+    void settle_turns(State& state) const;
 
     /// λ of all rows from that of those that are kept: 0 in the others.
     [[nodiscard]] std::vector<double> all_multipliers(const std::vector<double>& kept) const;
@@ -571,9 +573,6 @@ public:
     /// After finish(), of a system of some bodies of `whole`: takes the scales of the whole for its own (the envelope,
     /// the resolution of gaps, the speed of recovery), and gives its unilateral blocks the keys that they have there.
     void be_part_of(const MultibodySystem& whole, PartNumbers numbers);
-    /// The joints whose whole turns are counted, in the order of turns().
-    [[nodiscard]] std::vector<std::int32_t> counted_joints() const;
-
     // ---- DynamicalSystem ----
     [[nodiscard]] std::int32_t n() const override;
     [[nodiscard]] std::int32_t position_size() const override;

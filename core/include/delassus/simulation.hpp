@@ -82,7 +82,6 @@ struct SimulationTotals {
 struct SimulationState {
     std::int64_t step = 0;
     State state;                  ///< in the coordinates of the simulation
-    std::vector<double> turns;    ///< MultibodySystem::turns()
     std::vector<double> memory;   ///< Timestepper::save(), warm starts included
     std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps that nothing divides
     std::vector<std::int32_t>
@@ -211,6 +210,7 @@ private:
     /// The same where the method has come to.
     void renew_rows_ahead();
     /// Forgets what is ahead of the state shown if the system was changed since.
+    void settle_turns(State& state) const;
     void notice_changes();
 
     SceneSystem* system_;

@@ -6,13 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "delassus/error.hpp"
 
 namespace delassus::importers {
-
-using std::numbers::pi;
 
 MjcfReader::MjcfReader(const mjModel& m, const std::string& keyframe, Model& model)
     : m_(m),
@@ -202,28 +199,12 @@ void MjcfReader::read_coordinate(int j, const std::string& what, JointParameters
     if (m_.jnt_limited[j] != 0 && !disabled(mjDSBL_LIMIT)) {
         own.lower = m_.jnt_range[2 * j] - reference;
         own.upper = m_.jnt_range[2 * j + 1] - reference;
-        if (turns && !(own.lower > -pi)) {
-            model_.lose(what, fmt::format("the lower limit, {:.6g} rad from where the scene has its 0: a stop must lie "
-                                          "within half a turn of it",
-                                          own.lower));
-            own.lower = model_import::none;
-        }
-        if (turns && !(own.upper < pi)) {
-            model_.lose(what, fmt::format("the upper limit, {:.6g} rad from where the scene has its 0: a stop must lie "
-                                          "within half a turn of it",
-                                          own.upper));
-            own.upper = model_import::none;
-        }
         if (!std::equal(usual_solref.begin(), usual_solref.end(), m_.jnt_solref + mjNREF * j) ||
             !std::equal(usual_solimp.begin(), usual_solimp.end(), m_.jnt_solimp + mjNIMP * j))
             model_.lose(what, "solref and solimp of the limit: stops are rigid");
         if (m_.jnt_margin[j] != 0.0) model_.lose(what, "margin of the limit: stops act where they are");
     }
-    double start = key_ < 0 ? 0.0 : m_.key_qpos[key_ * m_.nq + at] - reference;
-    if (turns && std::abs(start) > pi) {
-        if (coordinate.stiffness > 0.0) model_.lose(what, "whole turns at the start, which its spring would feel");
-        start = std::remainder(start, 2.0 * pi);
-    }
+    const double start = key_ < 0 ? 0.0 : m_.key_qpos[key_ * m_.nq + at] - reference;
     const double within = std::clamp(start, std::isfinite(own.lower) ? own.lower : start,
                                      std::isfinite(own.upper) ? std::max(own.upper, own.lower) : start);
     if (within != start)

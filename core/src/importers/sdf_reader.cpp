@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "delassus/error.hpp"
 
@@ -343,19 +342,11 @@ void SdfReader::read_coordinate(const sdf::JointAxis& axis, const std::string& w
     if (coordinate.stiffness > 0.0) coordinate.rest = axis.SpringReference();
     if (coordinate.damping < 0.0 || coordinate.friction < 0.0 || coordinate.stiffness < 0.0)
         throw InputError(fmt::format("{} has a negative damping, friction or stiffness", what));
-    // 1e16 stands for no limit.
-    const double most = turns ? std::numbers::pi : 1e15;
-    const double lower = axis.Lower(), upper = axis.Upper();
-    if (lower > -most) own.lower = lower;
-    if (upper < most) own.upper = upper;
-    const auto beyond = [&](double limit, const char* which) {
-        if (turns && std::abs(limit) >= most && std::abs(limit) < 1e15)
-            model_.lose(what,
-                        fmt::format("the {} limit, {:.6g} rad: a stop must lie within half a turn of 0", which, limit));
-    };
-    beyond(lower, "lower");
-    beyond(upper, "upper");
-    if (own.lower > own.upper) throw InputError(fmt::format("the limits of {} are {} and {}", what, lower, upper));
+    constexpr double no_limit = 1e15;  // 1e16 and infinity stand for none
+    if (axis.Lower() > -no_limit) own.lower = axis.Lower();
+    if (axis.Upper() < no_limit) own.upper = axis.Upper();
+    if (own.lower > own.upper)
+        throw InputError(fmt::format("the limits of {} are {} and {}", what, own.lower, own.upper));
     const double start = own.lower > 0.0 ? own.lower : own.upper < 0.0 ? own.upper : 0.0;
     if (start != 0.0) {
         coordinate.start = start;

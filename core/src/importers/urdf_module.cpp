@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <set>
 #include <string>
 
@@ -206,20 +205,11 @@ private:
         if (!joint.limits) return;
         if (joint.limits->effort > 0.0 || joint.limits->velocity > 0.0) efforts_.push_back(joint.name);
         if (joint.type == urdf::Joint::CONTINUOUS) return;
-        own.lower = joint.limits->lower - zero;
-        own.upper = joint.limits->upper - zero;
+        if (std::isfinite(joint.limits->lower)) own.lower = joint.limits->lower - zero;
+        if (std::isfinite(joint.limits->upper)) own.upper = joint.limits->upper - zero;
         if (own.lower > own.upper)
             throw InputError(
                 fmt::format("the limits of {} are {} and {}", what, joint.limits->lower, joint.limits->upper));
-        const auto drop = [&](double& limit, const char* which) {
-            model_.lose(what,
-                        fmt::format("the {} limit, {:.6g} rad from where the scene has its 0: a stop must lie within "
-                                    "half a turn of it",
-                                    which, limit));
-            limit = model_import::none;
-        };
-        if (turns && !(own.lower > -std::numbers::pi)) drop(own.lower, "lower");
-        if (turns && !(own.upper < std::numbers::pi)) drop(own.upper, "upper");
         const double start = own.lower > 0.0 ? own.lower : own.upper < 0.0 ? own.upper : 0.0;
         if (start != 0.0) {
             coordinate.start = start;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "delassus/error.hpp"
+#include "mechanics/angle.hpp"
 #include "mechanics/kinematic_tree.hpp"
 #include "mechanics/tree_derivatives.hpp"
 
@@ -32,6 +33,20 @@ struct JointCoordinates::Implementation {
             link_at[static_cast<std::size_t>(tree.links()[k].body_column / 6)] = k;
             turns = turns || !spins_alone(k);
         }
+        std::vector<bool> in_trees(static_cast<std::size_t>(system.joint_count()), false);
+        for (const Link& link : tree.links()) {
+            if (link.joint < 0) continue;
+            in_trees[static_cast<std::size_t>(link.joint)] = true;
+            if (const std::int32_t place = system.angle_position(link.joint); place >= 0)
+                angles.push_back(
+                    {static_cast<std::size_t>(place), static_cast<std::size_t>(link.position + link.coordinates - 1)});
+        }
+        angles_of_trees = angles.size();
+        for (std::int32_t joint = 0; joint < system.joint_count(); ++joint)
+            if (const std::int32_t place = system.angle_position(joint);
+                place >= 0 && !in_trees[static_cast<std::size_t>(joint)])
+                angles.push_back({static_cast<std::size_t>(place),
+                                  static_cast<std::size_t>(tree.position_size()) + angles.size() - angles_of_trees});
     }
 
     MultibodySystem& bodies;
@@ -41,6 +56,13 @@ struct JointCoordinates::Implementation {
     std::vector<std::int32_t> held;    // rows that the trees hold
     bool turns = false;                // a link with a joint, whose forces depend on the state
     std::vector<std::size_t> link_at;  // by the body's column / 6
+    // Angles over whole turns in q of the bodies, and in q of the trees: coordinates, and at the end of q those of
+    // joints that no tree holds.
+    struct AngleOfJoint {
+        std::size_t of_bodies, own;
+    };
+    std::vector<AngleOfJoint> angles;
+    std::size_t angles_of_trees = 0;  // these come first
     // Work space of the call that runs:
     State state;  // of the bodies
     std::vector<double> force, rates;
@@ -66,8 +88,14 @@ struct JointCoordinates::Implementation {
 
     void place(const State& at) {
         tree.place(at.q.data(), at.v.data());
-        tree.write(state);
+        write(at.q.data(), state);
         state.t = at.t;
+    }
+
+    /// After tree.place() at q.
+    void write(const double* q, State& of_bodies) const {
+        tree.write(of_bodies);
+        for (const auto& angle : angles) of_bodies.q[angle.of_bodies] = q[angle.own];
     }
 
     /// entries ← those of a row, in ascending columns, from its entries in columns of bodies: columns ascend there. A
@@ -293,12 +321,19 @@ void JointCoordinates::bodies_of(const State& state, State& result) const {
     result.v.resize(self.state.v.size());
     result.t = state.t;
     self.tree.place(state.q.data(), state.v.data());
-    self.tree.write(result);
+    self.write(state.q.data(), result);
 }
 
 State JointCoordinates::coordinates_of(const State& bodies) const {
+    const auto& self = *implementation_;
     State state;
-    implementation_->tree.read(bodies, state);
+    self.tree.read(bodies, state);
+    state.q.resize(static_cast<std::size_t>(position_size()));
+    for (std::size_t k = 0; k < self.angles.size(); ++k) {
+        const auto [of_bodies, own] = self.angles[k];
+        state.q[own] = k < self.angles_of_trees ? mechanics::Angle::nearest(state.q[own], bodies.q[of_bodies])
+                                                : bodies.q[of_bodies];
+    }
     return state;
 }
 
@@ -308,7 +343,8 @@ std::int32_t JointCoordinates::n() const {
     return implementation_->tree.n();
 }
 std::int32_t JointCoordinates::position_size() const {
-    return implementation_->tree.position_size();
+    const auto& self = *implementation_;
+    return self.tree.position_size() + static_cast<std::int32_t>(self.angles.size() - self.angles_of_trees);
 }
 std::vector<std::int32_t> JointCoordinates::constraint_blocks() const {
     return implementation_->bodies.constraint_blocks();
@@ -351,6 +387,25 @@ void JointCoordinates::increment(const double* q, const double* delta, double* r
         to[plain + 2] = turned.y();
         to[plain + 3] = turned.z();
     });
+    auto& self = *implementation_;
+    if (self.angles_of_trees == self.angles.size()) return;
+    // Angles in loops follow from the bodies: δ is their velocity at the end, as far as whole turns go.
+    for (std::size_t k = self.angles_of_trees; k < self.angles.size(); ++k)
+        result[self.angles[k].own] = q[self.angles[k].own];
+    self.tree.place(result, delta);
+    self.write(result, self.state);
+    self.bodies.add_turns(self.state.q.data(), self.state.v.data(), self.state.q.data());
+    for (std::size_t k = self.angles_of_trees; k < self.angles.size(); ++k)
+        result[self.angles[k].own] = self.state.q[self.angles[k].of_bodies];
+}
+
+void JointCoordinates::settle_turns(State& state) const {
+    auto& self = *implementation_;
+    if (self.angles_of_trees == self.angles.size()) return;
+    self.place(state);
+    self.bodies.settle_turns(self.state);
+    for (std::size_t k = self.angles_of_trees; k < self.angles.size(); ++k)
+        state.q[self.angles[k].own] = self.state.q[self.angles[k].of_bodies];
 }
 
 void JointCoordinates::difference(const double* from, const double* to, double* delta) const {

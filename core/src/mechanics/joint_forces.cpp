@@ -10,39 +10,6 @@ namespace delassus {
 using mechanics::finite_and_not_negative;
 using mechanics::refuse_unless;
 
-namespace mechanics {
-
-RowColumns Turn::columns(const Placements& at, bool with_prescribed) const {
-    RowColumns result;
-    for (const BodyIndex body : {angle.second, angle.first})
-        if (at[body].column >= 0 || (with_prescribed && at[body].prescribed())) result.add(body, at[body].column);
-    return result;
-}
-
-double Turn::value(const Placements& at, double t) const {
-    return nearest(angle.value(at), *reference) - offset - (drive ? drive->value(t) : 0.0);
-}
-
-void Turn::gradient(const Placements& at, double, const RowColumns& columns, RowVector& result) const {
-    result.setZero(6 * columns.bodies);
-    for (const bool of_second : {true, false}) {
-        const int first = columns.place(at[of_second ? angle.second : angle.first].column);
-        if (first >= 0) result.segment<3>(first + 3) = angle.coefficients(at, of_second);
-    }
-}
-
-void Turn::hessian(const Placements& at, double, const RowColumns& columns, RowMatrix& result) const {
-    result.setZero(6 * columns.bodies, 6 * columns.bodies);
-    const int row = columns.place(at[angle.second].column);
-    if (row < 0) return;
-    for (const bool along_second : {true, false}) {
-        const int column = columns.place(at[along_second ? angle.second : angle.first].column);
-        if (column >= 0) result.block<3, 3>(row + 3, column + 3) = angle.turning(at, along_second);
-    }
-}
-
-}  // namespace mechanics
-
 namespace {
 
 bool given(const JointCoordinate& forces) {
@@ -63,8 +30,6 @@ void mechanics::check_joint_forces(const JointParameters& joint) {
         refuse_unless(
             std::isfinite(coordinate->start.value_or(0.0)) && std::isfinite(coordinate->start_rate.value_or(0.0)),
             "the start of the joint", joint.name, "is not finite");
-    refuse_unless(std::abs(joint.turn.start.value_or(0.0)) <= M_PI, "the start of the joint", joint.name,
-                  "must lie in [-pi, pi] rad: whole turns do not change where bodies are");
     const auto& start = (kind == JointKind::Prismatic ? joint.slide : joint.turn).start;
     refuse_unless(!start || (!(*start < joint.lower) && !(*start > joint.upper)), "the start of the joint", joint.name,
                   "lies beyond its limits");
@@ -86,26 +51,16 @@ void mechanics::check_joint_forces(const JointParameters& joint) {
         "has no single angle for a spring, friction or start: spherical and universal joints take damping alone");
 }
 
-const double* MultibodySystem::Implementation::count_turns_of(std::int32_t joint) {
-    for (const auto& one : counted)
-        if (one.joint == joint) return one.reference.get();
-    return counted.emplace_back(CountedAngle{joint, std::make_unique<double>(0.0)}).reference.get();
-}
-
 void MultibodySystem::Implementation::add_coordinate_spring(std::int32_t index, bool turns, double stiffness,
                                                             double damping, double rest, const Motion* target,
                                                             bool potential) {
     if (stiffness == 0.0 && damping == 0.0) return;
+    if (turns) count_turns_of(index);
     const auto& joint = joints[static_cast<std::size_t>(index)];
-    if (turns) {
-        turn_springs.push_back(
-            {{joint.angle, rest, target, count_turns_of(index)}, stiffness, damping, potential, true});
-    } else {
-        mechanics::RowSpring spring{joint.slide, stiffness, damping, potential, true};
-        spring.row.offset = rest;
-        spring.row.drive = target;
-        springs.push_back(spring);
-    }
+    mechanics::RowSpring spring{turns ? joint.turn : joint.slide, stiffness, damping, potential, true};
+    spring.row.offset = rest;
+    spring.row.drive = target;
+    springs.push_back(spring);
 }
 
 void MultibodySystem::Implementation::add_joint_forces(std::int32_t index) {
@@ -122,46 +77,55 @@ void MultibodySystem::Implementation::add_joint_forces(std::int32_t index) {
     }
 }
 
-// ---- Whole turns ----
-//
-// An orientation tells an angle modulo 2π. The angle that counts is the one nearest to a reference, which is the angle
-// itself at the end of the last step that was kept. It follows from that state and a whole number, so that a run that
-// is resumed has the same bits.
+// ---- Whole turns (angle.hpp) ----
 
-std::vector<double> MultibodySystem::turns(const State& state) const {
-    const auto& self = *implementation_;
-    std::vector<double> result;
-    if (self.counted.empty()) return result;
-    self.place(state);
-    for (const auto& one : self.counted) {
-        const double angle = self.joints[static_cast<std::size_t>(one.joint)].angle.value(self.at);
-        result.push_back(std::round((*one.reference - angle) / (2.0 * M_PI)));
-    }
-    return result;
+void MultibodySystem::Implementation::count_turns_of(std::int32_t joint) {
+    std::int32_t& number = joints[static_cast<std::size_t>(joint)].turn.angle->counted;
+    if (number >= 0) return;
+    number = static_cast<std::int32_t>(counted.size());
+    counted.push_back(joint);
 }
 
-void MultibodySystem::set_turns(const State& state, const std::vector<double>& turns) {
+std::int32_t MultibodySystem::angle_position(std::int32_t index) const {
     const auto& self = *implementation_;
-    if (!turns.empty() && turns.size() != self.counted.size())
-        throw InputError(fmt::format("the turns of {} joints were given; the system counts those of {}", turns.size(),
-                                     self.counted.size()));
+    self.must_be_finished();
+    static_cast<void>(joint(index));
+    const auto& angle = self.joints[static_cast<std::size_t>(index)].turn.angle;
+    return angle && angle->counted >= 0 ? self.first_angle + angle->counted : -1;
+}
+
+// Where a motion is prescribed, its time is not known here, and the sum stands as it is.
+void MultibodySystem::add_turns(const double* q, const double* delta, double* result) const {
+    const auto& self = *implementation_;
+    const auto turn_of = [&](BodyIndex body) -> mechanics::Vector3d {
+        const std::int32_t column = self.at[body].column;
+        return column < 0 ? mechanics::Vector3d::Zero()
+                          : mechanics::Vector3d(Eigen::Map<const mechanics::Vector3d>(delta + column + 3));
+    };
+    const auto orientation_of = [&](BodyIndex body) -> mechanics::Matrix3d {
+        if (self.at[body].column < 0) return self.at[body].A;
+        const double* from = result + self.bodies[static_cast<std::size_t>(body)].position;
+        return mechanics::Quaterniond(from[3], from[4], from[5], from[6]).toRotationMatrix();
+    };
+    for (std::size_t k = 0; k < self.counted.size(); ++k) {
+        const auto& angle = *self.joints[static_cast<std::size_t>(self.counted[k])].turn.angle;
+        const auto place = static_cast<std::size_t>(self.first_angle) + k;
+        const double sum = q[place] + angle.change(turn_of(angle.first), turn_of(angle.second));
+        const bool known = !self.at[angle.first].prescribed() && !self.at[angle.second].prescribed();
+        result[place] = known ? mechanics::Angle::nearest(
+                                    angle.within_a_turn(orientation_of(angle.first), orientation_of(angle.second)), sum)
+                              : sum;
+    }
+}
+
+void MultibodySystem::settle_turns(State& state) const {
+    const auto& self = *implementation_;
     if (self.counted.empty()) return;
     self.place(state);
     for (std::size_t k = 0; k < self.counted.size(); ++k) {
-        const auto& one = self.counted[k];
-        const double angle = self.joints[static_cast<std::size_t>(one.joint)].angle.value(self.at);
-        *one.reference = angle + 2.0 * M_PI * (turns.empty() ? 0.0 : turns[k]);
+        const auto& angle = *self.joints[static_cast<std::size_t>(self.counted[k])].turn.angle;
+        state.q[static_cast<std::size_t>(self.first_angle) + k] = angle.value(self.at) - angle.prescribed_turn(self.at);
     }
-}
-
-std::vector<std::int32_t> MultibodySystem::counted_joints() const {
-    std::vector<std::int32_t> joints;
-    for (const auto& one : implementation_->counted) joints.push_back(one.joint);
-    return joints;
-}
-
-void MultibodySystem::follow(const State& state) {
-    if (!implementation_->counted.empty()) set_turns(state, turns(state));
 }
 
 }  // namespace delassus

@@ -51,6 +51,9 @@ State mechanics::with_joint_starts(const MultibodySystem& system, const State& g
     tree.place(coordinates.q.data(), coordinates.v.data());
     State result = given;
     tree.write(result);
+    for (const std::int32_t k : joints)
+        if (const auto& start = system.joint(k).turn.start)
+            result.q[static_cast<std::size_t>(system.angle_position(k))] = *start;
     return result;
 }
 

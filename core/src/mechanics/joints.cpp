@@ -72,22 +72,19 @@ std::unique_ptr<Gear> make_gear(const JointParameters& parameters, const Placeme
     const auto both = [&](JointKind kind) {
         return first && second && first->parameters.kind == kind && second->parameters.kind == kind;
     };
-    auto gear = std::make_unique<Gear>();
-    if (both(JointKind::Prismatic)) {
-        gear->slides = {first->slide, second->slide};
-        // Its bodies are those of the angles.
-        gear->first = first->angle;
-        gear->second = second->angle;
-        gear->numerator = parameters.gear_ratio;
-        return gear;
-    }
-    if (!both(JointKind::Revolute))
+    const bool slides = both(JointKind::Prismatic);
+    if (!slides && !both(JointKind::Revolute))
         throw InputError(
             fmt::format("the gear \"{}\" must join two revolute joints, or two prismatic ones", parameters.name));
-    gear->first = first->angle;
-    gear->second = second->angle;
+    auto gear = std::make_unique<Gear>();
+    gear->first = first->coordinate();
+    gear->second = second->coordinate();
+    gear->bodies = {first->parameters.first, first->parameters.second, second->parameters.first,
+                    second->parameters.second};
+    gear->numerator = parameters.gear_ratio;
+    if (slides) return gear;
     fraction_of(parameters.gear_ratio, parameters.name, gear->numerator, gear->denominator);
-    gear->offset = gear->denominator * gear->second.value(at) - gear->numerator * gear->first.value(at);
+    gear->offset = gear->denominator * gear->second.value(at, 0.0) - gear->numerator * gear->first.value(at, 0.0);
     return gear;
 }
 
@@ -174,17 +171,22 @@ Joint make_joint(const JointParameters& parameters, const Placements& at, const 
         case JointKind::Gear:
             break;
     }
-    joint.angle = {
-        a, b, in.direction(a, z), in.direction(a, x), in.direction(a, y), in.direction(b, x), in.direction(b, y)};
+    joint.turn.angle = {a,
+                        b,
+                        in.direction(a, z),
+                        in.direction(a, x),
+                        in.direction(a, y),
+                        in.direction(b, z),
+                        in.direction(b, x),
+                        in.direction(b, y)};
     joint.slide = product(r, in.axis(a, z));
     return joint;
 }
 
-// A turned by the motor: x_first(φ) = cos φ x + sin φ y must stay normal to y_second. At the angle θ of the joint,
-// y_second · x_first(φ) = sin(φ − θ); with the sign turned, C = sin(θ − φ).
 void drive_joint(Joint& joint, const MotorParameters& motor, Motions& motions) {
     const Motion& given = motor.motion;
     auto motion = std::make_unique<Motion>();
+    Row row = joint.coordinate();
     if (motor.speed) {
         if (!given.integral)
             throw InputError(
@@ -192,23 +194,13 @@ void drive_joint(Joint& joint, const MotorParameters& motor, Motions& motions) {
         motion->value = given.integral;
         motion->rate = given.value;
         motion->acceleration = given.rate;
+        const JointParameters& of = joint.parameters;
+        row.offset = (of.kind == JointKind::Revolute ? of.turn : of.slide).start.value_or(0.0);
     } else {
         *motion = given;
     }
-    if (joint.parameters.kind == JointKind::Prismatic) {
-        Row row = joint.slide;
-        row.drive = motion.get();
-        joint.rows.push_back(row);
-    } else {
-        const Angle& angle = joint.angle;
-        Row row;
-        row.u = Feature::axis(angle.first, angle.p);
-        row.u.parts[0].quarter = angle.q;
-        row.u.parts[0].turn = motion.get();
-        row.w = Feature::axis(angle.second, angle.second_q);
-        row.scale = -1.0;
-        joint.rows.push_back(row);
-    }
+    row.drive = motion.get();
+    joint.rows.push_back(row);
     joint.motors.push_back(motor.name);
     motions.push_back(std::move(motion));
 }

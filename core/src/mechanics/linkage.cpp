@@ -22,19 +22,10 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// The bodies of a joint that move.
 std::vector<BodyIndex> movers(const Joint& joint, const std::vector<Body>& bodies) {
     std::vector<BodyIndex> all = {joint.parameters.first, joint.parameters.second};
-    if (joint.gear)
-        all = {joint.gear->first.first, joint.gear->first.second, joint.gear->second.first, joint.gear->second.second};
+    if (joint.gear) all.assign(joint.gear->bodies.begin(), joint.gear->bodies.end());
     std::erase_if(
         all, [&](BodyIndex body) { return body == world_body || bodies[static_cast<std::size_t>(body)].column < 0; });
     return all;
-}
-
-bool is_driven(const Row& row) {
-    const auto turns = [](const Feature& feature) {
-        return std::any_of(feature.parts.begin(), feature.parts.begin() + feature.count,
-                           [](const Part& part) { return part.turn != nullptr; });
-    };
-    return row.drive != nullptr || turns(row.u) || turns(row.w);
 }
 
 }  // namespace
@@ -107,7 +98,7 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         grounded = grounded || own.size() < (joint.gear ? 4U : 2U);
         has_loops_ = has_loops_ || joint.gear;
         if (joint.gear) {
-            rows_.push_back({&joint, nullptr, nullptr, false, joint.gear->slides.has_value()});
+            rows_.push_back({&joint, nullptr, nullptr, false, !joint.gear->first.angle});
         } else {
             const JointParameters& given = joint.parameters;
             reach(given.first, vector(given.point));
@@ -116,8 +107,8 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         const std::size_t own_rows = joint.rows.size() - joint.motors.size();
         for (std::size_t i = 0; i < joint.rows.size(); ++i) {
             const Row& row = joint.rows[i];
-            rows_.push_back(
-                {&joint, &row, i < own_rows ? nullptr : &joint.motors[i - own_rows], is_driven(row), row.u.count == 2});
+            rows_.push_back({&joint, &row, i < own_rows ? nullptr : &joint.motors[i - own_rows], row.drive != nullptr,
+                             row.u.count == 2});
         }
         has_loops_ = has_loops_ || joint.motors.size() > 1;
         for (std::int32_t i = 0; i < joint.row_count(); ++i) numbers_.push_back(joint.first_row + i);
@@ -197,9 +188,15 @@ void Linkage::increment(State& state, const Eigen::VectorXd& change) const {
         q[5] = turned.y();
         q[6] = turned.z();
     }
+    place(state);
+    for (const RowOfJoint& one : rows_)
+        if (const auto& angle = one.joint->turn.angle; angle && angle->counted >= 0)
+            *(state.q.end() - static_cast<std::ptrdiff_t>(at_->angles.size()) + angle->counted) =
+                angle->value(*at_) - angle->prescribed_turn(*at_);
 }
 
 void Linkage::place(const State& state) const {
+    std::copy(state.q.end() - static_cast<std::ptrdiff_t>(at_->angles.size()), state.q.end(), at_->angles.begin());
     for (const BodyIndex index : prescribed_)
         (*bodies_)[static_cast<std::size_t>(index)].prescribed->place(state.t, (*at_)[index]);
     for (const BodyIndex index : members_) {
@@ -210,29 +207,17 @@ void Linkage::place(const State& state) const {
 }
 
 // ---- Rows ----
-//
-// A motor's row C = sin(θ − φ) has a second zero, half a turn away, and does not tell which is nearer. Where |θ − φ| is
-// not small, the angle itself stands for C.
 
 void Linkage::evaluate(const State& state, const std::vector<std::size_t>& rows, Values& values) const {
-    constexpr double small_cosine = 0.9;
     place(state);
     const auto m = static_cast<Eigen::Index>(rows.size());
     values.C.resize(m);
     values.rate.setZero(m);
     std::vector<Eigen::Triplet<double>> entries;
-    const auto add_turn = [&](std::size_t i, const Angle& angle, double factor) {
-        for (const bool second : {true, false}) {
-            const auto column = (*at_)[second ? angle.second : angle.first].column;
-            if (column < 0) continue;
-            const Vector3d coefficients = factor * angle.coefficients(*at_, second);
-            for (int j = 0; j < 3; ++j) entries.emplace_back(static_cast<int>(i), column + 3 + j, coefficients[j]);
-        }
-    };
     RowVector gradient;
     const auto add_row = [&](std::size_t i, const Row& row, double factor) {
         const auto columns = row.columns(*at_);
-        row.gradient(*at_, state.t, columns, gradient);
+        row.gradient(*at_, columns, gradient);
         for (int k = 0; k < columns.bodies; ++k)
             for (int j = 0; j < 6; ++j)
                 entries.emplace_back(static_cast<int>(i), columns.column[static_cast<std::size_t>(k)] + j,
@@ -245,29 +230,13 @@ void Linkage::evaluate(const State& state, const std::vector<std::size_t>& rows,
             const Gear& gear = *one.joint->gear;
             values.C[index] = gear.value(*at_, state.t);
             values.rate[index] = gear.rate(*at_, state.t);
-            if (gear.slides) {
-                add_row(i, (*gear.slides)[1], 1.0);
-                add_row(i, (*gear.slides)[0], -gear.ratio());
-            } else {
-                add_turn(i, gear.second, 1.0);
-                add_turn(i, gear.first, -gear.ratio());
-            }
+            add_row(i, gear.second, 1.0);
+            add_row(i, gear.first, -gear.ratio());
             continue;
         }
         const Row& row = *one.row;
         values.C[index] = row.value(*at_, state.t);
         values.rate[index] = row.rate(*at_, state.t);
-        if (one.driven && row.drive == nullptr) {
-            const Angle& angle = one.joint->angle;
-            const Part& turned = row.u.parts[0];
-            const double cosine =
-                ((*at_)[angle.first].A * arm(turned, state.t)).dot((*at_)[angle.second].A * angle.second_p);
-            if (cosine < small_cosine) {
-                values.C[index] = std::atan2(values.C[index], cosine);
-                add_turn(i, angle, 1.0);
-                continue;
-            }
-        }
         add_row(i, row, 1.0);
     }
     values.J.resize(m, static_cast<Eigen::Index>(6 * members_.size()));

@@ -100,7 +100,7 @@ private:
     Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& joints, std::vector<BodyIndex> members,
             const std::vector<std::int32_t>& own_joints, std::shared_ptr<Placements> at);
     void place(const State& state) const;
-    /// C, C_t and C_q of rows, C and C_q of an angle that is driven far from where it is as that angle.
+    /// C, C_t and C_q of rows.
     void evaluate(const State& state, const std::vector<std::size_t>& rows, Values& values) const;
     [[nodiscard]] double unit_of(std::size_t row) const { return rows_[row].length ? size_ : 1.0; }
     /// C_q over the unit lengths of the metric.

@@ -67,27 +67,26 @@ struct ModalLoad {
     ModalPoint point;  ///< times the weight
 };
 
-/// q₂ θ₂ − p₁ θ₁ = 0 modulo 2π, divided by q₂: the ratio p₁/q₂ of integers makes it a function of the configuration. Of
-/// slides: s₂ − (p₁/q₂) s₁ = 0.
+/// c₂ − (p₁/q₂) c₁ = 0 of the coordinates of two joints; of angles modulo 2π/q₂, which the ratio p₁/q₂ of integers
+/// makes a function of the orientations.
 struct Gear {
-    Angle first, second;
-    std::optional<std::array<Row, 2>> slides = std::nullopt;  ///< s₁ and s₂, in place of the angles
+    Row first, second;
+    std::array<BodyIndex, 4> bodies{};  ///< of both
     double numerator = 1.0, denominator = 1.0;
-    double offset = 0.0;  ///< at t = 0
+    double offset = 0.0;  ///< times q₂, at t = 0
 
     [[nodiscard]] double ratio() const { return numerator / denominator; }
-    /// ∂/∂t, by bodies whose motion is prescribed, and of angles the part of d²/dt² that their accelerations make.
+    /// Of a derivative of the coordinates, that of C.
+    [[nodiscard]] double combined(double of_first, double of_second) const { return of_second - ratio() * of_first; }
     [[nodiscard]] double rate(const Placements& at, double t) const {
-        if (slides) return (*slides)[1].rate(at, t) - ratio() * (*slides)[0].rate(at, t);
-        return second.prescribed_rate(at) - ratio() * first.prescribed_rate(at);
+        return combined(first.rate(at, t), second.rate(at, t));
     }
-    [[nodiscard]] double acceleration(const Placements& at) const {
-        return second.prescribed_acceleration(at) - ratio() * first.prescribed_acceleration(at);
+    [[nodiscard]] double curvature(const Placements& at, double t) const {
+        return combined(first.curvature(at, t), second.curvature(at, t));
     }
     [[nodiscard]] double value(const Placements& at, double t) const {
-        if (slides) return (*slides)[1].value(at, t) - ratio() * (*slides)[0].value(at, t);
-        const double angle = denominator * second.value(at) - numerator * first.value(at) - offset;
-        return std::remainder(angle, 2.0 * M_PI) / denominator;
+        const double C = denominator * second.value(at, t) - numerator * first.value(at, t) - offset;
+        return (first.angle ? std::remainder(C, 2.0 * M_PI) : C) / denominator;
     }
 };
 
@@ -97,9 +96,10 @@ struct Joint {
     std::vector<Row> rows;            ///< its own, then one of each motor
     std::vector<std::string> motors;  ///< their names
     std::unique_ptr<Gear> gear;
-    Angle angle;                 ///< Revolute
-    Row slide;                   ///< Prismatic: the coordinate
+    Row turn, slide;             ///< the coordinates about and along the axis
     std::int32_t first_row = 0;  ///< among all rows, kept or not
+    /// Revolute, Prismatic: the coordinate.
+    [[nodiscard]] const Row& coordinate() const { return parameters.kind == JointKind::Revolute ? turn : slide; }
     [[nodiscard]] std::int32_t row_count() const { return gear ? 1 : static_cast<std::int32_t>(rows.size()); }
 };
 
@@ -120,8 +120,7 @@ struct BoundedActuator {
     std::int32_t joint = -1;
     Motion position, speed;  ///< both there
     double kp = 0.0, kd = 0.0;
-    Cone box;                           ///< of its limit
-    const double* reference = nullptr;  ///< of an angle: see Turn
+    Cone box;  ///< of its limit
 };
 
 /// Dry friction in a coordinate of a joint: a box row on its speed.
@@ -131,34 +130,13 @@ struct JointFriction {
     Cone box;            ///< of its bound
 };
 
-/// The angle θ of a joint over whole turns as a coordinate with the members of a Row: C = θ − offset − drive(t). Its
-/// derivatives are those where the joint holds.
-struct Turn {
-    Angle angle;
-    double offset = 0.0;
-    const Motion* drive = nullptr;
-    const double* reference = nullptr;  ///< the angle lately: the nearest value modulo 2π counts
-
-    /// θ, from where it was lately.
-    static double nearest(double angle, double reference) {
-        return angle + 2.0 * M_PI * std::round((reference - angle) / (2.0 * M_PI));
-    }
-    [[nodiscard]] RowColumns columns(const Placements& at, bool with_prescribed = false) const;
-    [[nodiscard]] double value(const Placements& at, double t) const;
-    void gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const;
-    void hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const;
-};
-
-/// The force −(k C + c Ċ) ∇C of a coordinate C, a Row or a Turn.
-template <class Coordinate>
-struct CoordinateSpring {
-    Coordinate row;
+/// The force −(k C + c Ċ) ∇C of a row.
+struct RowSpring {
+    Row row;
     double stiffness = 0.0, damping = 0.0;
     bool potential = true;  ///< ½ k C² counts as energy; that of an actuator does not
     bool definite = false;  ///< its symmetric tangent is positive semidefinite: k ∇C ∇Cᵀ
 };
-using RowSpring = CoordinateSpring<Row>;
-using TurnSpring = CoordinateSpring<Turn>;
 
 /// The torque −c (ω_second − ω_first) on the second body and its opposite on the first.
 struct TurnDamper {

@@ -122,6 +122,7 @@ std::int32_t MultibodySystem::add_node(const NodeParameters& parameters) {
 
 mechanics::Placements MultibodySystem::Implementation::initial_placements() const {
     mechanics::Placements result(bodies.size());
+    result.angles.assign(counted.size(), 0.0);
     for (std::size_t k = 0; k < bodies.size(); ++k) {
         auto& place = result[static_cast<BodyIndex>(k)];
         place.x = vector(bodies[k].parameters.pose.position);
@@ -151,6 +152,8 @@ std::int32_t MultibodySystem::add_joint(const JointParameters& parameters) {
     self.joints.push_back(mechanics::make_joint(parameters, self.initial_placements(), self.joints));
     if (parameters.kind != JointKind::Gear) keep_apart(parameters.first, parameters.second);
     const auto index = static_cast<std::int32_t>(self.joints.size()) - 1;
+    if (parameters.kind == JointKind::Revolute && (limited || parameters.turn.start)) self.count_turns_of(index);
+    if (parameters.kind == JointKind::Cylindrical && parameters.turn.start) self.count_turns_of(index);
     self.add_joint_forces(index);
     return index;
 }
@@ -169,6 +172,7 @@ void MultibodySystem::add_motor(const MotorParameters& motor) {
     refuse_unless(motor.force_limit >= 0.0, "the force limit of the motor", name, "must not be negative");
     self.motion_corners.add(motor.motion);
     if (std::isinf(motor.force_limit)) {
+        if (joint.parameters.kind == JointKind::Revolute) self.count_turns_of(motor.joint);
         mechanics::drive_joint(joint, motor, self.motions);
     } else {
         refuse_unless(motor.speed, "the motor", name, "has a force limit, so it must be driven by speed");
@@ -203,8 +207,8 @@ void MultibodySystem::add_actuator(const ActuatorParameters& actuator) {
                                           {rate, nullptr, nullptr, nullptr},
                                           actuator.kp,
                                           actuator.kd,
-                                          mechanics::box_of(actuator.force_limit),
-                                          kind == JointKind::Revolute ? self.count_turns_of(actuator.joint) : nullptr});
+                                          mechanics::box_of(actuator.force_limit)});
+        if (kind == JointKind::Revolute) self.count_turns_of(actuator.joint);
         return;
     }
     const auto drive = [&](double kp, double kd, const Motion& target) {
@@ -365,6 +369,8 @@ void MultibodySystem::finish() {
         self.n += 3;
     }
     self.reduce_bodies();
+    self.first_angle = self.position_size;
+    self.position_size += static_cast<std::int32_t>(self.counted.size());
     self.at = self.initial_placements();
     for (std::size_t k = 0; k < self.bodies.size(); ++k)
         self.at[static_cast<BodyIndex>(k)].column =
@@ -468,6 +474,7 @@ void MultibodySystem::Implementation::place(const double* q, const double* v, do
             place.omega = Eigen::Map<const Vector3d>(v + body.column + 3);
         }
     }
+    std::copy_n(q + first_angle, counted.size(), at.angles.begin());
     place_modal(q, v);
 }
 
@@ -629,6 +636,7 @@ State MultibodySystem::initial_state() const {
         state.v.insert(state.v.end(), node.parameters.velocity.begin(), node.parameters.velocity.end());
     }
     self.append_modal_start(state);
+    state.q.insert(state.q.end(), self.counted.size(), 0.0);
     self.carry_nodes(state);
     return state;
 }
@@ -665,6 +673,7 @@ void MultibodySystem::increment(const double* q, const double* delta, double* re
         for (Eigen::Index a = 0; a < body.model.inertia.modes(); ++a)
             result[body.position + 7 + a] = q[body.position + 7 + a] + delta[body.column + 6 + a];
     }
+    add_turns(q, delta, result);
 }
 
 void MultibodySystem::difference(const double* from, const double* to, double* delta) const {

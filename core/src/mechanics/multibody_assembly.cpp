@@ -95,6 +95,17 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
     if (size_of(before) > 0.0) done.velocity_share = std::max(done.velocity_share, share);
 }
 
+// The angle of a joint is known modulo 2π, and its motor says which value it has.
+void MultibodySystem::Implementation::choose_turns_of_motors(State& state) const {
+    place(state);
+    for (const auto& joint : joints)
+        for (const auto& row : joint.rows)
+            if (row.angle && row.drive)
+                state.q[static_cast<std::size_t>(first_angle + row.angle->counted)] =
+                    mechanics::Angle::nearest(row.angle->value(at), row.drive->value(state.t) + row.offset) -
+                    row.angle->prescribed_turn(at);
+}
+
 const Assembly& MultibodySystem::assemble() {
     auto& self = *implementation_;
     self.must_be_finished();
@@ -104,7 +115,8 @@ const Assembly& MultibodySystem::assemble() {
         keep_rows(self.first_kept_rows);
         return *self.assembly;
     }
-    const State given = mechanics::with_joint_starts(*this, initial_state());
+    State given = mechanics::with_joint_starts(*this, initial_state());
+    self.choose_turns_of_motors(given);
     State state = given;
     Assembly done;
     for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {
@@ -135,6 +147,7 @@ const Assembly& MultibodySystem::assemble() {
         self.redundant.push_back(std::move(linkage));
     }
     self.carry_nodes(state);
+    settle_turns(state);
     self.first_kept_rows = self.kept_rows;
     self.assembled = std::move(state);
     return self.assembly.emplace(done);
@@ -208,8 +221,10 @@ bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
         }
         renewed = true;
     }
-    if (renewed) self.carry_nodes(state);
-    return renewed;
+    if (!renewed) return false;
+    self.carry_nodes(state);
+    settle_turns(state);
+    return true;
 }
 
 std::vector<double> MultibodySystem::all_multipliers(const std::vector<double>& kept) const {

@@ -7,7 +7,6 @@
 
 namespace delassus {
 
-using mechanics::arm;
 using mechanics::Attachment;
 using mechanics::Feature;
 using mechanics::Gear;
@@ -82,12 +81,12 @@ void MultibodySystem::all_constraints(const State& state, double* C) const {
         put(one.value(self.modal_at[static_cast<std::size_t>(one.reduced)], self.at[one.body]), C + one.first_row);
 }
 
-void MultibodySystem::Implementation::add_gradient(const Row& row, double t, std::int32_t to, MatrixAssembler& D,
+void MultibodySystem::Implementation::add_gradient(const Row& row, std::int32_t to, MatrixAssembler& D,
                                                    double factor) const {
     const auto columns = row.columns(at);
-    row.gradient(at, t, columns, gradient);
+    row.gradient(at, columns, gradient);
     for (int k = 0; k < columns.bodies; ++k)
-        for (int j = 0; j < 6; ++j)
+        for (int j = row.angle ? 3 : 0; j < 6; ++j)
             D.add(to, columns.column[static_cast<std::size_t>(k)] + j, factor * gradient[6 * k + j]);
 }
 
@@ -96,26 +95,16 @@ void MultibodySystem::add_joint_jacobian(const State& state, MatrixAssembler& D)
     self.place(state.q.data(), nullptr, state.t);
     for (const auto& joint : self.joints)
         for (std::size_t i = 0; i < joint.rows.size(); ++i)
-            self.add_gradient(joint.rows[i], state.t, joint.first_row + static_cast<std::int32_t>(i), D);
+            self.add_gradient(joint.rows[i], joint.first_row + static_cast<std::int32_t>(i), D);
 }
 
 void MultibodySystem::add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const {
     const auto& self = *implementation_;
     self.place(state.q.data(), nullptr, state.t);
-    self.for_each_row([&](std::int32_t i, const Row& row) { self.add_gradient(row, state.t, first_row + i, D); });
+    self.for_each_row([&](std::int32_t i, const Row& row) { self.add_gradient(row, first_row + i, D); });
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
-        if (gear.slides) {
-            self.add_gradient((*gear.slides)[1], state.t, first_row + i, D);
-            self.add_gradient((*gear.slides)[0], state.t, first_row + i, D, -gear.ratio());
-            return;
-        }
-        for (const auto& [angle, factor] : self.terms_of(gear))
-            for (const bool second : {true, false}) {
-                const auto column = self.at[second ? angle.second : angle.first].column;
-                if (column < 0) continue;
-                const Vector3d coefficients = factor * angle.coefficients(self.at, second);
-                for (int j = 0; j < 3; ++j) D.add(first_row + i, column + 3 + j, coefficients[j]);
-            }
+        self.add_gradient(gear.second, first_row + i, D);
+        self.add_gradient(gear.first, first_row + i, D, -gear.ratio());
     });
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         const auto node = self.nodes[static_cast<std::size_t>(one.node)].column;
@@ -153,19 +142,7 @@ void MultibodySystem::constraint_curvature(const State& state, double* c) const 
     const auto& self = *implementation_;
     self.place(state);
     self.for_each_row([&](std::int32_t i, const Row& row) { c[i] = row.curvature(self.at, state.t); });
-    // θ̇ = z · (ω_s − ω_f), and at ω̄˙ = 0 also ω̇ = 0: what is left is ż · (ω_s − ω_f) = (ω_f × z) · ω_s.
-    self.for_each_gear([&](std::int32_t i, const Gear& gear) {
-        if (gear.slides) {
-            c[i] = (*gear.slides)[1].curvature(self.at, state.t) -
-                   gear.ratio() * (*gear.slides)[0].curvature(self.at, state.t);
-            return;
-        }
-        c[i] = gear.acceleration(self.at);
-        for (const auto& [angle, factor] : self.terms_of(gear)) {
-            const auto &first = self.at[angle.first], &second = self.at[angle.second];
-            c[i] += factor * (first.A * first.omega.cross(angle.z)).dot(second.A * second.omega);
-        }
-    });
+    self.for_each_gear([&](std::int32_t i, const Gear& gear) { c[i] = gear.curvature(self.at, state.t); });
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
         Eigen::Map<Vector3d>(c + i) = one.curvature(body);
     });
@@ -182,7 +159,7 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
     mechanics::RowMatrix sum;
     self.for_each_row([&](std::int32_t i, const Row& row) {
         const auto columns = row.columns(self.at);
-        row.hessian(self.at, state.t, columns, self.hessian);
+        row.hessian(self.at, columns, self.hessian);
         if (columns.bodies == common.bodies && columns.column == common.column) {
             sum += factor * lambda[i] * self.hessian;
             return;
@@ -193,35 +170,12 @@ void MultibodySystem::add_constraint_stiffness(const State& state, const double*
     });
     add_local(common, sum, 1.0, tangent, H);
     self.for_each_gear([&](std::int32_t i, const Gear& gear) {
-        if (gear.slides) {
-            for (const bool second : {true, false}) {
-                const Row& slide = (*gear.slides)[second ? 1 : 0];
-                const auto columns = slide.columns(self.at);
-                slide.hessian(self.at, state.t, columns, self.hessian);
-                const double weight = second ? 1.0 : -gear.ratio();
-                add_local(columns, self.hessian, factor * lambda[i] * weight, tangent, H);
-            }
-            return;
-        }
-        for (const auto& [angle, scale] : self.terms_of(gear)) {
-            const auto first = self.at[angle.first].column, second = self.at[angle.second].column;
-            if (second < 0) continue;
-            const double weight = factor * scale * lambda[i];
-            for (const bool along_second : {true, false}) {
-                const auto column = along_second ? second : first;
-                if (column < 0) continue;
-                const Matrix3d block = angle.turning(self.at, along_second);
-                for (int a = 0; a < 3; ++a)
-                    for (int b = 0; b < 3; ++b) {
-                        const double value = weight * block(a, b);
-                        if (tangent == Tangent::Exact) {
-                            H.add(second + 3 + a, column + 3 + b, value);
-                        } else {
-                            H.add(second + 3 + a, column + 3 + b, 0.5 * value);
-                            H.add(column + 3 + b, second + 3 + a, 0.5 * value);
-                        }
-                    }
-            }
+        for (const bool second : {true, false}) {
+            const Row& row = second ? gear.second : gear.first;
+            const auto columns = row.columns(self.at);
+            row.hessian(self.at, columns, self.hessian);
+            const double weight = second ? 1.0 : -gear.ratio();
+            add_local(columns, self.hessian, factor * lambda[i] * weight, tangent, H);
         }
     });
     self.for_each_attachment([&](std::int32_t i, const Attachment& one, const Placement& body) {
@@ -267,14 +221,14 @@ void MultibodySystem::add_definite_constraint_stiffness(const State& state, cons
             const Row& row = joint.rows[i];
             const auto place = self.place_of(joint, i);
             if (row.u.count != 2 || place < 0) continue;
-            force += row.force(self.at, state.t, lambda[place]);
+            force += row.force(self.at, lambda[place]);
             span = &row.u;
         }
         if (span == nullptr) continue;
         for (const auto& part : span->parts) {
             const auto& place = self.at[part.body];
             if (place.column < 0) continue;
-            const Vector3d c = arm(part, state.t);
+            const Vector3d& c = part.arm;
             const auto& body = self.bodies[static_cast<std::size_t>(part.body)];
             const double moment = body.parameters.mass * c.squaredNorm() + body.inertia.diagonal().minCoeff();
             const double k = factor * part.sign * c.dot(place.A.transpose() * force) - 0.1 * moment;

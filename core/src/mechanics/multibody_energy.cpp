@@ -26,34 +26,36 @@ double MultibodySystem::kinetic_energy(const State& state) const {
     for (std::size_t k = 0; k < self.reduced.size(); ++k) energy += self.modal_dynamics(k).kinetic_energy();
     if (self.beam_inertias.empty() && !self.has_armature) return energy;
     self.place(state);
-    energy += self.energy_of_rotors(state.t);
+    energy += self.energy_of_rotors();
     self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.kinetic_energy(at); });
     return energy;
 }
 
 // ½ a ċ² of each coordinate c, and ½ a |ω_second − ω_first|² of a ball joint.
-double MultibodySystem::Implementation::energy_of_rotors(double t) const {
+double MultibodySystem::Implementation::energy_of_rotors() const {
     double energy = 0.0;
     for (const auto& joint : joints) {
         const auto &slide = joint.parameters.slide, &turn = joint.parameters.turn;
-        if (slide.armature > 0.0) {
-            const auto columns = joint.slide.columns(at);
-            joint.slide.gradient(at, t, columns, gradient);
-            double rate = 0.0;
-            for (int k = 0; k < columns.bodies; ++k) {
-                const auto& place = at[columns.body[static_cast<std::size_t>(k)]];
-                rate += gradient.segment<3>(6 * k).dot(place.v) + gradient.segment<3>(6 * k + 3).dot(place.omega);
-            }
-            energy += 0.5 * slide.armature * rate * rate;
-        }
+        if (slide.armature > 0.0) energy += 0.5 * slide.armature * std::pow(rate_of(joint.slide), 2);
         if (turn.armature == 0.0) continue;
         const auto &first = at[joint.parameters.first], &second = at[joint.parameters.second];
         const double square = joint.parameters.kind == JointKind::Spherical
                                   ? (second.A * second.omega - first.A * first.omega).squaredNorm()
-                                  : std::pow(joint.angle.rate(at), 2);
+                                  : std::pow(rate_of(joint.turn), 2);
         energy += 0.5 * turn.armature * square;
     }
     return energy;
+}
+
+double MultibodySystem::Implementation::rate_of(const mechanics::Row& coordinate) const {
+    const auto columns = coordinate.columns(at);
+    coordinate.gradient(at, columns, gradient);
+    double rate = coordinate.rate(at, 0.0);
+    for (int k = 0; k < columns.bodies; ++k) {
+        const auto& place = at[columns.body[static_cast<std::size_t>(k)]];
+        rate += gradient.segment<3>(6 * k).dot(place.v) + gradient.segment<3>(6 * k + 3).dot(place.omega);
+    }
+    return rate;
 }
 
 std::array<Vector3, 2> MultibodySystem::momentum(const State& state) const {
@@ -99,11 +101,11 @@ double MultibodySystem::energy(const State& state) const {
                   self.reduced[k].model.inertia.mass * gravity.dot(self.modal_at[k].x);
     self.for_each_inertia([&](const auto& inertia, const auto& at) { energy += inertia.potential(at, gravity); });
     self.for_each_element(state, [&](const auto& element, const auto& at) { energy += element.energy(at); });
-    self.for_each_spring([&](const auto& spring) {
-        if (!spring.potential) return;
+    for (const auto& spring : self.springs) {
+        if (!spring.potential) continue;
         const double stretch = spring.row.value(self.at, state.t);
         energy += 0.5 * spring.stiffness * stretch * stretch;
-    });
+    }
     return energy;
 }
 

@@ -187,9 +187,9 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
     }
     for (const auto& node : self.nodes)
         if (node.column >= 0) Eigen::Map<Vector3d>(result + node.column) += factor * node.parameters.mass * gravity;
-    self.for_each_spring([&](const auto& spring) {
+    for (const auto& spring : self.springs) {
         const auto columns = spring.row.columns(self.at, true);
-        spring.row.gradient(self.at, state.t, columns, self.gradient);
+        spring.row.gradient(self.at, columns, self.gradient);
         double force = spring.stiffness * spring.row.value(self.at, state.t);
         const RowVector v = velocities_of(columns, self.at);
         for (int k = 0; k < 6 * columns.bodies; ++k) force += spring.damping * self.gradient[k] * v[k];
@@ -197,7 +197,7 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
         for (int k = 0; k < columns.bodies; ++k)
             if (const auto column = columns.column[static_cast<std::size_t>(k)]; column >= 0)
                 for (int i = 0; i < 6; ++i) result[column + i] -= factor * force * self.gradient[6 * k + i];
-    });
+    }
     for (const auto& damper : self.turn_dampers) {
         const auto &first = self.at[damper.first], &second = self.at[damper.second];
         const Vector3d torque = -damper.damping * (second.A * second.omega - first.A * first.omega);
@@ -248,14 +248,15 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
 void MultibodySystem::add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state);
-    self.for_each_spring([&](const auto& spring) {
+    for (const auto& spring : self.springs) {
         const auto columns = spring.row.columns(self.at, true);
-        spring.row.gradient(self.at, state.t, columns, self.gradient);
+        spring.row.gradient(self.at, columns, self.gradient);
         if (spring.definite && tangent == Tangent::Symmetric) {
             const RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose();
-            return add_local(columns, K, factor, tangent, H);
+            add_local(columns, K, factor, tangent, H);
+            continue;
         }
-        spring.row.hessian(self.at, state.t, columns, self.hessian);
+        spring.row.hessian(self.at, columns, self.hessian);
         const RowVector v = velocities_of(columns, self.at);
         double force = spring.stiffness * spring.row.value(self.at, state.t) + spring.damping * self.gradient.dot(v);
         if (spring.row.drive) force -= spring.damping * spring.row.drive->rate(state.t);
@@ -263,7 +264,7 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
         RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose() + force * self.hessian;
         K += spring.damping * self.gradient * turning.transpose();
         add_local(columns, K, factor, tangent, H);
-    });
+    }
     for (const auto& damper : self.turn_dampers) {
         if (tangent == Tangent::Symmetric) break;  // as of coordinates
         add_damper(
@@ -306,13 +307,13 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
 void MultibodySystem::add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state);
-    self.for_each_spring([&](const auto& spring) {
-        if (spring.damping == 0.0) return;
+    for (const auto& spring : self.springs) {
+        if (spring.damping == 0.0) continue;
         const auto columns = spring.row.columns(self.at);
-        spring.row.gradient(self.at, state.t, columns, self.gradient);
+        spring.row.gradient(self.at, columns, self.gradient);
         const RowMatrix R = spring.damping * self.gradient * self.gradient.transpose();
         add_local(columns, R, factor, tangent, H);
-    });
+    }
     for (const auto& damper : self.turn_dampers)
         add_damper(
             damper, self.at, factor, tangent, H,
@@ -336,8 +337,8 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
 
 bool MultibodySystem::has_stiffness() const {
     const auto& self = *implementation_;
-    return !self.springs.empty() || !self.turn_springs.empty() || !self.turn_dampers.empty() || !self.loads.empty() ||
-           !self.element_sides.empty() || !self.cables.empty() || !self.beams.empty();
+    return !self.springs.empty() || !self.turn_dampers.empty() || !self.loads.empty() || !self.element_sides.empty() ||
+           !self.cables.empty() || !self.beams.empty();
 }
 
 }  // namespace delassus

@@ -22,15 +22,10 @@ struct MultibodySystem::Implementation {
     std::vector<mechanics::Node> nodes;
     std::vector<mechanics::Joint> joints;
     std::vector<mechanics::RowSpring> springs;
-    std::vector<mechanics::TurnSpring> turn_springs;
     std::vector<mechanics::TurnDamper> turn_dampers;
     std::vector<mechanics::JointFriction> frictions;
-    bool has_armature = false;  // of a joint
-    struct CountedAngle {
-        std::int32_t joint = -1;
-        std::unique_ptr<double> reference;  ///< its address lasts
-    };
-    std::vector<CountedAngle> counted;
+    bool has_armature = false;          // of a joint
+    std::vector<std::int32_t> counted;  // joints whose angles are counted in turns
     std::vector<mechanics::Load> loads;
     std::vector<mechanics::Attachment> attachments;  // to bodies that move
     std::vector<mechanics::LinearTetrahedron> linear_tetrahedra;
@@ -63,6 +58,7 @@ struct MultibodySystem::Implementation {
 
     // ---- Since finish() ----
     std::int32_t n = 0, position_size = 0;
+    std::int32_t first_angle = 0;             // in q, of `counted`
     std::vector<ReducedBody> reduced_bodies;  // as `reduced`
     std::vector<mechanics::ModalLoad> modal_loads;
     // Of all joints' rows, then of attachments, those of reduced bodies last: number among those that are kept, −1:
@@ -118,22 +114,17 @@ struct MultibodySystem::Implementation {
     void place(const double* q, const double* v, double t) const;
     void place(const State& state) const { place(state.q.data(), state.v.data(), state.t); }
 
-    /// Where the angle of a joint counts its turns from.
-    const double* count_turns_of(std::int32_t joint);
+    /// From now on q has the angle of the joint over whole turns. Before copies of the angle are made.
+    void count_turns_of(std::int32_t joint);
     /// −k (C − target(t)) − c (Ċ − target˙(t)), C being the coordinate less `rest`; target may be null.
     void add_coordinate_spring(std::int32_t joint, bool turns, double stiffness, double damping, double rest,
                                const Motion* target, bool potential);
     /// What the parameters of a joint say of its coordinates.
     void add_joint_forces(std::int32_t joint);
     /// The kinetic energy of armatures; after place().
-    [[nodiscard]] double energy_of_rotors(double t) const;
-    /// Visits the springs of rows, then those of angles.
-    template <class Visitor>
-    void for_each_spring(Visitor&& visit) const {
-        for (const auto& spring : springs) visit(spring);
-        for (const auto& spring : turn_springs) visit(spring);
-    }
-
+    [[nodiscard]] double energy_of_rotors() const;
+    /// ċ of a coordinate, its ∂c/∂t among it; after place().
+    [[nodiscard]] double rate_of(const mechanics::Row& coordinate) const;
     [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
     [[nodiscard]] mechanics::NodePlacement node_of_reduced(std::int32_t node, const double* q, const double* v) const;
     /// Visits all elements with the placements of their nodes or bodies: visit(element, placements). After place().
@@ -166,8 +157,7 @@ struct MultibodySystem::Implementation {
         return place_of_row[static_cast<std::size_t>(joint.first_row) + i];
     }
     /// D ← with the gradient of a row of a joint in its row `to`; at the placement of now.
-    void add_gradient(const mechanics::Row& row, double t, std::int32_t to, MatrixAssembler& D,
-                      double factor = 1.0) const;
+    void add_gradient(const mechanics::Row& row, std::int32_t to, MatrixAssembler& D, double factor = 1.0) const;
     /// Visits the kept rows of all joints but gears: visit(row of C, Row).
     template <class Visitor>
     void for_each_row(Visitor&& visit) const {
@@ -188,6 +178,7 @@ struct MultibodySystem::Implementation {
     /// state ← with the kept rows of a linkage assembled, if they do not hold; done ← with what that changed since
     /// `given`. Throws InputError.
     void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done) const;
+    void choose_turns_of_motors(State& state) const;
 
     /// Visits the attachments: visit(first row of C, Attachment, placement of its body).
     template <class Visitor>
@@ -238,15 +229,6 @@ struct MultibodySystem::Implementation {
         const auto count = static_cast<std::int32_t>(6 + own.s.size());
         visit(0, own.column, count);
         if (body.column >= 0) visit(count, body.column, 6);
-    }
-
-    /// The two angles of a gear with their factors in C.
-    struct GearTerm {
-        const mechanics::Angle& angle;
-        double factor;
-    };
-    static std::array<GearTerm, 2> terms_of(const mechanics::Gear& gear) {
-        return {GearTerm{gear.second, 1.0}, GearTerm{gear.first, -gear.ratio()}};
     }
 
     /// The body of a shape or of a node contact, or the node: bodies first, nodes after them, −1 for the world.

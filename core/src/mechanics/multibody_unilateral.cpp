@@ -131,48 +131,16 @@ void MultibodySystem::Implementation::predict_displacements(double h, const Stat
 
 namespace {
 
-/// A joint's coordinate, its speed, and the part of it that bodies of prescribed motion have.
-struct Coordinate {
-    double value = 0.0, speed = 0.0, rate = 0.0;
-};
-
-double prescribed_rate_of(const mechanics::Joint& joint, bool turns, const mechanics::Placements& at) {
-    return turns ? joint.angle.prescribed_rate(at) : joint.slide.rate(at, 0.0);
-}
-
-Coordinate coordinate_of(const mechanics::Joint& joint, const mechanics::Placements& at) {
-    const bool turns = joint.parameters.kind == JointKind::Revolute;
-    const double rate = prescribed_rate_of(joint, turns, at);
-    if (turns) return {joint.angle.value(at), joint.angle.rate(at), rate};
-    Coordinate result{joint.slide.value(at, 0.0), rate, rate};
-    const auto columns = joint.slide.columns(at);
-    mechanics::RowVector gradient;
-    joint.slide.gradient(at, 0.0, columns, gradient);
-    for (const auto body : {joint.parameters.first, joint.parameters.second}) {
-        if (at[body].column < 0) continue;
-        const int first = columns.place(at[body].column);
-        result.speed += gradient.segment<3>(first).dot(at[body].v) + gradient.segment<3>(first + 3).dot(at[body].omega);
-    }
-    return result;
-}
-
-void put_coordinate_row(const mechanics::Joint& joint, bool turns, const mechanics::Placements& at, double sign,
+void put_coordinate_row(const mechanics::Row& coordinate, const mechanics::Placements& at, double sign,
                         UnilateralRows& rows) {
-    if (turns) {
-        for (const bool second : {false, true}) {
-            const auto& place = at[second ? joint.angle.second : joint.angle.first];
-            if (place.column < 0) continue;
-            const Vector3d coefficients = sign * joint.angle.coefficients(at, second);
-            rows.entries(place.column + 3, {coefficients.data(), 3});
-        }
-        return;
-    }
-    const auto columns = joint.slide.columns(at);
+    const auto columns = coordinate.columns(at);
     mechanics::RowVector gradient;
-    joint.slide.gradient(at, 0.0, columns, gradient);
+    coordinate.gradient(at, columns, gradient);
+    const int first = coordinate.angle ? 3 : 0;
     for (int k = 0; k < columns.bodies; ++k) {
         const Eigen::Matrix<double, 6, 1> part = sign * gradient.segment<6>(6 * k);
-        rows.entries(columns.column[static_cast<std::size_t>(k)], {part.data(), 6});
+        rows.entries(columns.column[static_cast<std::size_t>(k)] + first,
+                     {part.data() + first, static_cast<std::size_t>(6 - first)});
     }
 }
 
@@ -185,19 +153,17 @@ void MultibodySystem::Implementation::collect_limits(double h, UnilateralRows& r
         const auto& joint = joints[k];
         const auto& limits = joint.parameters;
         if (std::isnan(limits.lower) && std::isnan(limits.upper)) continue;
-        const bool turns = limits.kind == JointKind::Revolute;
-        const Coordinate now = coordinate_of(joint, at);
-        const double reach = 2.0 * h * std::abs(now.speed) + 0.01;
-        if (!std::isnan(limits.lower) && now.value - limits.lower < reach) {
-            put_coordinate_row(joint, turns, at, 1.0, rows);
-            rows.end_row(now.value - limits.lower, now.rate);
-            rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Lower, number_in(numbers.joints, k)));
-        }
-        if (!std::isnan(limits.upper) && limits.upper - now.value < reach) {
-            put_coordinate_row(joint, turns, at, -1.0, rows);
-            rows.end_row(limits.upper - now.value, -now.rate);
-            rows.end_block(Cone::nonnegative(1), key_of(KeyKind::Upper, number_in(numbers.joints, k)));
-        }
+        const auto& coordinate = joint.coordinate();
+        const double now = coordinate.value(at, 0.0), rate = coordinate.rate(at, 0.0);
+        const double reach = 2.0 * h * std::abs(rate_of(coordinate)) + 0.01;
+        const auto put = [&](double sign, double gap, KeyKind kind) {
+            if (!(gap < reach)) return;
+            put_coordinate_row(coordinate, at, sign, rows);
+            rows.end_row(gap, sign * rate);
+            rows.end_block(Cone::nonnegative(1), key_of(kind, number_in(numbers.joints, k)));
+        };
+        put(1.0, now - limits.lower, KeyKind::Lower);
+        put(-1.0, limits.upper - now, KeyKind::Upper);
     }
 }
 
@@ -205,8 +171,9 @@ void MultibodySystem::Implementation::collect_limits(double h, UnilateralRows& r
 void MultibodySystem::Implementation::collect_frictions(UnilateralRows& rows) const {
     for (const auto& [index, turns, box] : frictions) {
         const auto& joint = joints[static_cast<std::size_t>(index)];
-        put_coordinate_row(joint, turns, at, 1.0, rows);
-        rows.end_row(0.0, prescribed_rate_of(joint, turns, at));
+        const auto& coordinate = turns ? joint.turn : joint.slide;
+        put_coordinate_row(coordinate, at, 1.0, rows);
+        rows.end_row(0.0, coordinate.rate(at, 0.0));
         rows.end_block(
             box, key_of(KeyKind::Friction, number_in(numbers.joints, static_cast<std::size_t>(index)), turns ? 1 : 0));
     }
@@ -216,9 +183,8 @@ void MultibodySystem::Implementation::collect_motors(double t, UnilateralRows& r
     for (std::size_t k = 0; k < bounded_motors.size(); ++k) {
         const auto& motor = bounded_motors[k];
         const auto& joint = joints[static_cast<std::size_t>(motor.joint)];
-        const bool turns = joint.parameters.kind == JointKind::Revolute;
-        put_coordinate_row(joint, turns, at, 1.0, rows);
-        rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - motor.speed.value(t));
+        put_coordinate_row(joint.coordinate(), at, 1.0, rows);
+        rows.end_row(0.0, joint.coordinate().rate(at, 0.0) - motor.speed.value(t));
         rows.end_block(motor.box, key_of(KeyKind::Motor, number_in(numbers.motors, k)));
     }
 }
@@ -230,13 +196,12 @@ void MultibodySystem::Implementation::collect_actuators(double t, double h, Unil
     for (std::size_t k = 0; k < bounded_actuators.size(); ++k) {
         const auto& one = bounded_actuators[k];
         const auto& joint = joints[static_cast<std::size_t>(one.joint)];
-        const bool turns = one.reference != nullptr;
-        const double value =
-            turns ? mechanics::Turn::nearest(joint.angle.value(at), *one.reference) : joint.slide.value(at, 0.0);
+        const auto& coordinate = joint.coordinate();
+        const double value = coordinate.value(at, 0.0);
         const double force = one.kp * (one.position.value(t + h) - value) + one.kd * one.speed.value(t + h);
         const double gain = one.kd + h * one.kp;
-        put_coordinate_row(joint, turns, at, 1.0, rows);
-        rows.end_row(0.0, prescribed_rate_of(joint, turns, at) - force / gain);
+        put_coordinate_row(coordinate, at, 1.0, rows);
+        rows.end_row(0.0, coordinate.rate(at, 0.0) - force / gain);
         rows.end_block(one.box, key_of(KeyKind::Actuator, number_in(numbers.actuators, k)), 0.0, 1.0 / gain);
     }
 }

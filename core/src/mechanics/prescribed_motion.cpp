@@ -26,6 +26,7 @@ PrescribedMotion::PrescribedMotion(const BodyMotion& motion, const Pose& given)
       arm_(vector(given.position) - point_),
       orientation_(quaternion(given.orientation)) {
     own_axis_ = orientation_.conjugate() * axis_;
+    start_ = angle_.value(0.0);
 }
 
 Quaterniond PrescribedMotion::turn(double t) const {
@@ -50,6 +51,7 @@ void PrescribedMotion::place(double t, Placement& at) const {
     at.acceleration = acceleration * axis_.cross(r) + rate * rate * axis_.cross(axis_.cross(r)) +
                       at_time(translation_, &Motion::acceleration, t);
     at.turning = acceleration * own_axis_;
+    at.turn = (angle_.value(t) - start_) * own_axis_;
 }
 
 void PrescribedMotion::place_for_step(double t, double h, Placement& at) const {

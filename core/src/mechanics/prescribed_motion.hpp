@@ -38,6 +38,7 @@ private:
     Vector3d axis_, own_axis_;  // n, and A₀ᵀ n
     Vector3d point_, arm_;      // c, x₀ − c
     Quaterniond orientation_;   // A₀
+    double start_;              // φ(0)
 };
 
 }  // namespace delassus::mechanics

@@ -8,33 +8,12 @@ namespace delassus::mechanics {
 
 namespace {
 
-/// c̄ and its derivatives in time.
-struct Arm {
-    Vector3d c, c_t = Vector3d::Zero(), c_tt = Vector3d::Zero();
-};
-
-Arm arm_of(const Part& part, double t) {
-    if (!part.turn) return {part.arm};
-    const double angle = part.turn->value(t), rate = part.turn->rate(t), acceleration = part.turn->acceleration(t);
-    const double c = std::cos(angle), s = std::sin(angle);
-    const Vector3d along = c * part.arm + s * part.quarter;
-    const Vector3d across = c * part.quarter - s * part.arm;
-    return {along, rate * across, acceleration * across - rate * rate * along};
-}
-
-/// c̄ alone.
-Vector3d direction_of(const Part& part, double t) {
-    if (!part.turn) return part.arm;
-    const double angle = part.turn->value(t);
-    return std::cos(angle) * part.arm + std::sin(angle) * part.quarter;
-}
-
-Vector3d value_of(const Feature& feature, const Placements& at, double t) {
+Vector3d value_of(const Feature& feature, const Placements& at) {
     Vector3d result = Vector3d::Zero();
     for (int k = 0; k < feature.count; ++k) {
         const Part& part = feature.parts[static_cast<std::size_t>(k)];
         const Placement& place = at[part.body];
-        Vector3d vector = place.A * direction_of(part, t);
+        Vector3d vector = place.A * part.arm;
         if (part.point) vector += place.x;
         result += part.sign * vector;
     }
@@ -47,67 +26,64 @@ struct Motion3 {
              curvature = Vector3d::Zero();
 };
 
-Motion3 evaluate(const Feature& feature, const Placements& at, double t) {
+Motion3 evaluate(const Feature& feature, const Placements& at) {
     Motion3 result;
     for (int k = 0; k < feature.count; ++k) {
         const Part& part = feature.parts[static_cast<std::size_t>(k)];
         const Placement& place = at[part.body];
-        const Arm arm = arm_of(part, t);
         const double l = part.point ? 1.0 : 0.0;
-        const Vector3d turned = place.omega.cross(arm.c);
-        result.value += part.sign * (l * place.x + place.A * arm.c);
-        result.partial += part.sign * (place.A * arm.c_t);
-        result.velocity += part.sign * (l * place.v + place.A * (turned + arm.c_t));
-        result.curvature +=
-            part.sign * (place.A * (place.omega.cross(turned) + 2.0 * place.omega.cross(arm.c_t) + arm.c_tt));
+        const Vector3d turned = place.omega.cross(part.arm);
+        const Vector3d velocity = part.sign * (l * place.v + place.A * turned);
+        result.value += part.sign * (l * place.x + place.A * part.arm);
+        result.velocity += velocity;
+        result.curvature += part.sign * (place.A * place.omega.cross(turned));
         if (!place.prescribed()) continue;
-        result.partial += part.sign * (l * place.v + place.A * turned);
-        result.curvature += part.sign * (l * place.acceleration + place.A * place.turning.cross(arm.c));
+        result.partial += velocity;
+        result.curvature += part.sign * (l * place.acceleration + place.A * place.turning.cross(part.arm));
     }
     return result;
 }
 
 /// result += J_featureᵀ y.
-void add_transposed(const Feature& feature, const Placements& at, double t, const Vector3d& y,
-                    const RowColumns& columns, double factor, RowVector& result) {
+void add_transposed(const Feature& feature, const Placements& at, const Vector3d& y, const RowColumns& columns,
+                    double factor, RowVector& result) {
     for (int k = 0; k < feature.count; ++k) {
         const Part& part = feature.parts[static_cast<std::size_t>(k)];
         const Placement& place = at[part.body];
         const int first = columns.place(place.column);
         if (first < 0) continue;
         if (part.point) result.segment<3>(first) += factor * part.sign * y;
-        result.segment<3>(first + 3) += factor * part.sign * direction_of(part, t).cross(place.A.transpose() * y);
+        result.segment<3>(first + 3) += factor * part.sign * part.arm.cross(place.A.transpose() * y);
     }
 }
 
 /// result += factor (∂(J_featureᵀ y)/∂q).
-void add_turning(const Feature& feature, const Placements& at, double t, const Vector3d& y, const RowColumns& columns,
+void add_turning(const Feature& feature, const Placements& at, const Vector3d& y, const RowColumns& columns,
                  double factor, RowMatrix& result) {
     for (int k = 0; k < feature.count; ++k) {
         const Part& part = feature.parts[static_cast<std::size_t>(k)];
         const Placement& place = at[part.body];
         const int first = columns.place(place.column) + 3;
         if (first < 3) continue;
-        result.block<3, 3>(first, first) +=
-            factor * part.sign * skew(direction_of(part, t)) * skew(place.A.transpose() * y);
+        result.block<3, 3>(first, first) += factor * part.sign * skew(part.arm) * skew(place.A.transpose() * y);
     }
 }
 
 /// result += factor J_uᵀ J_w.
-void add_product(const Feature& u, const Feature& w, const Placements& at, double t, const RowColumns& columns,
-                 double factor, RowMatrix& result) {
+void add_product(const Feature& u, const Feature& w, const Placements& at, const RowColumns& columns, double factor,
+                 RowMatrix& result) {
     for (int k = 0; k < u.count; ++k) {
         const Part& left = u.parts[static_cast<std::size_t>(k)];
         const Placement& left_place = at[left.body];
         const int row = columns.place(left_place.column);
         if (row < 0) continue;
-        const Matrix3d left_turn = -left.sign * left_place.A * skew(direction_of(left, t));
+        const Matrix3d left_turn = -left.sign * left_place.A * skew(left.arm);
         for (int j = 0; j < w.count; ++j) {
             const Part& right = w.parts[static_cast<std::size_t>(j)];
             const Placement& right_place = at[right.body];
             const int column = columns.place(right_place.column);
             if (column < 0) continue;
-            const Matrix3d right_turn = -right.sign * right_place.A * skew(direction_of(right, t));
+            const Matrix3d right_turn = -right.sign * right_place.A * skew(right.arm);
             if (left.point && right.point)
                 result.block<3, 3>(row, column) += factor * left.sign * right.sign * Matrix3d::Identity();
             if (left.point) result.block<3, 3>(row, column + 3) += factor * left.sign * right_turn;
@@ -130,68 +106,88 @@ Outer outer(const Row& row, double c) {
 
 }  // namespace
 
-Vector3d arm(const Part& part, double t) {
-    return arm_of(part, t).c;
-}
-
 RowColumns Row::columns(const Placements& at, bool with_prescribed) const {
     RowColumns result;
+    const auto add = [&](BodyIndex body) {
+        const auto& place = at[body];
+        if (place.column >= 0 || (with_prescribed && place.prescribed())) result.add(body, place.column);
+    };
+    if (angle) {
+        add(angle->second);
+        add(angle->first);
+    }
     for (const Feature* feature : {&u, &w})
-        for (int k = 0; k < feature->count; ++k) {
-            const BodyIndex body = feature->parts[static_cast<std::size_t>(k)].body;
-            const auto& place = at[body];
-            if (place.column >= 0 || (with_prescribed && place.prescribed())) result.add(body, place.column);
-        }
+        for (int k = 0; k < feature->count; ++k) add(feature->parts[static_cast<std::size_t>(k)].body);
     return result;
 }
 
 double Row::value(const Placements& at, double t) const {
-    const double c = value_of(u, at, t).dot(value_of(w, at, t));
-    return outer(*this, c).value - offset - (drive ? drive->value(t) : 0.0);
+    const double value = angle ? angle->value(at) : outer(*this, value_of(u, at).dot(value_of(w, at))).value;
+    return value - offset - (drive ? drive->value(t) : 0.0);
 }
 
-void Row::gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const {
-    const Vector3d first = value_of(u, at, t), second = value_of(w, at, t);
-    const double slope = outer(*this, first.dot(second)).slope;
+void Row::gradient(const Placements& at, const RowColumns& columns, RowVector& result) const {
     result.setZero(6 * columns.bodies);
-    add_transposed(u, at, t, second, columns, slope, result);
-    add_transposed(w, at, t, first, columns, slope, result);
+    if (angle) {
+        for (const bool of_second : {true, false}) {
+            const int first = columns.place(at[of_second ? angle->second : angle->first].column);
+            if (first >= 0) result.segment<3>(first + 3) = angle->coefficients(at, of_second);
+        }
+        return;
+    }
+    const Vector3d first = value_of(u, at), second = value_of(w, at);
+    const double slope = outer(*this, first.dot(second)).slope;
+    add_transposed(u, at, second, columns, slope, result);
+    add_transposed(w, at, first, columns, slope, result);
 }
 
-Vector3d Row::force(const Placements& at, double t, double lambda) const {
-    const Vector3d first = evaluate(u, at, t).value, second = evaluate(w, at, t).value;
+Vector3d Row::force(const Placements& at, double lambda) const {
+    const Vector3d first = value_of(u, at), second = value_of(w, at);
     return lambda * outer(*this, first.dot(second)).slope * second;
 }
 
 double Row::rate(const Placements& at, double t) const {
-    const Motion3 first = evaluate(u, at, t), second = evaluate(w, at, t);
+    const double driven = drive ? drive->rate(t) : 0.0;
+    if (angle) return angle->prescribed_rate(at) - driven;
+    const Motion3 first = evaluate(u, at), second = evaluate(w, at);
     return outer(*this, first.value.dot(second.value)).slope *
                (first.partial.dot(second.value) + first.value.dot(second.partial)) -
-           (drive ? drive->rate(t) : 0.0);
+           driven;
 }
 
 double Row::curvature(const Placements& at, double t) const {
-    const Motion3 first = evaluate(u, at, t), second = evaluate(w, at, t);
+    const double driven = drive ? drive->acceleration(t) : 0.0;
+    if (angle) return angle->curvature(at) - driven;
+    const Motion3 first = evaluate(u, at), second = evaluate(w, at);
     const Outer f = outer(*this, first.value.dot(second.value));
     const double velocity = first.velocity.dot(second.value) + first.value.dot(second.velocity);
     return f.slope * (first.curvature.dot(second.value) + 2.0 * first.velocity.dot(second.velocity) +
                       first.value.dot(second.curvature)) +
-           f.second * velocity * velocity - (drive ? drive->acceleration(t) : 0.0);
+           f.second * velocity * velocity - driven;
 }
 
-void Row::hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const {
-    const Vector3d first = value_of(u, at, t), second = value_of(w, at, t);
-    const Outer f = outer(*this, first.dot(second));
+void Row::hessian(const Placements& at, const RowColumns& columns, RowMatrix& result) const {
     result.setZero(6 * columns.bodies, 6 * columns.bodies);
-    add_turning(u, at, t, second, columns, f.slope, result);
-    add_turning(w, at, t, first, columns, f.slope, result);
-    add_product(u, w, at, t, columns, f.slope, result);
-    add_product(w, u, at, t, columns, f.slope, result);
+    if (angle) {
+        const int row = columns.place(at[angle->second].column);
+        if (row < 0) return;
+        for (const bool along_second : {true, false}) {
+            const int column = columns.place(at[along_second ? angle->second : angle->first].column);
+            if (column >= 0) result.block<3, 3>(row + 3, column + 3) = angle->turning(at, along_second);
+        }
+        return;
+    }
+    const Vector3d first = value_of(u, at), second = value_of(w, at);
+    const Outer f = outer(*this, first.dot(second));
+    add_turning(u, at, second, columns, f.slope, result);
+    add_turning(w, at, first, columns, f.slope, result);
+    add_product(u, w, at, columns, f.slope, result);
+    add_product(w, u, at, columns, f.slope, result);
     if (f.second != 0.0) {
         RowVector inner;
         inner.setZero(6 * columns.bodies);
-        add_transposed(u, at, t, second, columns, 1.0, inner);
-        add_transposed(w, at, t, first, columns, 1.0, inner);
+        add_transposed(u, at, second, columns, 1.0, inner);
+        add_transposed(w, at, first, columns, 1.0, inner);
         result += f.second * inner * inner.transpose();
     }
 }

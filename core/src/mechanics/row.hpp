@@ -5,13 +5,13 @@
 // points of bodies, a constant. It is a sum of at most two parts s (l x + A c̄), with the pose (x, A) of a body, l = 1
 // for a point and 0 for an axis, and s = ±1.
 //
-// A *row* is C = f(u · w) − offset − drive(t) of two features u and w, with f(c) = scale · c, or √c for a length.
-// Its derivatives follow from those of the features by the product rule. Along increments (δx in the world frame, θ in
-// the body frame), with δA = A [θ]× :
+// A *row* is C = f(u · w) − offset − drive(t) of two features u and w, with f(c) = scale · c, or √c for a length; or it
+// has the angle of a joint in place of f (angle.hpp). The derivatives of f follow from those of the features by the
+// product rule. Along increments (δx in the world frame, θ in the body frame), with δA = A [θ]× :
 //
 //     part:       J_x = s l I,   J_θ = −s A [c̄]×
-//     velocity:   s (l v + A (ω × c̄ + c̄_t))
-//     curvature:  s A (ω × (ω × c̄) + 2 ω × c̄_t + c̄_tt)            (second derivative in time at v̇ = 0), and
+//     velocity:   s (l v + A (ω × c̄))
+//     curvature:  s A (ω × (ω × c̄))            (second derivative in time at v̇ = 0), and
 //                 s (l v̇ + A (ω̇ × c̄)) more of a body whose motion is prescribed
 //     stiffness:  ∂(J_θᵀ y)/∂θ = ∂(s c̄ × Aᵀ y)/∂θ = s [c̄]× [Aᵀ y]×   (for fixed y)
 //
@@ -23,51 +23,21 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "delassus/multibody.hpp"
+#include "mechanics/angle.hpp"
+#include "mechanics/placement.hpp"
 #include "mechanics/rotation.hpp"
 
 namespace delassus::mechanics {
-
-/// Where a body is and how it moves. Columns of v: x at column, θ at column + 3; −1 if it is fixed. A body whose motion
-/// is prescribed has none either: a number of its own below −1 stands there.
-struct Placement {
-    Vector3d x = Vector3d::Zero();
-    Matrix3d A = Matrix3d::Identity();
-    Vector3d v = Vector3d::Zero();
-    Vector3d omega = Vector3d::Zero();
-    std::int32_t column = -1;
-    Vector3d acceleration = Vector3d::Zero(), turning = Vector3d::Zero();  ///< v̇ and ω̇ of a prescribed motion
-
-    [[nodiscard]] bool prescribed() const { return column < -1; }
-};
-
-/// Placements of all bodies; the world last.
-class Placements {
-public:
-    explicit Placements(std::size_t bodies = 0) : items_(bodies + 1) {}
-    Placement& operator[](BodyIndex body) {
-        return items_[body == world_body ? items_.size() - 1 : static_cast<std::size_t>(body)];
-    }
-    const Placement& operator[](BodyIndex body) const {
-        return items_[body == world_body ? items_.size() - 1 : static_cast<std::size_t>(body)];
-    }
-
-private:
-    std::vector<Placement> items_;
-};
 
 struct Part {
     BodyIndex body = world_body;
     double sign = 1.0;
     bool point = false;               ///< l
-    Vector3d arm = Vector3d::Zero();  ///< c̄ at angle zero
-    Vector3d quarter = Vector3d::Zero();
-    const Motion* turn = nullptr;  ///< c̄(t) = cos φ(t) arm + sin φ(t) quarter; none: c̄ = arm
+    Vector3d arm = Vector3d::Zero();  ///< c̄
 };
-
-/// c̄ at a time.
-Vector3d arm(const Part& part, double t);
 
 struct Feature {
     std::array<Part, 2> parts;
@@ -75,15 +45,15 @@ struct Feature {
 
     static Feature axis(BodyIndex body, const Vector3d& direction) {
         Feature feature;
-        feature.parts[0] = {body, 1.0, false, direction, Vector3d::Zero(), nullptr};
+        feature.parts[0] = {body, 1.0, false, direction};
         feature.count = 1;
         return feature;
     }
     /// p_second − p_first, the points in the frames of their bodies.
     static Feature span(BodyIndex first, const Vector3d& first_point, BodyIndex second, const Vector3d& second_point) {
         Feature feature;
-        feature.parts[0] = {second, 1.0, true, second_point, Vector3d::Zero(), nullptr};
-        feature.parts[1] = {first, -1.0, true, first_point, Vector3d::Zero(), nullptr};
+        feature.parts[0] = {second, 1.0, true, second_point};
+        feature.parts[1] = {first, -1.0, true, first_point};
         feature.count = 2;
         return feature;
     }
@@ -116,6 +86,7 @@ using RowMatrix =
 
 struct Row {
     Feature u, w;
+    std::optional<Angle> angle = std::nullopt;  ///< in place of f(c); derivatives are those where its joint holds
     double scale = 1.0;
     bool length = false;  ///< f(c) = √c, then u = w
     double offset = 0.0;
@@ -126,15 +97,15 @@ struct Row {
     /// C.
     [[nodiscard]] double value(const Placements& at, double t) const;
     /// ∇C over columns().
-    void gradient(const Placements& at, double t, const RowColumns& columns, RowVector& result) const;
+    void gradient(const Placements& at, const RowColumns& columns, RowVector& result) const;
     /// ∂C/∂t at fixed q.
     [[nodiscard]] double rate(const Placements& at, double t) const;
     /// C̈ at v̇ = 0.
     [[nodiscard]] double curvature(const Placements& at, double t) const;
-    /// λ f' w: the force that λ is along u.
-    [[nodiscard]] Vector3d force(const Placements& at, double t, double lambda) const;
+    /// λ f' w: the force that λ is along u. Of features alone.
+    [[nodiscard]] Vector3d force(const Placements& at, double lambda) const;
     /// ∇²C over columns(): entry (i, j) is the derivative of ∇C_i along increment j.
-    void hessian(const Placements& at, double t, const RowColumns& columns, RowMatrix& result) const;
+    void hessian(const Placements& at, const RowColumns& columns, RowMatrix& result) const;
 };
 
 /// H += factor · matrix, over columns; its symmetric part if asked. Columns of prescribed bodies are left out.

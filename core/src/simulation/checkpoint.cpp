@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 8;
+constexpr int version = 9;
 constexpr std::size_t digits = 16;
 
 /// How a checkpoint of this text ends.
@@ -133,7 +133,6 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"t", bits({simulation.state.t})},
                                    {"q", bits(simulation.state.q)},
                                    {"v", bits(simulation.state.v)},
-                                   {"turns", bits(simulation.turns)},
                                    {"memory", bits(simulation.memory)},
                                    {"control", bits(simulation.control)},
                                    {"ahead", bits(simulation.ahead)},
@@ -165,7 +164,6 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             one.at("name").get_to(system.name);
             one.at("step").get_to(system.simulation.step);
             system.simulation.state = {number(one.at("t")), numbers(one.at("q")), numbers(one.at("v"))};
-            system.simulation.turns = numbers(one.at("turns"));
             system.simulation.memory = numbers(one.at("memory"));
             system.simulation.control = numbers(one.at("control"));
             system.simulation.ahead = numbers(one.at("ahead"));

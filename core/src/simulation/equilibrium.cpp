@@ -126,7 +126,6 @@ public:
                 throw StepFailure(
                     fmt::format("on the path of equilibria something moves away without bound, at {:.4g} of the loads",
                                 point.load));
-            mechanics_.follow(point.state);
             found.points.push_back(described(point, event, unloaded));
             const PathPoint& last = found.points.back();
             found.end.load_steps.push_back({last.load, 1, last.newton_iterations, last.residual, last.energy});

@@ -15,8 +15,8 @@
 //     smallest size passes the corner. Where `crowd` corners follow one another at less than `apart` steps shown in the
 //     mean, as in a table that samples a curve, that would cost more than it saves: there steps are no longer than
 //     those shown, and end with them.
-//   - A joint turns by half a turn or more, so that its turns are miscounted (MultibodySystem::follow()). So no body
-//     turns by more than `largest_turn` at the speeds of the beginning, in a step that is longer than those shown.
+//   - A body turns by half a turn or more, so that the difference of two orientations is not the way between them. So
+//     none turns by more than `largest_turn` at the speeds of the beginning, in a step that is longer than those shown.
 #include "simulation/look_ahead.hpp"
 
 #include <algorithm>

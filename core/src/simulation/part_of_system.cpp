@@ -34,7 +34,7 @@ public:
         for (const BodyIndex body : touched) numbers_.touched.push_back(local(body));
         part_.shapes = numbers_.shapes;
         keep_rows();
-        find_turns();
+        find_angles();
         part_.system->be_part_of(mechanics_, std::move(numbers_));
         return std::move(part_);
     }
@@ -143,12 +143,13 @@ private:
         part_.system->keep_rows(own);
     }
 
-    void find_turns() {
-        const std::vector<std::int32_t> all = mechanics_.counted_joints();
-        for (const std::int32_t joint : part_.system->counted_joints()) {
-            const auto place = std::find(all.begin(), all.end(), numbers_.joints[static_cast<std::size_t>(joint)]);
-            part_.turns.push_back(static_cast<std::int32_t>(place - all.begin()));
-        }
+    void find_angles() {
+        std::vector<std::array<std::int32_t, 2>> places;  // in the part, in the whole
+        for (std::size_t k = 0; k < numbers_.joints.size(); ++k)
+            if (const std::int32_t own = part_.system->angle_position(static_cast<std::int32_t>(k)); own >= 0)
+                places.push_back({own, mechanics_.angle_position(numbers_.joints[k])});
+        std::sort(places.begin(), places.end());
+        for (const auto& place : places) part_.angles.push_back(place[1]);
     }
 
     const SceneSystem& whole_;

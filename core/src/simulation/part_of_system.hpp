@@ -15,7 +15,7 @@ struct PartOfSystem {
     std::unique_ptr<MultibodySystem> system;
     std::vector<BodyIndex> bodies;     ///< the numbers of its bodies in the whole, ascending
     std::vector<std::int32_t> rows;    ///< of its bilateral rows among the kept rows of the whole, ascending
-    std::vector<std::int32_t> turns;   ///< of its counted turns among those of the whole
+    std::vector<std::int32_t> angles;  ///< of the angles at the end of its q: their places in q of the whole
     std::vector<std::int32_t> shapes;  ///< of its shapes in the whole, ascending
 };
 

@@ -146,11 +146,6 @@ void SharedRun::share_out(const State& whole, double h, std::unique_ptr<Timestep
     // What one process alone cannot do ends the step on all.
     steps_.step([&] {
         part_ = part_of_system(system_, bodies, touched);
-        const State local = local_state(whole);
-        std::vector<double> turns;
-        const std::vector<double> all_turns = system_.system->turns(whole);
-        for (const std::int32_t turn : part_.turns) turns.push_back(all_turns[static_cast<std::size_t>(turn)]);
-        part_.system->set_turns(local, turns);
         timestepper = make_timestepper(system_.integrator, *part_.system, system_.integrator_options);
         if (!has_begin_) return;
         StepMemory own;
@@ -190,6 +185,7 @@ State SharedRun::local_state(const State& whole) const {
         local.v.insert(local.v.end(), whole.v.begin() + static_cast<std::ptrdiff_t>(velocities * k),
                        whole.v.begin() + static_cast<std::ptrdiff_t>(velocities * (k + 1)));
     }
+    for (const std::int32_t place : part_.angles) local.q.push_back(whole.q[static_cast<std::size_t>(place)]);
     return local;
 }
 
@@ -203,6 +199,11 @@ void SharedRun::exchange_states(const State& local, State& whole) const {
         own.insert(own.end(), local.v.begin() + static_cast<std::ptrdiff_t>(velocities * k),
                    local.v.begin() + static_cast<std::ptrdiff_t>(velocities * (k + 1)));
     }
+    for (std::size_t k = 0; k < part_.angles.size(); ++k)
+        whole.q[static_cast<std::size_t>(part_.angles[k])] = local.q[positions * local_.size() + k];
+    const auto angles = angles_of_owners();
+    for (const auto& [place, owner] : angles)
+        if (owner == rank) own.push_back(whole.q[place]);
     Bytes bytes;
     put(bytes, own);
     const std::vector<Bytes> from = to_all(*communicator_, bytes);
@@ -216,14 +217,31 @@ void SharedRun::exchange_states(const State& local, State& whole) const {
         std::copy_n(first + positions, velocities, whole.v.begin() + static_cast<std::ptrdiff_t>(velocities * k));
         next[p] += positions + velocities;
     }
+    for (const auto& [place, owner] : angles) {
+        const auto p = static_cast<std::size_t>(owner);
+        whole.q[place] = values[p][next[p]++];
+    }
     whole.t = local.t;
+}
+
+std::vector<std::pair<std::size_t, std::int32_t>> SharedRun::angles_of_owners() const {
+    const MultibodySystem& all = *system_.system;
+    std::vector<std::pair<std::size_t, std::int32_t>> angles;
+    for (std::int32_t k = 0; k < all.joint_count(); ++k) {
+        const std::int32_t place = all.angle_position(k);
+        if (place < 0) continue;
+        const std::int32_t column = std::max(all.body_column(all.joint(k).first), all.body_column(all.joint(k).second));
+        if (column >= 0)
+            angles.emplace_back(static_cast<std::size_t>(place),
+                                owners_[static_cast<std::size_t>(column) / velocities]);
+    }
+    return angles;
 }
 
 void SharedRun::step(State& whole, double h, Timestepper& timestepper, StepSolver& solver, StepReport& report) {
     State local;
     steps_.step([&] {
         local = local_state(whole);
-        part_.system->follow(local);
         timestepper.step(local, h, solver, report);
     });
     exchange_states(local, whole);

@@ -68,6 +68,8 @@ private:
     [[nodiscard]] State local_state(const State& whole) const;
     /// Puts the own bodies of all processes into the whole state.
     void exchange_states(const State& local, State& whole) const;
+    /// Places in q of angles of joints (MultibodySystem::angle_position()), and the processes that compute them.
+    [[nodiscard]] std::vector<std::pair<std::size_t, std::int32_t>> angles_of_owners() const;
     void complete(StepReport& report, double h);
 
     SceneSystem& system_;

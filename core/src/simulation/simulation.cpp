@@ -156,7 +156,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         });
     now_.state = dynamics().initial_state();
     if (ahead_) ahead_->begin(now_.state);
-    system.system->set_turns(bodies_at(now_.state, bodies_), {});
+    if (joint_) joint_->bodies_of(now_.state, bodies_);
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
     measure(state(), now_.step);
@@ -228,6 +228,11 @@ const State& Simulation::bodies_at(const State& state, State& memory) const {
     return memory;
 }
 
+void Simulation::settle_turns(State& state) const {
+    if (joint_) return joint_->settle_turns(state);
+    system_->system->settle_turns(state);
+}
+
 void Simulation::notice_changes() {
     if (!ahead_ || revision_ == system_->system->revision()) return;
     revision_ = system_->system->revision();
@@ -296,7 +301,6 @@ void Simulation::advance_ahead(State& state, double end, StepReport& report) {
     while (!ahead_->reaches(end)) {
         AdaptiveStepReport part =
             ahead_->advance(end, bodies_at(ahead_->front(), next_bodies_), *timestepper_, *control_, *solver_);
-        system_->system->follow(bodies_at(ahead_->front(), next_bodies_));
         if (!ahead_->cut_by_corner()) ++parts;
         part.step.follow(report);
         std::swap(report, part.step);
@@ -312,7 +316,6 @@ void Simulation::advance_ahead(State& state, double end, StepReport& report) {
         record_.parts = step_within_error(*control_, state, end, *solver_, report).taken;
         state.t = end;
         ahead_->begin(state);
-        system_->system->follow(bodies_at(state, next_bodies_));
     }
     report.multipliers.clear();
 }
@@ -384,11 +387,9 @@ const StepRecord& Simulation::step() {
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
     const std::vector<double> control = control_ && !only_shows ? control_->save() : std::vector<double>{};
     std::optional<LookAhead::Memory> ahead;
-    std::vector<double> turns;
     if (advances) {
         ahead = ahead_->memory();
         ahead_->count_advance();
-        turns = system_->system->turns(bodies_at(ahead_->front(), next_bodies_));
     }
     AdaptiveStepReport& taken = next_report_;
     SimulationTotals judged = now_.totals;
@@ -401,15 +402,14 @@ const StepRecord& Simulation::step() {
         timestepper_->load(memory);
         if (sleeping_) sleeping_->load(sleeping);
         if (control_) control_->load(control);
-        if (!ahead) return;
-        ahead_->put_back(std::move(*ahead));
-        system_->system->set_turns(bodies_at(ahead_->front(), next_bodies_), turns);
+        if (ahead) ahead_->put_back(std::move(*ahead));
     };
     try {
         advance(next, taken, memory);
         require_usable(solver_->effort());
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
+        if (!ahead_) settle_turns(next);
         measure(bodies_at(next, next_bodies_), now_.step + 1);
         judge(taken, judged);
     } catch (const Unsupported& error) {
@@ -429,7 +429,6 @@ const StepRecord& Simulation::step() {
     const std::string place = where();
     now_.state = std::move(next);
     std::swap(bodies_, next_bodies_);
-    if (!ahead_) system_->system->follow(state());
     now_.totals = std::move(judged);
     ++now_.step;
 
@@ -615,7 +614,6 @@ SimulationState Simulation::save() const {
             ++next;
         else
             result.rows_left_out.push_back(row);
-    result.turns = mechanics.turns(state());
     result.memory = memory_of_method();
     if (control_) result.control = control_->save();
     if (ahead_) result.ahead = ahead_->save();
@@ -640,7 +638,7 @@ void Simulation::load(SimulationState state) {
         throw InputError(fmt::format("the checkpoint of system \"{}\" leaves out rows that the system does not have",
                                      system_->name));
     system_->system->keep_rows(kept);
-    system_->system->set_turns(bodies_at(state.state, bodies_), state.turns);
+    if (joint_) joint_->bodies_of(state.state, bodies_);
     make_method();
     timestepper_->load(state.memory);
     if (shared_) {
@@ -650,13 +648,9 @@ void Simulation::load(SimulationState state) {
     }
     if (control_) control_->load(state.control);
     if (ahead_ && state.ahead.empty()) ahead_->begin(state.state);
-    if (ahead_ && !state.ahead.empty()) {
-        ahead_->load(state.ahead);
-        system_->system->follow(bodies_at(ahead_->front(), next_bodies_));
-    }
+    if (ahead_ && !state.ahead.empty()) ahead_->load(state.ahead);
     if (sleeping_) sleeping_->load(state.sleeping);
     now_ = std::move(state);
-    now_.turns.clear();
     now_.memory.clear();
     now_.rows_left_out.clear();
     now_.control.clear();
