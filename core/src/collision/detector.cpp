@@ -276,11 +276,7 @@ void Detector::collide_pairs(std::size_t first, std::size_t last, double envelop
     for (std::size_t k = first; k < last; ++k) {
         const auto& [a, b] = pairs_[k];
         const std::size_t before = contacts.size();
-        if (approach_bound(sweeps_[a], sweeps_[b]) <= envelope) {
-            by.still.collide(placed_[a], placed_[b], envelope, contacts);
-        } else {
-            by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], envelope, contacts);
-        }
+        by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], envelope, contacts);
         leave_out_covered(a, b, before, by, contacts);
         for (std::size_t i = before; i < contacts.size(); ++i) {
             contacts[i].shape_a = a;

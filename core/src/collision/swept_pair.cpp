@@ -28,6 +28,17 @@ Vector3d carried_back(const Placed& placed, const Placed& moved, const Vector3& 
     return placed.position + placed.rotation * (moved.rotation.transpose() * (vector(point) - moved.position));
 }
 
+/// With which a point moves from a to b along its normal over the step, m.
+double closing(const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, const ContactPoint& contact) {
+    return vector(contact.normal).dot(displacement(a, of_a, contact.point_a) - displacement(b, of_b, contact.point_b));
+}
+
+/// The point with the least gap, or the end.
+std::vector<ContactPoint>::const_iterator nearest_of(const std::vector<ContactPoint>& points) {
+    return std::min_element(points.begin(), points.end(),
+                            [](const auto& one, const auto& other) { return one.gap < other.gap; });
+}
+
 /// How far away points are found with the shapes where they are. The normal of a plane does not turn at all.
 double near_limit(const Placed& a, const Placed& b) {
     constexpr double share = 0.25;
@@ -48,24 +59,41 @@ void SweptPair::collide(NarrowPhase& by, Placed& a, Placed& b, const Sweep& of_a
                         std::vector<ContactPoint>& contacts) {
     const double bound = approach_bound(of_a, of_b), limit = near_limit(a, b);
     found_.clear();
-    by.collide(a, b, std::clamp(limit, envelope, bound), found_);
-    if (!near(a, b, of_a, of_b, envelope)) {
+    by.collide(a, b, bound <= envelope ? envelope : std::clamp(limit, envelope, bound), found_);
+    if (bound <= envelope || near(a, b, of_a, of_b, envelope)) {
+        keep_what_meets(by, a, b, of_a, of_b, envelope);
+    } else {
         found_.clear();
-        if (bound > limit) far(by, a, b, of_a, of_b, envelope);
+        if (bound > limit) far(by, a, b, of_a, of_b, envelope, envelope);
     }
     contacts.insert(contacts.end(), found_.begin(), found_.end());
 }
 
 bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope) const {
     return std::any_of(found_.begin(), found_.end(), [&](const ContactPoint& contact) {
-        const double closing =
-            vector(contact.normal).dot(displacement(a, of_a, contact.point_a) - displacement(b, of_b, contact.point_b));
-        return contact.gap - std::max(closing, 0.0) < envelope;
+        return contact.gap - std::max(closing(a, b, of_a, of_b, contact), 0.0) < envelope;
     });
 }
 
+void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
+                                double envelope) {
+    constexpr double touching = 1e-6, share = 1e-2, same_cosine = 0.9999;
+    const auto nearest = nearest_of(found_);
+    const double reach = a.solid->reach > 0.0 && b.solid->reach > 0.0 ? std::min(a.solid->reach, b.solid->reach)
+                                                                      : std::max(a.solid->reach, b.solid->reach);
+    if (nearest == found_.end() || nearest->gap <= touching * reach) return;
+    if (std::none_of(found_.begin(), found_.end(),
+                     [&](const ContactPoint& contact) { return closing(a, b, of_a, of_b, contact) > contact.gap; }))
+        return;
+    const double gap = nearest->gap;
+    const Vector3d normal = vector(nearest->normal);
+    begin_.swap(found_);
+    far(by, a, b, of_a, of_b, envelope, share * gap);
+    if (!found_.empty() && vector(nearest_of(found_)->normal).dot(normal) > same_cosine) found_.swap(begin_);
+}
+
 void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
-                    double envelope) {
+                    double envelope, double meeting) {
     constexpr int most_advances = 64;
     const double bound = approach_bound(of_a, of_b);
     double t = 0.0;
@@ -74,13 +102,12 @@ void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Swe
         advance(b, of_b, t, moved_b_);
         found_.clear();
         by.collide(moved_a_, moved_b_, std::max((1.0 - t) * bound, envelope), found_);
-        const auto nearest = std::min_element(found_.begin(), found_.end(),
-                                              [](const auto& one, const auto& other) { return one.gap < other.gap; });
+        const auto nearest = nearest_of(found_);
         if (nearest == found_.end()) return;
-        if (nearest->gap < envelope) break;
+        if (nearest->gap < meeting) break;
         const double speed =
             vector(nearest->normal).dot(of_a.translation - of_b.translation) + of_a.turned + of_b.turned;
-        if (speed > 0.0) t += (nearest->gap - 0.5 * envelope) / speed;
+        if (speed > 0.0) t += (nearest->gap - 0.5 * meeting) / speed;
         if (!(speed > 0.0) || t >= 1.0) {
             found_.clear();
             return;

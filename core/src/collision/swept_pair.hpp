@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Contacts of shapes that move farther in a step than the envelope.
+// Contacts of shapes that meet on their way in a step.
 //
 // A contact is a linear bound on the velocities of a step: n·(Δ_b − Δ_a) ≥ −gap for the displacements Δ of its points.
-// What is farther away than the envelope at the beginning has no bound, and goes through what it meets. Which pairs can
-// meet follows from the motion that they have now: their distance changes by at most
+// What is farther away than the envelope at the beginning has no bound, and goes through what it meets; what is nearer
+// is held off by a half-space, though it may pass beside the shape. Which pairs can meet follows from the motion that
+// they have now: their distance changes by at most
 //
 //     m = |d_b − d_a| + |θ_a| r_a + |θ_b| r_b
 //
 // with the translations d of the shapes' origins, the rotations θ and the reaches r. A pair with m below the envelope
-// is looked at as if it stood still. Otherwise
+// is looked at where it is. Otherwise
 //   near    points up to min(m, a quarter of the smaller reach) away count if one of them would come into the envelope:
 //           all points of the pair, since what one of them stops turns the others in. Over so short a way normals
 //           hardly turn.
@@ -17,6 +18,9 @@
 //           before the time g/(n·(d_a − d_b) + |θ_a| r_a + |θ_b| r_b). The points of that place are carried back to the
 //           beginning with their bodies, and their gap is n·(p_b − p_a) there. So shapes that pass each other get no
 //           contact, as they would with the normal of the beginning.
+// Of the points of a pair where it is, or near, one may be closer than its bodies move towards it, while none touches
+// yet. Then the shapes are advanced in the same way, to a hundredth of their distance: those that pass get no contact,
+// and where the normal has turned till then those of that place count.
 #pragma once
 
 #include <vector>
@@ -37,17 +41,21 @@ struct Sweep {
 
 class SweptPair {
 public:
-    /// Appends the points of a pair with approach_bound(of_a, of_b) > envelope; shape_a and shape_b are left to the
-    /// caller.
+    /// Appends the points of a pair; shape_a and shape_b are left to the caller.
     void collide(NarrowPhase& by, Placed& a, Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope,
                  std::vector<ContactPoint>& contacts);
 
 private:
     bool near(const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope) const;
-    void far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope);
+    /// found_ ← the points in the envelope at the place where the shapes come nearer than `meeting`, if they do.
+    void far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope,
+             double meeting);
+    /// found_ ← what is left of it where the shapes pass, or meet elsewhere.
+    void keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
+                         double envelope);
 
     Placed moved_a_, moved_b_;
-    std::vector<ContactPoint> found_;
+    std::vector<ContactPoint> found_, begin_;
 };
 
 }  // namespace delassus::collision
