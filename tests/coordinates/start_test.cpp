@@ -116,8 +116,8 @@ TEST(JointStart, IsWhereARunBegins) {
     }
 }
 
-// A parallelogram whose last joint closes the loop: its place follows from the others.
-TEST(JointStart, OfALoopIsClosedOrRefused) {
+// A parallelogram: one start says where all of it is, whichever joint has it; what contradicts it is refused.
+TEST(JointStart, OfALoopIsHeldAndFollowed) {
     const auto linkage = [](const std::string& i, const std::string& j, const std::string& k, const std::string& l) {
         return "bodies:\n" + body("a", "[0, 0.15, 0]") + body("b", "[0.25, 0.3, 0]") + body("c", "[0.5, 0.15, 0]") +
                fmt::format(
@@ -128,21 +128,35 @@ TEST(JointStart, OfALoopIsClosedOrRefused) {
                    "  - {{name: l, kind: revolute, second: c, point: [0.5, 0, 0], axis: [0, 0, 1]{}}}\n",
                    i, j, k, l);
     };
-    const Begun fitting(linkage(", start: 0.4", ", start: -0.4", ", start: 0.4", ""));
-    EXPECT_LT(fitting.assembly.displacement, 1e-14);
-    EXPECT_LT((fitting.position("a") - 0.15 * Vector3d(-std::sin(0.4), std::cos(0.4), 0.0)).norm(), 1e-14);
-    EXPECT_LT((fitting.position("b") - Vector3d(0.25, 0.0, 0.0) - 2.0 * fitting.position("a")).norm(), 1e-14);
+    const auto expect_at = [&](const Begun& begun, double angle, double rate) {
+        const Vector3d along(-std::sin(angle), std::cos(angle), 0.0), across(-std::cos(angle), -std::sin(angle), 0.0);
+        EXPECT_LT((begun.position("a") - 0.15 * along).norm(), 1e-9);
+        EXPECT_LT((begun.position("b") - Vector3d(0.25, 0.0, 0.0) - 0.3 * along).norm(), 1e-9);
+        EXPECT_LT((begun.position("c") - Vector3d(0.5, 0.0, 0.0) - 0.15 * along).norm(), 1e-9);
+        EXPECT_LT((begun.velocity("a") - 0.15 * rate * across).norm(), 1e-8);
+        EXPECT_LT((begun.velocity("b") - 0.3 * rate * across).norm(), 1e-8);
+    };
+    const std::string start = ", start: 1.2, start_rate: 3";
+    expect_at(Begun(linkage(", start: 0.4", ", start: -0.4", ", start: 0.4", "")), 0.4, 0.0);
+    expect_at(Begun(linkage(start, "", "", "")), 1.2, 3.0);
+    expect_at(Begun(linkage("", "", "", start)), 1.2, 3.0);
+    expect_at(Begun(linkage(", start_rate: 3", "", "", "")), 0.0, 3.0);
+    // Digits that contradict each other are not.
+    expect_at(Begun(linkage(", start: 1.2, start_rate: 3", "", "", ", start: 1.2, start_rate: 3")), 1.2, 3.0);
+    EXPECT_NO_THROW(Begun(linkage(", start: 0.4", "", "", ", start: 0.40001")));
+    EXPECT_EQ(Begun(linkage(start, "", "", "")).assembly.rotation, 0.0);
 
-    const Begun closed(linkage(", start: 0.4", "", "", ""));
-    EXPECT_GT(closed.assembly.rotation, 0.1);
-    EXPECT_LT((closed.position("b") - Vector3d(0.25, 0.0, 0.0) - 2.0 * closed.position("a")).norm(), 1e-9);
-
-    try {
-        const Begun refused(linkage("", "", "", ", start: 0.4"));
-        FAIL() << "the joint that closes the loop took a start";
-    } catch (const InputError& error) {
-        EXPECT_NE(std::string(error.what()).find("closes a loop"), std::string::npos) << error.what();
-    }
+    const auto sentence_of = [&](const std::string& i, const std::string& l) -> std::string {
+        try {
+            const Begun refused(linkage(i, "", "", l));
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return {};
+    };
+    EXPECT_NE(sentence_of(", start: 0.4", ", start: 0.6").find("the start of joint"), std::string::npos);
+    EXPECT_NE(sentence_of(", start_rate: 1", ", start_rate: 2").find("has a rate that cannot be had"),
+              std::string::npos);
 }
 
 TEST(JointStart, OfAMechanismWithNodesIsRefused) {

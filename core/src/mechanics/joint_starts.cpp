@@ -17,7 +17,8 @@ bool starts(const JointCoordinate& coordinate) {
 
 }  // namespace
 
-State mechanics::with_joint_starts(const MultibodySystem& system, const State& given) {
+State mechanics::with_joint_starts(const MultibodySystem& system, const State& drawn, const State& given,
+                                   double share) {
     std::vector<std::int32_t> joints;
     for (std::int32_t k = 0; k < system.joint_count(); ++k)
         if (starts(system.joint(k).slide) || starts(system.joint(k).turn)) joints.push_back(k);
@@ -30,18 +31,18 @@ State mechanics::with_joint_starts(const MultibodySystem& system, const State& g
 
     KinematicTree tree(system);
     State coordinates;
+    tree.read(drawn, coordinates);
+    const std::vector<double> rates = coordinates.v;
     tree.read(given, coordinates);
+    coordinates.v = rates;
     for (const std::int32_t k : joints) {
         const JointParameters& joint = system.joint(k);
         const auto link =
             std::find_if(tree.links().begin(), tree.links().end(), [k](const Link& one) { return one.joint == k; });
-        if (link == tree.links().end())
-            throw InputError(fmt::format(
-                "the joint \"{}\" cannot have a start: it closes a loop, or a body with a motion of its own "
-                "takes part in it, so that others decide where it is; give theirs",
-                joint.name));
+        if (link == tree.links().end()) continue;
         const auto put = [&](const JointCoordinate& coordinate, std::int32_t place) {
-            if (coordinate.start) coordinates.q[static_cast<std::size_t>(link->position + place)] = *coordinate.start;
+            if (coordinate.start)
+                coordinates.q[static_cast<std::size_t>(link->position + place)] = share * *coordinate.start;
             if (coordinate.start_rate)
                 coordinates.v[static_cast<std::size_t>(link->column + place)] = *coordinate.start_rate;
         };
@@ -51,9 +52,11 @@ State mechanics::with_joint_starts(const MultibodySystem& system, const State& g
     tree.place(coordinates.q.data(), coordinates.v.data());
     State result = given;
     tree.write(result);
-    for (const std::int32_t k : joints)
-        if (const auto& start = system.joint(k).turn.start)
-            result.q[static_cast<std::size_t>(system.angle_position(k))] = *start;
+    for (const Link& link : tree.links())
+        if (const std::int32_t place = link.joint < 0 ? -1 : system.angle_position(link.joint); place >= 0) {
+            if (const auto& start = system.joint(link.joint).turn.start)
+                result.q[static_cast<std::size_t>(place)] = share * *start;
+        }
     return result;
 }
 

@@ -167,8 +167,9 @@ private:
     std::vector<Composite> composite_;
 };
 
-/// The given state with the joints of the system at their `start` and `start_rate`; itself where there are none. Throws
-/// InputError for a joint that no tree holds, and for systems with nodes.
-[[nodiscard]] State with_joint_starts(const MultibodySystem& system, const State& given);
+/// The given state with the joints of trees at this share of their `start`, and all rates as they are in `drawn` or as
+/// `start_rate` says; itself where no joint has any. Throws InputError for systems with nodes.
+[[nodiscard]] State with_joint_starts(const MultibodySystem& system, const State& drawn, const State& given,
+                                      double share);
 
 }  // namespace delassus::mechanics

@@ -18,6 +18,8 @@ namespace delassus::mechanics {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+/// By which a motor's residual and starts are followed: rad, or a share of the size.
+constexpr double part_of_way = 0.1;
 
 /// The bodies of a joint that move.
 std::vector<BodyIndex> movers(const Joint& joint, const std::vector<Body>& bodies) {
@@ -120,12 +122,29 @@ Linkage::Linkage(const std::vector<Body>& bodies, const std::vector<Joint>& join
         all_.push_back(i);
         if (!rows_[i].driven) scleronomic_.push_back(i);
     }
+    for (const auto index : own_joints) {
+        const Joint& joint = joints[static_cast<std::size_t>(index)];
+        for (const bool turns : {true, false}) {
+            const JointCoordinate& start = turns ? joint.parameters.turn : joint.parameters.slide;
+            if (start.start) starts_.push_back(rows_.size());
+            if (start.start_rate) start_rates_.push_back(rows_.size());
+            if (start.start || start.start_rate)
+                rows_.push_back({&joint, turns ? &joint.turn : &joint.slide, nullptr, true, !turns, &start});
+        }
+    }
+}
+
+int Linkage::parts_of_starts() const {
+    if (!has_loops_) return 1;
+    double most = 0.0;
+    for (const auto row : starts_) most = std::max(most, std::abs(*rows_[row].start->start) / unit_of(row));
+    return std::max(1, static_cast<int>(std::ceil(most / part_of_way)));
 }
 
 std::string Linkage::owner_of(std::size_t row) const {
     const RowOfJoint& one = rows_[row];
     return one.motor ? fmt::format("motor \"{}\"", *one.motor)
-                     : fmt::format("joint \"{}\"", one.joint->parameters.name);
+                     : fmt::format("{}joint \"{}\"", one.start ? "the start of " : "", one.joint->parameters.name);
 }
 
 // ---- Motions ----
@@ -237,6 +256,10 @@ void Linkage::evaluate(const State& state, const std::vector<std::size_t>& rows,
         const Row& row = *one.row;
         values.C[index] = row.value(*at_, state.t);
         values.rate[index] = row.rate(*at_, state.t);
+        if (one.start) {
+            values.C[index] -= share_ * one.start->start.value_or(0.0);
+            values.rate[index] -= one.start->start_rate.value_or(0.0);
+        }
         add_row(i, row, 1.0);
     }
     values.J.resize(m, static_cast<Eigen::Index>(6 * members_.size()));
@@ -370,7 +393,6 @@ Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& v
 Linkage::Residual Linkage::settle(State& state, const std::vector<std::size_t>& rows, Metric metric, double threshold,
                                   int iterations) const {
     constexpr double longest = 0.4;  // of one iteration: rad, or as a share of the size
-    constexpr double part = 0.1;     // of a motor's residual, likewise
     constexpr double good = 1e-10;   // where no iteration helps, this much is well
     Values values;
     double last = HUGE_VAL;
@@ -381,9 +403,9 @@ Linkage::Residual Linkage::settle(State& state, const std::vector<std::size_t>& 
             return left;
         last = left.value;
         evaluate(state, rows, values);
-        // A motor that is far off is followed in parts, so that the other joints stay nearly closed on the way.
+        // A motor or a start that is far off is followed in parts, so that the other joints stay nearly closed.
         for (std::size_t i = 0; i < rows.size(); ++i) {
-            const double most = part * unit_of(rows[i]);
+            const double most = part_of_way * unit_of(rows[i]);
             double& C = values.C[static_cast<Eigen::Index>(i)];
             if (rows_[rows[i]].driven) C = std::clamp(C, -most, most);
         }
@@ -411,7 +433,10 @@ constexpr double coarse = 1e-4;
 }  // namespace
 
 void Linkage::approach(State& state) const {
-    if (residual(state, all_).value > coarse) settle(state, all_, Metric::Mass, coarse, 100);
+    // On the way to a start a motor is not yet where it drives the joint.
+    std::vector<std::size_t> rows = share_ < 1.0 ? scleronomic_ : all_;
+    rows.insert(rows.end(), starts_.begin(), starts_.end());
+    if (residual(state, rows).value > coarse) settle(state, rows, Metric::Mass, coarse, 100);
 }
 
 Linkage::Residual Linkage::assemble_positions(State& state, const std::vector<std::size_t>& rows) const {
@@ -522,7 +547,7 @@ bool Linkage::move(State& state, std::uint32_t seed) const {
 }
 
 std::vector<std::size_t> Linkage::independent_rows(const State& state) const {
-    if (!has_loops_ || rows_.size() > most_dense_rows) return all_;
+    if (!has_loops_ || all_.size() > most_dense_rows) return all_;
     Rank best = rank_at(state, all_, dependent);
     if (best.rank == all_.size()) return all_;
     if (rank_at(state, scleronomic_, dependent).rank == 6 * members_.size()) return best.first(best.rank);

@@ -25,7 +25,7 @@ public:
     [[nodiscard]] bool has_loops() const { return has_loops_; }
     /// Diameter of the joints and mass centres at t = 0, at least that of a body's inertia, m.
     [[nodiscard]] double size() const { return size_; }
-    /// The joint or motor of a row: joint "hinge".
+    /// The joint, motor or start of a row: joint "hinge".
     [[nodiscard]] std::string owner_of(std::size_t row) const;
     /// The owners of those rows, which are independent, on which another one depends; motors alone if there are any:
     /// motor "first", motor "second".
@@ -66,8 +66,17 @@ public:
     [[nodiscard]] bool is_rounding(const Residual& position) const;
     [[nodiscard]] static bool is_rounding_of_rates(const Residual& rate);
 
-    /// If rows are far from holding, state ← positions at which all of them nearly do, so that it can be seen which
-    /// ones imply others.
+    /// Rows, which are no rows of the system, by which joints are where their `start` says, or as fast as their
+    /// `start_rate`.
+    [[nodiscard]] const std::vector<std::size_t>& starts() const { return starts_; }
+    [[nodiscard]] const std::vector<std::size_t>& start_rates() const { return start_rates_; }
+    /// In how many parts joints go to their starts, so that loops stay nearly closed on the way; 1 without loops.
+    [[nodiscard]] int parts_of_starts() const;
+    /// From now on starts() lead to this share of the starts.
+    void set_share_of_starts(double share) { share_ = share; }
+
+    /// If rows or starts() are far from holding, state ← positions at which all of them nearly do, so that it can be
+    /// seen which ones imply others.
     void approach(State& state) const;
     /// state ← the nearest positions, in the mass metric, at which these rows hold. The residual that is left.
     Residual assemble_positions(State& state, const std::vector<std::size_t>& rows) const;
@@ -90,8 +99,9 @@ private:
         const Joint* joint;
         const Row* row;
         const std::string* motor;  // null for a row of the joint itself
-        bool driven;               // depends on time
+        bool driven;               // depends on time, or leads to a start
         bool length;               // in m, else rad
+        const JointCoordinate* start = nullptr;
     };
     enum class Metric { Mass, Length };
     struct Values;
@@ -122,7 +132,8 @@ private:
     std::vector<BodyIndex> members_, prescribed_;
     std::vector<RowOfJoint> rows_;
     std::vector<std::int32_t> numbers_;
-    std::vector<std::size_t> all_, scleronomic_, certain_;
+    std::vector<std::size_t> all_, scleronomic_, certain_, starts_, start_rates_;
+    double share_ = 1.0;  // of the starts
     bool has_loops_ = false;
     std::vector<double> arms_;         // of members: the farthest joint from the mass centre, or the radius of inertia
     double size_ = 0.0, reach_ = 0.0;  // reach: largest coordinate

@@ -58,11 +58,27 @@ void MultibodySystem::Implementation::number_rows() {
     }
 }
 
-void MultibodySystem::Implementation::assemble(const Linkage& linkage, const State& given, State& state,
-                                               Assembly& done) const {
+// Starts are held beside the rows. What is wrong is theirs if the rows hold without them; by little, as where
+// coordinates of few digits say the same of several joints of a loop, they need not hold.
+void MultibodySystem::Implementation::assemble(const Linkage& linkage, const State& given, State& state, Assembly& done,
+                                               bool at_start) const {
     const auto rows = rows_of(linkage, true);
-    if (!linkage.is_rounding(linkage.residual(state, rows))) {
-        const auto left = linkage.assemble_positions(state, rows);
+    const auto with = [&](const std::vector<std::size_t>& starts) {
+        auto all = rows;
+        if (at_start) all.insert(all.end(), starts.begin(), starts.end());
+        return all;
+    };
+    if (const auto held = with(linkage.starts()); !linkage.is_rounding(linkage.residual(state, held))) {
+        auto left = linkage.assemble_positions(state, held);
+        if (held.size() > rows.size() && !(left.value <= assembled_position)) {
+            left = linkage.assemble_positions(state, rows);
+            const auto missed = linkage.residual(state, linkage.starts());
+            if (left.value <= assembled_position && missed.value > most_drift)
+                throw InputError(
+                    fmt::format("{} cannot be had: where the joints, motors and other starts come nearest to it, it is "
+                                "off by {:.3g} rad, or of the mechanism's size of {:.3g} m",
+                                linkage.owner_of(missed.row), missed.value, linkage.size()));
+        }
         if (!(left.value <= assembled_position))
             throw InputError(fmt::format(
                 "the joints do not fit together at t = {:.9g} s: the bodies were moved by up to {:.3g} m and {:.3g} "
@@ -70,14 +86,26 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
                 state.t, linkage.displacement(given, state).linear, linkage.displacement(given, state).angular,
                 linkage.owner_of(left.row), left.value, linkage.size()));
     }
-    if (!Linkage::is_rounding_of_rates(linkage.rate_residual(state, rows))) {
-        const auto left = linkage.assemble_velocities(state, rows);
+    if (const auto held = with(linkage.start_rates());
+        !Linkage::is_rounding_of_rates(linkage.rate_residual(state, held))) {
+        auto left = linkage.assemble_velocities(state, held);
+        if (held.size() > rows.size() && !(left.share <= assembled_velocity)) {
+            left = linkage.assemble_velocities(state, rows);
+            const auto missed = linkage.rate_residual(state, linkage.start_rates());
+            if (left.share <= assembled_velocity && missed.share > most_drift)
+                throw InputError(fmt::format(
+                    "{} has a rate that cannot be had: with the velocities that fit the joints, motors and other "
+                    "starts, it is off by {:.3g} of what adds up in it",
+                    linkage.owner_of(missed.row), missed.share));
+        }
         if (!(left.share <= assembled_velocity))
             throw InputError(
                 fmt::format("no velocities fit the joints and motors at t = {:.9g} s: {} misses by {:.3g} of what "
                             "adds up in it; the mechanism cannot move that way from there",
                             state.t, linkage.owner_of(left.row), left.share));
     }
+    // What follows a start of a loop is where it was asked to be.
+    if (at_start && linkage.has_loops() && !(linkage.starts().empty() && linkage.start_rates().empty())) return;
     const auto moved = linkage.displacement(given, state), faster = linkage.velocity_change(given, state);
     const auto before = linkage.speed(given), after = linkage.speed(state);
     done.displacement = std::max(done.displacement, moved.linear);
@@ -115,16 +143,27 @@ const Assembly& MultibodySystem::assemble() {
         keep_rows(self.first_kept_rows);
         return *self.assembly;
     }
-    State given = mechanics::with_joint_starts(*this, initial_state());
+    auto linkages = Linkage::of(self.bodies, self.joints, self.initial_placements());
+    const State drawn = initial_state();
+    State given = drawn;
+    int parts = 1;
+    for (const auto& linkage : linkages) parts = std::max(parts, linkage.parts_of_starts());
+    for (int k = 1; k <= parts; ++k) {
+        const double share = static_cast<double>(k) / parts;
+        given = mechanics::with_joint_starts(*this, drawn, given, share);
+        for (auto& linkage : linkages) linkage.set_share_of_starts(share);
+        if (k == parts) break;
+        for (const auto& linkage : linkages) linkage.approach(given);
+    }
     self.choose_turns_of_motors(given);
     State state = given;
     Assembly done;
-    for (auto& linkage : Linkage::of(self.bodies, self.joints, self.initial_placements())) {
+    for (auto& linkage : linkages) {
         linkage.approach(state);
         const auto rows = linkage.independent_rows(state);
         const bool leaves_out_rows = rows.size() < linkage.numbers().size();
         if (leaves_out_rows) self.keep_of(linkage, rows);
-        self.assemble(linkage, given, state, done);
+        self.assemble(linkage, given, state, done, true);
         if (!leaves_out_rows) continue;
         const auto left_out = self.rows_of(linkage, false);
         const auto others = [&](std::size_t row) {
@@ -215,7 +254,7 @@ bool MultibodySystem::renew_rows(State& state, std::int64_t step) {
         self.keep_of(linkage, rows);
         Assembly done;
         try {
-            self.assemble(linkage, State(state), state, done);
+            self.assemble(linkage, State(state), state, done, false);
         } catch (const InputError& error) {
             throw StepFailure(error.what());
         }

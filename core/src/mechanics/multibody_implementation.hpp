@@ -176,8 +176,9 @@ struct MultibodySystem::Implementation {
     void keep_of(const mechanics::Linkage& linkage, const std::vector<std::size_t>& rows);
     void number_rows();
     /// state ← with the kept rows of a linkage assembled, if they do not hold; done ← with what that changed since
-    /// `given`. Throws InputError.
-    void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done) const;
+    /// `given`. at_start: joints are where they start, and as fast. Throws InputError.
+    void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done,
+                  bool at_start) const;
     void choose_turns_of_motors(State& state) const;
 
     /// Visits the attachments: visit(first row of C, Attachment, placement of its body).
