@@ -34,6 +34,7 @@ using Json = nlohmann::json;
 constexpr const char* pile = R"(
 step: 0.0023
 end: 0.0851
+integrator: euler_implicit_linearized
 solver: {tolerance: 1.0e-9}
 materials: {stone: {friction: 0.4}}
 bodies:
@@ -180,7 +181,8 @@ TEST_F(SharedRun, AChainIsCut) {
 // Two flocks fly through one another: all bodies change their domains.
 TEST_F(SharedRun, BodiesThatFlyFarChangeProcesses) {
     compare(
-        "{step: 0.0031, end: 0.5, gravity: [0, 0, -1], solver: {tolerance: 1.0e-9}, materials: {m: {friction: 0.3, "
+        "{step: 0.0031, end: 0.5, integrator: euler_implicit_linearized, gravity: [0, 0, -1], solver: {tolerance: "
+        "1.0e-9}, materials: {m: {friction: 0.3, "
         "restitution: 0.5}}, bodies: [{name: 'a_{i}_{j}', density: 900, position: [-3, 0, 1], velocity: [9, 0, 0], "
         "angular_velocity: [0, 3, 1], shapes: [{box: {size: [0.1, 0.12, 0.11]}, material: m}], repeat: {count: [6, 5, "
         "1], spacing: [0.3, 0.3, 0]}}, {name: 'b_{i}_{j}', density: 800, position: [1.5, 0.15, 1.06], velocity: [-9, "
@@ -191,7 +193,8 @@ TEST_F(SharedRun, BodiesThatFlyFarChangeProcesses) {
 
 TEST_F(SharedRun, MoreProcessesThanBodies) {
     compare(
-        "{step: 0.01, end: 0.5, bodies: [{name: floor, fixed: true, shapes: [{plane: {}}]}, {name: a, density: 900, "
+        "{step: 0.01, end: 0.5, integrator: euler_implicit_linearized, bodies: [{name: floor, fixed: true, shapes: "
+        "[{plane: {}}]}, {name: a, density: 900, "
         "position: [0.1, 0, 0.4], shapes: [{sphere: {radius: 0.1}}]}, {name: b, density: 800, position: [3, 0, 0.35], "
         "shapes: [{sphere: {radius: 0.12}}]}]}",
         {5}, 1e-9, 1e-7);

@@ -64,17 +64,18 @@ TEST_F(Touching, MechanismsThatMayTouchGetIt) {
         return std::pair(scene.systems[0].integrator, scene.systems[0].coordinates);
     };
     const std::pair switching{std::string("switching"), Coordinates::Joint},
-        euler{std::string("euler_implicit_linearized"), Coordinates::Maximal};
+        euler{std::string("euler_implicit_linearized"), Coordinates::Maximal},
+        trapezoidal{std::string("linearly_implicit_trapezoidal"), Coordinates::Maximal};
     EXPECT_EQ(chosen(chain(4, 0.9)), switching);
     const std::string balls =
         "- {name: 'b{i}', mass: 1, position: [3, 0, 0.5], shapes: [{sphere: {radius: 0.1}, material: m}], repeat: "
         "{count: 5, spacing: [0, 1, 0]}}\n";
     std::string piled = chain(4, 0.9);
     piled.insert(piled.find("joints:"), balls);
-    EXPECT_EQ(chosen(piled), euler) << "five of nine bodies have no joint";
-    EXPECT_EQ(chosen("coordinates: maximal\n" + chain(4, 0.9)), euler);
+    EXPECT_EQ(chosen(piled), trapezoidal) << "five of nine bodies have no joint";
+    EXPECT_EQ(chosen("coordinates: maximal\n" + chain(4, 0.9)), trapezoidal);
     EXPECT_EQ(chosen("sleeping: true\n" + chain(4, 0.9)), euler);
-    EXPECT_EQ(chosen("solver: ssn\n" + chain(4, 0.9)), euler);
+    EXPECT_EQ(chosen("solver: ssn\n" + chain(4, 0.9)), trapezoidal);
     const auto with = [](const std::string& more) {
         std::string text = chain(4, 0.9);
         text.insert(text.rfind('}'), more);
