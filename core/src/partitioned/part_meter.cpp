@@ -261,8 +261,10 @@ Errors PartMeter::measure(const double* x, const double* lambda) {
 }
 
 double PartMeter::natural(const double* x, const double* lambda) {
+    // A process without columns has no address to show.
+    const bool given = part_.largest(static_cast<std::int64_t>(!x && part_.problem.n() > 0)) == 0;
     std::vector<double> own;
-    if (!x && part_.structure != Structure::Reduced) {
+    if (!given && part_.structure != Structure::Reduced) {
         if (part_.stands_in()) return std::numeric_limits<double>::quiet_NaN();
         part_.velocity_of(lambda, own);
         x = own.data();
