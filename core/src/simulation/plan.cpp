@@ -310,6 +310,9 @@ private:
             find_later_solvers(all);
         } else {
             nothing_.push_back({"a solver for cones", "no contact, stop or limited motor: every row is bilateral"});
+            // The first step may be the answer by itself, as where a motor goes on at the speed of the start.
+            const std::string name = simulation_.solver().choice(needs_);
+            if (plan_.solvers.empty() && !name.empty()) plan_.solvers.push_back(name);
         }
         if (!plan_.later_solvers.empty())
             leave(fmt::format("the solvers {}", fmt::join(plan_.later_solvers, ", ")),
