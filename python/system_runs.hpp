@@ -117,7 +117,6 @@ private:
                 return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
             };
             if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
-            require_usable(solver_->effort());
             measure(next, record);
         } catch (const Unsupported& error) {
             undo(memory, control);
@@ -166,7 +165,9 @@ private:
             taken.rejected = parts.rejected;
         } else {
             const auto take = [this](State& moved, double h, StepReport& report) {
+                solver_->forget_misses();
                 timestepper_->step(moved, h, *solver_, report);
+                solver_->require_usable();
             };
             try {
                 take(state, step.h, taken.step);

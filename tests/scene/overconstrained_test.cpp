@@ -407,6 +407,37 @@ TEST(Overconstrained, AFlatParallelogramLosesNoRowThatItNeeds) {
     EXPECT_EQ(left_out(run), 3);
 }
 
+// A motor turns the crank through flat positions, which are states to be shown: at each of several phases and speeds.
+TEST(Overconstrained, AParallelogramIsDrivenThroughItsFlatPositions) {
+    for (const double turns : {1.0, 0.8, 1.25})
+        for (const double start : {0.0, 0.25 * M_PI}) {
+            Running run(parse_scene(
+                fmt::format(
+                    "step: 0.002\nend: 5\nbodies:\n"
+                    "- {{name: crank, mass: 0.3, inertia: {{xx: 0.00225, yy: 0.00225, zz: 5.0e-6}}, position: "
+                    "[0, 0, 0.15]}}\n"
+                    "- {{name: coupler, mass: 1, inertia: {{xx: 1.7e-5, yy: 0.0833, zz: 0.0833}}, position: "
+                    "[0.5, 0, 0.3]}}\n"
+                    "- {{name: rocker, mass: 0.3, inertia: {{xx: 0.00225, yy: 0.00225, zz: 5.0e-6}}, position: "
+                    "[1, 0, 0.15]}}\n"
+                    "joints:\n"
+                    "- {{name: O, kind: revolute, second: crank, axis: [0, -1, 0], start: {0}, start_rate: "
+                    "{1}}}\n"
+                    "- {{name: A, kind: revolute, first: crank, second: coupler, point: [0, 0, 0.3], axis: [0, "
+                    "-1, 0]}}\n"
+                    "- {{name: B, kind: revolute, first: coupler, second: rocker, point: [1, 0, 0.3], axis: [0, "
+                    "-1, 0]}}\n"
+                    "- {{name: G, kind: revolute, second: rocker, point: [1, 0, 0], axis: [0, -1, 0]}}\n"
+                    "motors: [{{name: m, joint: O, speed: true, motion: {1}}}]\n",
+                    start, 2.0 * M_PI * turns),
+                "s"));
+            ASSERT_NO_THROW(run.finish()) << turns << " " << start;
+            const double angle = start + 10.0 * M_PI * turns;
+            EXPECT_NEAR(run.pose("crank").position[0], -0.15 * std::sin(angle), 1e-5) << turns << " " << start;
+            EXPECT_LT(run.simulation.totals().worst_drift, 1e-5);
+        }
+}
+
 TEST(Overconstrained, MotorsThatContradictEachOtherAreNamed) {
     const auto scene = [](const std::string& second) {
         std::string yaml = Bennett().scene(8, swinging, head("hht", 0.001, 1.0));

@@ -37,6 +37,9 @@ public:
     /// InputError for another time, StepTooLong if the polynomials are so far from the constraints that they cannot be
     /// returned to them, StepFailure if the state is not finite.
     void at(const ContinuousExtension& way, double t, State& state, StepSolver& solver, StepReport& report);
+    /// The same as the polynomials have it, which is off the constraints by their error. Throws InputError and
+    /// StepFailure as at().
+    void read(const ContinuousExtension& way, double t, State& state);
     /// λ of the bilateral constraints at a state that at() gave, forces, m: by a problem more where way.multipliers and
     /// multiplier_powers do not tell them.
     [[nodiscard]] std::vector<double> multipliers(const ContinuousExtension& way, const State& state,

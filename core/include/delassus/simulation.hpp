@@ -195,6 +195,7 @@ private:
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A state that is shown, by steps that are as long as their errors allow.
     void advance_ahead(State& state, double end, StepReport& report);
+    void show_ahead(State& state, double end, StepReport& report);
     /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
     void add_unilateral_forces(std::vector<double>& force) const;
     /// The timestepper and what controls its steps.

@@ -118,6 +118,13 @@ public:
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
     DELASSUS_API StepAnswer solve(Problem&& problem, Solution& solution, const StepRequest& request = {});
 
+    /// Before a trial of a step: misses so far are of what is kept, or of what was thrown away.
+    DELASSUS_API void forget_misses();
+    /// After it: throws StepTooLong if a solve since forget_misses() or reset_effort() missed its tolerance by orders,
+    /// since its answer is no motion. Another length may have one, as past a position where rows become dependent.
+    /// Within two orders the run goes on, and says at its end that it is not solved.
+    DELASSUS_API void require_usable() const;
+
     /// Threads in place of those that the configuration asks for, e.g. to share them with other systems. Null: none but
     /// the calling thread. Call it between solves.
     DELASSUS_API void use(std::shared_ptr<ThreadTeam> threads);

@@ -117,12 +117,14 @@ void AdaptiveStepping::restore(const std::vector<double>& memory) {
 }
 
 AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, StepSolver& solver) {
+    solver.forget_misses();
     Trial trial;
     if (embedded_) {
         trial.end = begin;
         restore(memory_);
         trial.second = stepper_.step(trial.end, h, solver);
         count(trial.second);
+        solver.require_usable();
         trial.memory = stepper_.save();
         trial.error = error_of(begin, trial.end, stepper_.embedded_error(), h);
         return trial;
@@ -137,6 +139,7 @@ AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, Ste
     count(trial.first);
     trial.second = stepper_.step(trial.end, 0.5 * h, solver);
     count(trial.second);
+    solver.require_usable();
     trial.memory = stepper_.save();
     trial.error = error_of(begin, whole, trial.end, h);
     trial.touches = trial.whole.active_blocks + trial.first.active_blocks + trial.second.active_blocks > 0;
@@ -224,9 +227,13 @@ AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double h, double 
     report_.h = remaining < h + control_.smallest ? remaining : h;
     report_.impact = true;
     const std::int32_t iterations = report_.step.newton_iterations;
-    report_.step = stepper_.step(state, report_.h, solver);
+    State after = state;
+    solver.forget_misses();
+    report_.step = stepper_.step(after, report_.h, solver);
+    solver.require_usable();
     report_.step.newton_iterations += iterations;
     impacts_ += 1.0;
+    state = std::move(after);
     if (report_.h == remaining) state.t = end;
     return std::move(report_);
 }

@@ -76,6 +76,12 @@ DenseOutput::~DenseOutput() = default;
 
 void DenseOutput::at(const ContinuousExtension& way, double t, State& state, StepSolver& solver, StepReport& report) {
     auto& self = *implementation_;
+    read(way, t, state);
+    if (t != way.end.t && self.m > 0) self.return_to_constraints(way.begin, state, solver, report);
+}
+
+void DenseOutput::read(const ContinuousExtension& way, double t, State& state) {
+    auto& self = *implementation_;
     if (t == way.end.t) {
         state = way.end;
         return;
@@ -95,7 +101,6 @@ void DenseOutput::at(const ContinuousExtension& way, double t, State& state, Ste
     state.v = way.begin.v;
     for (std::size_t i = 0; i < state.v.size(); ++i) state.v[i] += self.value[static_cast<Eigen::Index>(i)];
     require_finite(way.begin, state, t - way.begin.t, "dense output");
-    if (self.m > 0) self.return_to_constraints(way.begin, state, solver, report);
 }
 
 std::vector<double> DenseOutput::multipliers(const ContinuousExtension& way, const State& state, StepSolver& solver,

@@ -12,6 +12,7 @@
 #include "delassus/error.hpp"
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
+#include "delassus/timestepper.hpp"
 #include "dynamics/general_factor.hpp"
 #include "dynamics/island_solver.hpp"
 #include "dynamics/islands.hpp"
@@ -388,6 +389,17 @@ const SolverEffort& StepSolver::effort() const {
 void StepSolver::reset_effort() {
     implementation_->effort = {};
 }
+void StepSolver::forget_misses() {
+    implementation_->effort.worst_miss = 0.0;
+    implementation_->effort.unsolved.clear();
+}
+void StepSolver::require_usable() const {
+    const SolverEffort& effort = implementation_->effort;
+    if (effort.worst_miss > 100.0)
+        throw StepTooLong(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used", effort.unsolved,
+                                      effort.worst_miss));
+}
+
 std::vector<std::string> StepSolver::loaded() const {
     std::set<std::string> names;
     for (const KeptKind& kind : implementation_->kinds)

@@ -46,10 +46,4 @@ std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const
     throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
 }
 
-void require_usable(const SolverEffort& effort) {
-    if (effort.worst_miss > 100.0)
-        throw StepFailure(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used", effort.unsolved,
-                                      effort.worst_miss));
-}
-
 }  // namespace delassus

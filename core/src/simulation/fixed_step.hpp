@@ -69,8 +69,4 @@ DELASSUS_API std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep
                                         const std::vector<double>& memory, double h, State& state, StepReport& report,
                                         const StepTooLong& failure);
 
-/// Throws StepFailure if a solve missed its tolerance by orders. Within two the run goes on, and says at its end that
-/// it is not solved.
-DELASSUS_API void require_usable(const SolverEffort& effort);
-
 }  // namespace delassus

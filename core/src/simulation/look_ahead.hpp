@@ -36,6 +36,8 @@ public:
     [[nodiscard]] bool cut_by_corner() const { return cut_; }
     /// state ← that at `to`, which the method has reached; the problems solved go to the report.
     void show(double to, State& state, StepSolver& solver, StepReport& report);
+    /// The same, off the constraints by the error of the way.
+    void read(double to, State& state) { output_.read(way_, to, state); }
     /// λ of the bilateral constraints at a state that was shown last.
     [[nodiscard]] std::vector<double> multipliers(const State& state, StepSolver& solver);
 

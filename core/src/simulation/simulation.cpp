@@ -283,16 +283,54 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     } else if (control_) {
         record_.parts = step_within_error(*control_, state, step.end, *solver_, report.step).taken;
     } else {
+        const auto take = [this](State& moved, double h, StepReport& part) {
+            solver_->forget_misses();
+            take_step(moved, h, part);
+            solver_->require_usable();
+        };
         try {
-            take_step(state, report.h, report.step);
+            take(state, report.h, report.step);
         } catch (const StepTooLong& failure) {
-            const auto take = [this](State& moved, double h, StepReport& part) { take_step(moved, h, part); };
             record_.parts =
                 step_in_parts(*timestepper_, take, now_.state, memory, report.h, state, report.step, failure);
         }
     }
     state.t = step.end;
     if (sleeping_) sleeping_->end_step(now_.state, state);
+}
+
+// Where a step has leapt over a place at which constraints lose rank, its way cannot be returned to them, and one ends
+// at the state shown. If none can, as where that is the place itself, it is shown as the way has it.
+void Simulation::show_ahead(State& state, double end, StepReport& report) {
+    StepReport shown;
+    try {
+        solver_->forget_misses();
+        ahead_->show(end, state, *solver_, shown);
+        solver_->require_usable();
+        shown.follow(report);
+        std::swap(report, shown);
+        return;
+    } catch (const StepFailure&) {
+        state = now_.state;
+    }
+    const std::vector<double> memory = timestepper_->save(), control = control_->save();
+    try {
+        timestepper_->restart();
+        control_->set_largest(system_->step);
+        record_.parts = step_within_error(*control_, state, end, *solver_, shown).taken;
+        std::swap(report, shown);
+        state.t = end;
+        ahead_->begin(state);
+    } catch (const StepFailure&) {
+        timestepper_->restart();
+        timestepper_->load(memory);
+        control_->load(control);
+        ahead_->read(end, state);
+        std::vector<double> off(static_cast<std::size_t>(dynamics().m()));
+        dynamics().constraint(state, off.data());
+        const double limit = timestepper_->error_limit();
+        if (std::any_of(off.begin(), off.end(), [limit](double C) { return !(std::abs(C) <= limit); })) throw;
+    }
 }
 
 void Simulation::advance_ahead(State& state, double end, StepReport& report) {
@@ -306,17 +344,7 @@ void Simulation::advance_ahead(State& state, double end, StepReport& report) {
         std::swap(report, part.step);
     }
     record_.parts = std::max<std::int64_t>(parts, 1);
-    try {
-        ahead_->show(end, state, *solver_, report);
-    } catch (const StepFailure&) {
-        // As where a step leaps over a place at which constraints lose rank: then one ends here.
-        state = now_.state;
-        timestepper_->restart();
-        control_->set_largest(system_->step);
-        record_.parts = step_within_error(*control_, state, end, *solver_, report).taken;
-        state.t = end;
-        ahead_->begin(state);
-    }
+    show_ahead(state, end, report);
     report.multipliers.clear();
 }
 
@@ -406,7 +434,6 @@ const StepRecord& Simulation::step() {
     };
     try {
         advance(next, taken, memory);
-        require_usable(solver_->effort());
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
         if (!ahead_) settle_turns(next);
