@@ -362,6 +362,14 @@ struct ContactMaterial {
     double restitution = 0.0;  ///< in [0, 1]
 };
 
+/// Two bodies whose shapes overlap.
+struct BodyOverlap {
+    BodyIndex a, b;    ///< a < b
+    double depth;      ///< of the deepest contact, m, > 0
+    double extent;     ///< the largest one of the smaller shape that touches, m
+    double thickness;  ///< half of the smallest extent of the thinner one, m; infinite of planes and terrains
+};
+
 /// What MultibodySystem::assemble() changed.
 struct Assembly {
     // The largest change of a body:
@@ -369,9 +377,9 @@ struct Assembly {
     double velocity = 0.0, angular_velocity = 0.0;  ///< m/s, rad/s
     /// The largest change of a position: in sizes of its linkage, or in rad.
     double position_share = 0.0;
-    /// The largest change of velocities over the largest velocity of the linkage; of linkages that were not at rest.
+    /// The largest change of velocities that were given, not 0, over the largest velocity of the linkage.
     double velocity_share = 0.0;
-    /// The same of all linkages: 1 where motors set bodies in motion that were at rest.
+    /// The same of all velocities: 1 where motors set bodies in motion that were at rest.
     double velocity_share_of_all = 0.0;
 };
 
@@ -504,6 +512,9 @@ public:
     /// m, since finish(): how near shapes must be for a contact, and their median size; 0 where none can touch.
     [[nodiscard]] double envelope() const;
     [[nodiscard]] double size_of_shapes() const;
+    /// Bodies that overlap at a state, by pairs, ascending; h (s): of the step that begins there. What it finds is kept
+    /// for collect_unilateral() of the same state and step. Not those of nodes.
+    void collect_overlaps(const State& state, double h, std::vector<BodyOverlap>& overlaps);
     /// Whether shapes or nodes could meet, so that contacts are looked for; after finish().
     [[nodiscard]] bool detects_contacts() const;
     /// Rows of joint `index` within all_constraints() and all_multipliers(): first row and count.

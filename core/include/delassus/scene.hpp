@@ -82,6 +82,7 @@ struct SceneSystem {
     std::string method_reason;                   ///< why the integrator is this one; empty: the scene names it
     SolverConfig solver;                         ///< an empty name: `auto`
     double step = 0.0;                           ///< s, > 0; with `control` the first that is tried
+    double accuracy = 1e-3;                      ///< of positions, as a share of the extent of what moves
     std::optional<StepControl> control;          ///< steps follow from a tolerance; none: all are `step` long
     std::optional<SleepingRule> sleeping;        ///< none: every body is awake
     std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given

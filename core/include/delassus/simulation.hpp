@@ -76,6 +76,10 @@ struct SimulationTotals {
     double seconds = 0.0, solver_seconds = 0.0;
     std::int64_t unsolved_steps = 0;  ///< steps with a solve that missed its tolerance
     std::string first_unsolved;       ///< when and why the first did
+    /// Steps in which bodies came to overlap by more than the accuracy allows, and shorter ones did not help; when and
+    /// which the first time.
+    std::int64_t deep_steps = 0;
+    std::string first_deep;
 };
 
 /// All that a simulation carries from step to step: with equal scenes, going on from it gives the same bits.
@@ -92,6 +96,7 @@ struct SimulationState {
 };
 
 class EnergyGuard;
+class OverlapWatch;
 class LookAhead;
 class SharedRun;
 
@@ -193,6 +198,9 @@ private:
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     /// memory: of the timestepper, before the step.
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
+    /// A step of fixed size, in parts where it is too long as one. False if bodies come to overlap whatever the parts:
+    /// they are not watched any longer, and the step is to be taken again.
+    bool advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A state that is shown, by steps that are as long as their errors allow.
     void advance_ahead(State& state, double end, StepReport& report);
     void show_ahead(State& state, double end, StepReport& report);
@@ -230,8 +238,10 @@ private:
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next
     std::vector<double> constraint_;
     std::unique_ptr<EnergyGuard> guard_;
-    std::unique_ptr<SharedRun> shared_;  // empty where this process steps all bodies
-    std::vector<double> gathered_;       // the memory of the method for all bodies, after step gathered_at_
+    std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or steps follow from their errors
+    std::string deep_;                        // of this step: what came to overlap whatever its parts; or empty
+    std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies
+    std::vector<double> gathered_;            // the memory of the method for all bodies, after step gathered_at_
     std::int64_t gathered_at_ = -1;
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -20,13 +21,14 @@ public:
     explicit PositionProjection(DynamicalSystem& system);
 
     /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
-    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite or does not
-    /// bring the constraints nearer to 0.
+    /// contacts gave by it to report.recovered. late: impulses that positions lack besides, divided by h, n or empty
+    /// (VelocityContacts::add_late_impulse). Throws StepFailure if the motion is not finite or does not bring the
+    /// constraints nearer to 0.
     void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
-                 StepSolver& solver, StepReport& report, std::string_view method);
+                 StepSolver& solver, StepReport& report, std::string_view method, std::span<const double> late = {});
 
 private:
-    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts, bool late);
     void make_compliant();
     void require_nearer(const State& begin, const State& end, double h, std::string_view method);
 

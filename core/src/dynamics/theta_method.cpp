@@ -102,9 +102,16 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     end_.v = solution_.x;
     require_finite(state, end_, h, settings_.name);
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
-    if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
-    if (!settings_.linearly_implicit || contacts_.landed(solution_))
+    late_.clear();
+    if (contacts_.bounced(solution_)) {
+        late_.resize(static_cast<std::size_t>(n_));
+        contacts_.add_late_impulse(problem_, solution_, late_);
+    }
+    if (!settings_.linearly_implicit || !late_.empty() || contacts_.landed(solution_))
+        projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name, late_);
+    if (!late_.empty() && m_ > 0)  // the motion that was lacking is no small one
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
+    if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
     if (settings_.linearly_implicit) remember_change(result_, h);
     last_h_ = h;
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
@@ -164,10 +171,21 @@ void ThetaMethod::extrapolate(double h) {
     }
 }
 
+// What a bounce changes at once is no acceleration: there the last ones stay.
 void ThetaMethod::remember_change(const Vector& result, double h) {
-    changes_[1].swap(changes_[0]);
-    changes_[0].resize(static_cast<std::size_t>(n_));
-    Eigen::Map<Vector>(changes_[0].data(), n_) = (result - free_) / h;
+    const auto n = static_cast<std::size_t>(n_);
+    bounced_.assign(n, 0);
+    contacts_.mark_bounced(problem_, solution_, bounced_);
+    std::vector<double>& last = changes_[0];
+    std::vector<double>& before = changes_[1];
+    if (!last.empty()) before.resize(n);
+    last.resize(n);
+    for (std::int32_t i = 0; i < n_; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        if (bounced_[k]) continue;
+        if (!before.empty()) before[k] = last[k];
+        last[k] = (result[i] - free_[i]) / h;
+    }
 }
 
 /// H, D and the cones, which stay for the step.

@@ -53,6 +53,16 @@ namespace delassus {
 //
 // Gaps nearer to 0 than the resolution are 0.
 //
+// `once` knows the acceleration of a row besides impulses, a = (D(q⁺) ṽ⁺ − u⁻)/h with the guess of a smooth motion. So
+// a contact with restitution meets when g + u⁻ τ + ½ a τ² = 0, bounces with the speed that it has then, and has moved
+// on at the end of the step (bounce.cpp): b = −u⁺ of that. Its impulse acts from τ on, by which
+//
+//     M x = (1 − θ − τ/h) h Dᵀ P
+//
+// is what positions lack, where the step moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end
+// of the step (position_projection.cpp). Of an impulse that holds a contact besides, the part counts that changes the
+// speed as a bounce does.
+//
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)
 // u⁻ + θ u⁺), is
@@ -261,8 +271,7 @@ void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& c
     const double gap = contact.resolved_gap();
     const double speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
     contact.normal = 0.0;
-    const bool corrects = settings_.once && contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap);
-    if (block.restitution > 0.0 && speed < -settings_.restitution_speed && !corrects) {
+    if (!settings_.once && block.restitution > 0.0 && speed < -settings_.restitution_speed) {
         const bool closes = gap + h_ * speed <= 0.0;
         contact.bounces = closes && !contact.pushed;
         contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
@@ -277,10 +286,36 @@ void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& c
     }
 }
 
+/// `once`: bounces at their times, with the accelerations of the guess.
+void VelocityContacts::time_bounces(const Problem& problem, std::span<const double> guess) {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const UnilateralRows::Block& block = rows_.blocks()[k];
+        Contact& contact = contacts_[k];
+        if (!contact.along_normal || block.restitution == 0.0) continue;
+        const double gap = contact.resolved_gap(), speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
+        if (contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap)) continue;  // it corrects
+        double end = problem.D.row_times(static_cast<std::int32_t>(first_row_ + contact.row), guess.data()) +
+                     rows_.rows()[contact.row].rate;
+        if (contact.smooth) end += (1.0 - theta_) / theta_ * (end - before_.speed(contact.before, guess.data()));
+        const auto bounce = bounce_within(h_, std::max(contact.gap, 0.0), speed, (end - speed) / h_, block.restitution);
+        if (bounce && bounce->closing > settings_.restitution_speed) {
+            contact.bounce = bounce;
+            contact.bounces = !contact.pushed || gap > 0.0;
+            contact.turns = contact.turns && contact.pushed;
+            contact.normal = -bounce->end_speed;
+            contact.recovery = 0.0;
+        } else if (gap > 0.0 && speed < -settings_.restitution_speed) {
+            contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
+            contact.recovery = 0.0;
+        }
+    }
+}
+
 void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, bool coulomb) {
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
+    timed_ = false;
     contacts_.clear();
     compliances_.clear();
     kept_.begin_walk();
@@ -309,6 +344,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.known = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
+            contact.smooth = block.restitution > 0.0 && nearly_equal(row, before->row, 1);
             contact.turns =
                 (contact.pushed || !contact.along_normal) && nearly_equal(row, before->row, block.cone.rows);
         } else {
@@ -333,6 +369,8 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                              double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
+    if (settings_.once && !timed_) time_bounces(problem, guess);
+    timed_ = true;
     const double share = std::max(settings_.once ? settled_share_once : settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
@@ -419,6 +457,42 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
     }
 }
 
+template <class Visit>
+void VelocityContacts::for_each_bounced(const Solution& solution, const Visit& visit) const {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const std::size_t first = first_row_ + contacts_[k].row;
+        if (contacts_[k].bounce && solution.lambda[first] > 0.0)
+            visit(contacts_[k], *contacts_[k].bounce, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
+    }
+}
+
+bool VelocityContacts::bounced(const Solution& solution) const {
+    bool any = false;
+    for_each_bounced(solution, [&](const Contact&, const Bounce&, std::size_t, std::size_t) { any = true; });
+    return any;
+}
+
+void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& solution,
+                                        std::vector<double>& momentum) const {
+    const auto& D = problem.D;
+    for_each_bounced(solution, [&](const Contact& contact, const Bounce& bounce, std::size_t first, std::size_t rows) {
+        const double share = std::min(bounce.change / contact.change, 1.0);
+        const double late = share * (1.0 - theta_ - bounce.acts / h_);
+        for (std::size_t row = first; row < first + rows; ++row)
+            for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
+                momentum[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] +=
+                    late * D.value[static_cast<std::size_t>(e)] * solution.lambda[row];
+    });
+}
+
+void VelocityContacts::mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {
+    const auto& D = problem.D;
+    for_each_bounced(solution, [&](const Contact&, const Bounce&, std::size_t first, std::size_t rows) {
+        for (auto e = D.row_start[first]; e < D.row_start[first + rows]; ++e)
+            marks[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] = 1;
+    });
+}
+
 double VelocityContacts::work(const Problem& problem, const Solution& solution, std::span<const double> mean) const {
     double sum = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -503,6 +577,13 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         }
         report.recovered +=
             lambda[first] * std::clamp(0.5 * (contact.end_speed - contact.approach), 0.0, contact.recovery);
+        if (contact.bounce) {
+            if (contact.bounces && contact.bounce->closing > report.impact_speed) {
+                report.impact_speed = contact.bounce->closing;
+                report.impact_time = contact.bounce->meets;
+            }
+            continue;
+        }
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
         if (settings_.once && speed <= 0.25 * contact.change) continue;
         if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {

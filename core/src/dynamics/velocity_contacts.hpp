@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "delassus/export.hpp"
 #include "delassus/timestepper.hpp"
+#include "dynamics/bounce.hpp"
 #include "dynamics/gap_resolution.hpp"
 #include "dynamics/kept_impulses.hpp"
 
@@ -68,6 +70,14 @@ public:
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
+    /// Whether a contact bounced in this step at a time within it (`once`). solution: of the whole problem.
+    [[nodiscard]] bool bounced(const Solution& solution) const;
+    /// momentum += what positions at the end of the step lack where impulses of bounces act at their own times and not
+    /// over the whole step, divided by h; n.
+    void add_late_impulse(const Problem& problem, const Solution& solution, std::vector<double>& momentum) const;
+    /// Sets the marks of the velocities that bounces changed at once, n.
+    void mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
+
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n. solution: of the whole problem.
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
     /// For the rest of the step nothing bounces, and rows stay as they are in the middle of it: such contacts take
@@ -105,6 +115,7 @@ private:
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
         bool known = false;       ///< it is in before_
+        bool smooth = false;      ///< its normal row, which may bounce, only turns
         bool turns = false;       ///< b has what its rows turn until the end of the step
         double gap = 0.0;         ///< at the beginning
         double resolution = 0.0;  ///< of it
@@ -120,6 +131,7 @@ private:
         const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
         bool pushed = false;                         ///< in the step before
         bool bounces = false;                        ///< b has restitution
+        std::optional<Bounce> bounce;                ///< `once`: it bounces at a time within the step
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -133,6 +145,10 @@ private:
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
+    [[nodiscard]] bool set_bounce(const UnilateralRows::Block& block, Contact& contact, double acceleration) const;
+    void time_bounces(const Problem& problem, std::span<const double> guess);
+    template <class Visit>
+    void for_each_bounced(const Solution& solution, const Visit& visit) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;
@@ -151,7 +167,7 @@ private:
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     std::size_t first_row_ = 0;             // in the problem
-    bool coulomb_ = false, settled_ = true;
+    bool coulomb_ = false, settled_ = true, timed_ = false;
 };
 
 /// The options of timesteppers that take contacts, and what their values say.

@@ -176,12 +176,15 @@ Linkage::Largest Linkage::displacement(const State& from, const State& to) const
     return largest;
 }
 
-Linkage::Largest Linkage::velocity_change(const State& from, const State& to) const {
+Linkage::Largest Linkage::velocity_change(const State& from, const State& to, bool of_given) const {
     Largest largest;
+    const auto change = [&](std::int32_t column) -> Vector3d {
+        if (of_given && three(from.v, column).isZero(0.0)) return Vector3d::Zero();
+        return three(to.v, column) - three(from.v, column);
+    };
     for (const BodyIndex index : members_) {
         const auto column = (*bodies_)[static_cast<std::size_t>(index)].column;
-        largest.include(three(to.v, column) - three(from.v, column),
-                        three(to.v, column + 3) - three(from.v, column + 3));
+        largest.include(change(column), change(column + 3));
     }
     return largest;
 }
@@ -361,6 +364,9 @@ Eigen::VectorXd Linkage::unscaled(const Eigen::VectorXd& change, Metric metric) 
 
 namespace {
 
+/// Directions in which rows differ by less are singular, where the kept rows alone are asked.
+constexpr double singular = 1e-10;
+
 /// The lengths of rows; 1 of rows of zeros.
 Eigen::VectorXd lengths_of_rows(const Eigen::SparseMatrix<double, Eigen::RowMajor>& A) {
     Eigen::VectorXd lengths(A.rows());
@@ -386,6 +392,20 @@ Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& v
     for (Eigen::Index i = 0; i < G.rows(); ++i) G.coeffRef(i, i) += shift;
     const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(G);
     return unscaled(A.transpose() * factor.solve(b), metric);
+}
+
+/// The shortest change, in the mass metric, of the velocities marked by 1 that brings values of rows nearest to 0.
+Eigen::VectorXd Linkage::nearest(const Values& values, const Eigen::VectorXd& value,
+                                 const Eigen::VectorXd& marks) const {
+    Eigen::SparseMatrix<double, Eigen::RowMajor> A = scaled(values, Metric::Mass);
+    const Eigen::VectorXd lengths = lengths_of_rows(A);
+    A = lengths.cwiseInverse().asDiagonal() * A * marks.asDiagonal();
+    const Eigen::VectorXd b = -value.cwiseQuotient(lengths);
+    if (rows_.size() <= most_dense_rows) return unscaled(least_solution(A, b, singular), Metric::Mass);
+    constexpr double shift = 1e-12;
+    Eigen::SparseMatrix<double> G = Eigen::SparseMatrix<double>(A.transpose()) * Eigen::SparseMatrix<double>(A);
+    for (Eigen::Index i = 0; i < G.rows(); ++i) G.coeffRef(i, i) += shift;
+    return unscaled(Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(G).solve(A.transpose() * b), Metric::Mass);
 }
 
 // ---- Assembly ----
@@ -423,8 +443,6 @@ Linkage::Residual Linkage::settle(State& state, const std::vector<std::size_t>& 
 
 namespace {
 
-/// Directions in which rows differ by less are singular, where the kept rows alone are asked.
-constexpr double singular = 1e-10;
 /// Rows that are dependent to this relative measure repeat each other: coordinates of six digits are no better.
 constexpr double dependent = 1e-5;
 /// For directions and residuals on the way to a configuration.
@@ -443,7 +461,10 @@ Linkage::Residual Linkage::assemble_positions(State& state, const std::vector<st
     return settle(state, rows, Metric::Mass, singular, 100);
 }
 
-Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<std::size_t>& rows) const {
+// A velocity of a mass centre or of a turning that is 0 was not given: it follows those that were, as far as it can. So
+// the rows are first brought as near to 0 as these velocities alone allow, and all of them change for what is left.
+Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<std::size_t>& rows,
+                                               bool zeros_follow) const {
     Values values;
     evaluate(state, rows, values);
     const auto n = static_cast<Eigen::Index>(6 * members_.size());
@@ -451,6 +472,12 @@ Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<s
     for (std::size_t k = 0; k < members_.size(); ++k)
         v.segment<6>(static_cast<Eigen::Index>(6 * k)) = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(
             state.v.data() + (*bodies_)[static_cast<std::size_t>(members_[k])].column);
+    if (zeros_follow) {
+        Eigen::VectorXd follows(n);
+        for (Eigen::Index i = 0; i < n; i += 3)
+            follows.segment<3>(i).setConstant(v.segment<3>(i).isZero(0.0) ? 1.0 : 0.0);
+        if (follows.minCoeff() < 1.0) v += nearest(values, values.J * v + values.rate, follows);
+    }
     for (int pass = 0; pass < 3; ++pass)  // the later ones remove what rounding left
         v += shortest(values, values.J * v + values.rate, Metric::Mass, singular);
     for (std::size_t k = 0; k < members_.size(); ++k)

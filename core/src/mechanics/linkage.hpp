@@ -50,7 +50,8 @@ public:
         void include(const Vector3d& line, const Vector3d& turn);
     };
     [[nodiscard]] Largest displacement(const State& from, const State& to) const;
-    [[nodiscard]] Largest velocity_change(const State& from, const State& to) const;
+    /// of_given: of velocities alone that are not 0 in `from`.
+    [[nodiscard]] Largest velocity_change(const State& from, const State& to, bool of_given = false) const;
     [[nodiscard]] Largest speed(const State& state) const;
 
     /// Of the worst of some rows: |C|/size or |C| of an angle; or |Ċ|/size in 1/s, and as a share of the largest sum of
@@ -80,8 +81,9 @@ public:
     void approach(State& state) const;
     /// state ← the nearest positions, in the mass metric, at which these rows hold. The residual that is left.
     Residual assemble_positions(State& state, const std::vector<std::size_t>& rows) const;
-    /// state ← the nearest velocities, in the mass metric, at which the rates of these rows vanish.
-    Residual assemble_velocities(State& state, const std::vector<std::size_t>& rows) const;
+    /// state ← the nearest velocities, in the mass metric, at which the rates of these rows vanish. zeros_follow:
+    /// those of mass centres and of turning that are 0 change before the others.
+    Residual assemble_velocities(State& state, const std::vector<std::size_t>& rows, bool zeros_follow) const;
 
     /// Independent rows that imply the others, ascending, at a state at which the scleronomic rows hold. All rows if
     /// those of the linkage are independent in general, or too many to tell.
@@ -119,6 +121,8 @@ private:
     /// The shortest change in the metric with C_q change = −value; directions below the threshold are left alone.
     [[nodiscard]] Eigen::VectorXd shortest(const Values& values, const Eigen::VectorXd& value, Metric metric,
                                            double threshold) const;
+    [[nodiscard]] Eigen::VectorXd nearest(const Values& values, const Eigen::VectorXd& value,
+                                          const Eigen::VectorXd& marks) const;
     void increment(State& state, const Eigen::VectorXd& change) const;
     /// Gauss–Newton iterations, at most so many.
     Residual settle(State& state, const std::vector<std::size_t>& rows, Metric metric, double threshold,

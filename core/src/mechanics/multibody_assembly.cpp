@@ -88,9 +88,9 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
     }
     if (const auto held = with(linkage.start_rates());
         !Linkage::is_rounding_of_rates(linkage.rate_residual(state, held))) {
-        auto left = linkage.assemble_velocities(state, held);
+        auto left = linkage.assemble_velocities(state, held, at_start);
         if (held.size() > rows.size() && !(left.share <= assembled_velocity)) {
-            left = linkage.assemble_velocities(state, rows);
+            left = linkage.assemble_velocities(state, rows, at_start);
             const auto missed = linkage.rate_residual(state, linkage.start_rates());
             if (left.share <= assembled_velocity && missed.share > most_drift)
                 throw InputError(fmt::format(
@@ -118,9 +118,8 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
     };
     const double fastest = std::max(size_of(before), size_of(after));
     if (!(fastest > 0.0)) return;
-    const double share = size_of(faster) / fastest;
-    done.velocity_share_of_all = std::max(done.velocity_share_of_all, share);
-    if (size_of(before) > 0.0) done.velocity_share = std::max(done.velocity_share, share);
+    done.velocity_share_of_all = std::max(done.velocity_share_of_all, size_of(faster) / fastest);
+    done.velocity_share = std::max(done.velocity_share, size_of(linkage.velocity_change(given, state, true)) / fastest);
 }
 
 // The angle of a joint is known modulo 2π, and its motor says which value it has.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The shapes of a multibody system as the collision detector sees them.
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "delassus/error.hpp"
@@ -30,6 +31,23 @@ double size_of(const Shape& shape) {
         }
         default:
             return shape.size[0];
+    }
+}
+
+double largest_extent(const Shape& shape) {
+    switch (shape.kind) {
+        case ShapeKind::Plane:
+        case ShapeKind::Terrain:
+        case ShapeKind::HeightField:
+            return HUGE_VAL;
+        case ShapeKind::Box:
+            return 2.0 * std::max({shape.size[0], shape.size[1], shape.size[2]});
+        case ShapeKind::Capsule:
+            return 2.0 * (shape.size[0] + shape.size[1]);
+        case ShapeKind::Cylinder:
+            return 2.0 * std::max(shape.size[0], shape.size[1]);
+        default:
+            return 2.0 * size_of(shape);
     }
 }
 
@@ -124,6 +142,11 @@ void MultibodySystem::Implementation::make_detector() {
     if (!bodies_touch) {
         if (!leaves_out) static_cast<void>(make_collision_detector({}));
         return;
+    }
+    extents.clear();
+    for (const auto& shape : shapes) {
+        const double half = size_of(shape);
+        extents.push_back({largest_extent(shape), half > 0.0 ? half : HUGE_VAL});
     }
     poses.resize(bodies.size() + nodes.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) poses[k] = bodies[k].parameters.pose;

@@ -76,6 +76,10 @@ struct MultibodySystem::Implementation {
     bool gyroscopic = false;            // a moving body whose moments differ
     double load_factor = 1.0;           // of weight and loads
     double size = 0.0;                  // the median of the shapes that collide
+    struct Extent {
+        double largest, half_smallest;  ///< m; infinite of planes and terrains
+    };
+    std::vector<Extent> extents;  // of shapes
     PartNumbers numbers;                // of a part of another system; empty otherwise
     std::optional<double> recovery;     // likewise, m/s
     bool unilateral_whole = false;      // likewise: the other system has contacts or stops
@@ -91,6 +95,12 @@ struct MultibodySystem::Implementation {
     mutable mechanics::RowMatrix hessian;
     std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
     std::vector<BodyDisplacement> displacements;  // of the same; fixed ones have none
+    /// What was detected last for collect_overlaps().
+    struct Detected {
+        std::vector<Pose> poses;
+        std::vector<BodyDisplacement> displacements;
+        std::vector<ContactPoint> contacts;
+    } detected;
 
     void must_be_finished() const;
     void must_not_be_finished() const;
@@ -259,6 +269,8 @@ struct MultibodySystem::Implementation {
     void place_shapes(const State& state);
     /// displacements ← of a step of length h (s).
     void predict_displacements(double h, const State& state);
+    /// Whether `detected` is of these poses and displacements.
+    [[nodiscard]] bool is_detected() const;
     [[nodiscard]] std::vector<std::int32_t> solids() const;
     void make_detector();
     void make_mesh_contacts();

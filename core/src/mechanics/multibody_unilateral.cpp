@@ -86,7 +86,11 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     if (self.detector) {
         self.place_shapes(state);
         self.predict_displacements(h, state);
-        self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
+        if (self.is_detected()) {
+            rows.contacts() = self.detected.contacts;
+        } else {
+            self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
+        }
         if (!self.prescribed.empty())
             std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
                 return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&

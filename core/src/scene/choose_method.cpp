@@ -23,8 +23,8 @@ namespace {
 
 /// h ω up to which explicit parts cost less than an implicit step (measured: docs/integrators.md).
 constexpr double most_explicit_rate = 50.0;
-/// With nodes: elements vibrate in as many ways as they have nodes, without damping, and a share of each tolerance
-/// feeds all of them where steps are near the stability limit.
+/// With elements: they vibrate in as many ways as they have nodes or bodies, without damping, and a share of each
+/// tolerance feeds all of them where steps are near the stability limit.
 constexpr double most_explicit_rate_of_elements = 1.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
@@ -150,6 +150,11 @@ bool always_acts(const SceneSystem& system) {
            std::ranges::any_of(system.actuators, limited, &ActuatorParameters::force_limit);
 }
 
+/// Whether it has nodes or beams.
+bool has_elements(const SceneSystem& system) {
+    return system.system->node_count() > 0 || !system.beams.empty();
+}
+
 /// Whether of the moving bodies that may touch more than half are held by no joint.
 bool mostly_without_joints(const SceneSystem& system) {
     std::vector<char> held(system.bodies.size(), 0), touches(system.bodies.size(), 0);
@@ -185,9 +190,8 @@ std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
 /// turning bodies for the price of the linearised Euler method, one problem a step, with errors smaller by orders. It
 /// damps nothing: what impacts excite in elements would rattle on.
 void choose_in_touch(SceneSystem& system, const std::string& reason) {
-    const std::string stiff = system.system->node_count() > 0
-                                  ? "elements vibrate"
-                                  : why_stiff(system, {most_rate_of_order_2, most_rate_of_order_2});
+    const std::string stiff =
+        has_elements(system) ? "elements vibrate" : why_stiff(system, {most_rate_of_order_2, most_rate_of_order_2});
     if (stiff.empty()) system.integrator = "linearly_implicit_trapezoidal";
     system.method_reason = reason + ", and " + (stiff.empty() ? "no force is stiff" : stiff);
 }
@@ -247,7 +251,7 @@ void choose_method(SceneSystem& system) {
         choose_with_unilateral(system, in_joints);
         return;
     }
-    const double most = system.system->node_count() > 0 ? most_explicit_rate_of_elements : most_explicit_rate;
+    const double most = has_elements(system) ? most_explicit_rate_of_elements : most_explicit_rate;
     const std::string stiff = why_stiff(system, {most, most});
     if (in_joints) system.coordinates = Coordinates::Joint;
     system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";

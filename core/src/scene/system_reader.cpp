@@ -22,6 +22,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"gravity", [this](const YAML::Node& n) { gravity_ = vector3(source_, n, "gravity"); }},
         {"step", [this](const YAML::Node& n) { read_step(n); }},
         {"tolerance", [this](const YAML::Node& n) { read_tolerance(n); }},
+        {"accuracy", [this](const YAML::Node& n) { result_.accuracy = positive_number(source_, n, "accuracy"); }},
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"sleeping", [this](const YAML::Node& n) { read_sleeping(n); }},
         {"start", [this](const YAML::Node& n) { read_start(n); }},

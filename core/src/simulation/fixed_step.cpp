@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "simulation/overlap_watch.hpp"
+
 namespace delassus {
 
 Parts step_within_error(AdaptiveStepping& control, State& state, double end, StepSolver& solver, StepReport& report) {
@@ -38,10 +40,11 @@ std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const
                 part.follow(report);
                 std::swap(report, part);
             }
+            return parts;
+        } catch (const StepTooDeep&) {
+            if (parts == most) throw;
         } catch (const StepTooLong&) {
-            continue;
         }
-        return parts;
     }
     throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
 }

@@ -16,6 +16,7 @@
 #include "simulation/energy_guard.hpp"
 #include "simulation/fixed_step.hpp"
 #include "simulation/look_ahead.hpp"
+#include "simulation/overlap_watch.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
@@ -159,6 +160,8 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (joint_) joint_->bodies_of(now_.state, bodies_);
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
+    if (!shared_ && !control_ && system.system->size_of_shapes() > 0.0)
+        overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy);
     measure(state(), now_.step);
     now_.totals.start_energy = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
@@ -269,6 +272,31 @@ bool Simulation::finished() const {
     return system_->control ? t >= system_->end : has_ended(t, system_->end, system_->step);
 }
 
+bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
+    State bodies;
+    if (overlaps_) overlaps_->begin(bodies_at(state, bodies), report.h);
+    const auto take = [&](State& moved, double h, StepReport& part) {
+        solver_->forget_misses();
+        take_step(moved, h, part);
+        solver_->require_usable();
+        if (overlaps_) overlaps_->require_within(bodies_at(moved, bodies), h);
+    };
+    record_.parts = 1;
+    try {
+        take(state, report.h, report.step);
+    } catch (const StepTooLong& failure) {
+        try {
+            record_.parts =
+                step_in_parts(*timestepper_, take, now_.state, memory, report.h, state, report.step, failure);
+        } catch (const StepTooDeep& deep) {
+            overlaps_->give_up(deep.bodies());
+            if (deep_.empty()) deep_ = deep.what();
+            return false;
+        }
+    }
+    return true;
+}
+
 void Simulation::advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
     if (system_->control) {
         report = control_->step(state, system_->end, *solver_);
@@ -283,17 +311,12 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     } else if (control_) {
         record_.parts = step_within_error(*control_, state, step.end, *solver_, report.step).taken;
     } else {
-        const auto take = [this](State& moved, double h, StepReport& part) {
-            solver_->forget_misses();
-            take_step(moved, h, part);
-            solver_->require_usable();
-        };
-        try {
-            take(state, report.h, report.step);
-        } catch (const StepTooLong& failure) {
-            record_.parts =
-                step_in_parts(*timestepper_, take, now_.state, memory, report.h, state, report.step, failure);
+        while (!advance_fixed(state, report, memory)) {
+            state = now_.state;
+            timestepper_->restart();
+            timestepper_->load(memory);
         }
+        if (overlaps_) overlaps_->end();
     }
     state.t = step.end;
     if (sleeping_) sleeping_->end_step(now_.state, state);
@@ -411,6 +434,7 @@ const StepRecord& Simulation::step() {
     }
     // Where the state is only read off, the method stays as it is.
     const bool only_shows = ahead_ && !advances;
+    deep_.clear();
     const std::vector<double> memory = only_shows ? std::vector<double>{} : timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
     const std::vector<double> control = control_ && !only_shows ? control_->save() : std::vector<double>{};
@@ -489,6 +513,10 @@ const StepRecord& Simulation::step() {
     totals.repeated_solves += effort.repeated;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
+    if (!deep_.empty()) {
+        ++totals.deep_steps;
+        if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
+    }
     if (!report.solved) {
         ++totals.unsolved_steps;
         if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
@@ -577,6 +605,12 @@ std::vector<std::string> Simulation::warnings() const {
                             system_->name, fall, 100.0 * share, system_->integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
     }
+    if (const auto& totals = now_.totals; totals.deep_steps > 0)
+        sentences.push_back(
+            fmt::format("{} of {} steps leave bodies in one another by more than \"accuracy\" allows, and shorter "
+                        "parts of them did "
+                        "not help; the first: {}",
+                        totals.deep_steps, now_.step, totals.first_deep));
     if (shared_ && !system_->method_reason.empty() && system_->method_reason.find("several processes") == 0)
         sentences.push_back(fmt::format("system \"{}\": {}; {} took its place, which is less exact", system_->name,
                                         system_->method_reason, system_->integrator));

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dynamics/bounce.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace delassus {
+
+// With the acceleration a, the gap g and the speed u at the beginning of the step, the contact meets at
+//
+//     g + u τ + ½ a τ² = 0,      closing with s = −(u + a τ) = √(u² − 2 a g)
+//
+// and leaves with w = e s. For a ≥ 0 that was all. Otherwise it meets again after the flight F = 2 w/|a|, with a speed
+// and hence a next flight of e times the last ones: k flights take F (1 − eᵏ)/(1 − e). What is left of the step after
+// the last whole flight is t, and then u⁺ = eᵏ w + a t and g⁺ = eᵏ w t + ½ a t². All flights together take F/(1 − e):
+// if that is over within the step, the contact is at rest, u⁺ = g⁺ = 0.
+//
+// One impulse with the same effect changes the speed by u⁺ − u − a h, and acts at the time that leads to the same g⁺:
+//
+//     g + u h + ½ a h² + (h − τ*) (u⁺ − u − a h) = g⁺
+//
+// (τ* = τ for a single bounce).
+std::optional<Bounce> bounce_within(double h, double gap, double speed, double acceleration, double restitution) {
+    const double square = speed * speed - 2.0 * acceleration * gap;
+    if (!(square > 0.0)) return std::nullopt;
+    Bounce bounce;
+    bounce.closing = std::sqrt(square);
+    if (speed < 0.0) {
+        bounce.meets = 2.0 * gap / (bounce.closing - speed);
+    } else if (acceleration < 0.0) {
+        bounce.meets = (speed + bounce.closing) / -acceleration;
+    } else {
+        return std::nullopt;
+    }
+    double left = h - bounce.meets;
+    if (!(left >= 0.0)) return std::nullopt;
+    double leaves = restitution * bounce.closing;
+    if (acceleration < 0.0) {
+        const double flight = 2.0 * leaves / -acceleration;
+        if (flight <= left * (1.0 - restitution)) {
+            leaves = left = 0.0;
+        } else if (flight < left) {
+            if (restitution < 1.0) {
+                const double flights =
+                    std::floor(std::log1p(-left * (1.0 - restitution) / flight) / std::log(restitution));
+                const double share = std::pow(restitution, flights);
+                left = std::max(left - flight * (1.0 - share) / (1.0 - restitution), 0.0);
+                leaves *= share;
+            } else {
+                left -= flight * std::floor(left / flight);
+            }
+        }
+    }
+    bounce.end_speed = leaves + acceleration * left;
+    const double end_gap = (leaves + 0.5 * acceleration * left) * left;
+    bounce.change = bounce.end_speed - speed - acceleration * h;
+    const double alone = gap + (speed + 0.5 * acceleration * h) * h;
+    bounce.acts = bounce.change > 0.0 ? h - (end_gap - alone) / bounce.change : bounce.meets;
+    return bounce;
+}
+
+}  // namespace delassus

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "simulation/overlap_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <tuple>
+
+namespace delassus {
+
+namespace {
+
+std::string quoted_name(const MultibodySystem& system, BodyIndex body) {
+    return body == world_body ? "of the world" : fmt::format("\"{}\"", system.body(body).name);
+}
+
+}  // namespace
+
+double OverlapWatch::depth_before(const BodyOverlap& pair) const {
+    const auto found =
+        std::lower_bound(before_.begin(), before_.end(), pair, [](const BodyOverlap& one, const BodyOverlap& other) {
+            return std::tie(one.a, one.b) < std::tie(other.a, other.b);
+        });
+    return found != before_.end() && found->a == pair.a && found->b == pair.b ? found->depth : 0.0;
+}
+
+void OverlapWatch::require_within(const State& state, double h) {
+    constexpr double share_of_thickness = 0.1;
+    system_.collect_overlaps(state, h, now_);
+    const BodyOverlap* worst = nullptr;
+    double beyond = 1.0, grown = 0.0;
+    for (const BodyOverlap& pair : now_) {
+        const double more = pair.depth - depth_before(pair);
+        const double allowed = std::min(accuracy_ * pair.extent, share_of_thickness * pair.thickness);
+        if (more <= beyond * allowed || given_up_.contains({pair.a, pair.b})) continue;
+        worst = &pair;
+        beyond = more / allowed;
+        grown = more;
+    }
+    if (!worst) return;
+    throw StepTooDeep(
+        fmt::format("bodies {} and {} come to overlap by {:.2g} m in the step until t = {:.9g} s, {:.2g} "
+                    "times what its accuracy allows",
+                    quoted_name(system_, worst->a), quoted_name(system_, worst->b), grown, state.t, beyond),
+        worst->a, worst->b);
+}
+
+void OverlapWatch::end() {
+    std::erase_if(given_up_, [&](const std::pair<BodyIndex, BodyIndex>& bodies) {
+        return std::none_of(now_.begin(), now_.end(),
+                            [&](const BodyOverlap& pair) { return std::pair(pair.a, pair.b) == bodies; });
+    });
+}
+
+}  // namespace delassus

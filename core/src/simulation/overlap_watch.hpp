@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Steps that leave bodies in one another (internal).
+#pragma once
+
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/multibody.hpp"
+#include "delassus/timestepper.hpp"
+
+namespace delassus {
+
+/// A step that leaves bodies deeper in one another than they were, by more than its accuracy allows.
+class DELASSUS_API StepTooDeep : public StepTooLong {
+public:
+    StepTooDeep(const std::string& sentence, BodyIndex a, BodyIndex b) : StepTooLong(sentence), bodies_(a, b) {}
+    [[nodiscard]] std::pair<BodyIndex, BodyIndex> bodies() const { return bodies_; }
+
+private:
+    std::pair<BodyIndex, BodyIndex> bodies_;
+};
+
+/// A step has rows for the contacts that it knows. What bodies meet otherwise, as where they turn or land within it,
+/// shows at its end: they overlap more than they did. A step counts as too long then where the overlap has grown by
+/// more than the accuracy allows, a share of the extent of the smaller one of both; or than a tenth of half the
+/// thickness of the thinner one, beyond which it is soon pushed out on the other side.
+class DELASSUS_API OverlapWatch {
+public:
+    /// system: finished, outlives it. accuracy: a share, > 0.
+    OverlapWatch(MultibodySystem& system, double accuracy) : system_(system), accuracy_(accuracy) {}
+
+    /// Notes the overlaps at the beginning of a step of size h, of the bodies.
+    void begin(const State& state, double h) { system_.collect_overlaps(state, h, before_); }
+    /// Throws StepTooDeep if they have grown too much at the end of it. h: of the next step.
+    void require_within(const State& state, double h);
+    /// They come to overlap however short the steps: they are not watched until they have come apart.
+    void give_up(std::pair<BodyIndex, BodyIndex> bodies) { given_up_.insert(bodies); }
+    /// After a step that was within.
+    void end();
+
+private:
+    [[nodiscard]] double depth_before(const BodyOverlap& pair) const;
+
+    MultibodySystem& system_;
+    double accuracy_;
+    std::vector<BodyOverlap> before_, now_;
+    std::set<std::pair<BodyIndex, BodyIndex>> given_up_;
+};
+
+}  // namespace delassus
