@@ -137,6 +137,28 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     if (late.empty()) require_nearer(begin, end, h, method);
 }
 
+void PositionProjection::project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report) {
+    problem_.name = "velocity";
+    problem_.law = Law::Associated;
+    problem_.H = H;
+    problem_.E = {};
+    D_.begin(m_, n_);
+    system_.add_constraint_jacobian(end, 0, D_);
+    D_.finish_into(problem_.D);
+    system_.constraint_rate(end, constraint_.data());
+    problem_.b.assign(constraint_.begin(), constraint_.end());
+    for (std::int32_t row = 0; row < m_; ++row)
+        problem_.b[static_cast<std::size_t>(row)] += problem_.D.row_times(row, end.v.data());
+    problem_.cones.clear();
+    for (const std::int32_t rows : blocks_) problem_.cones.push_back(Cone::free(rows));
+    problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.lambda.assign(problem_.b.size(), 0.0);
+    report.take(solver.solve(problem_, solution_, {.warm_start = true}));
+    ++report.newton_iterations;
+    for (std::size_t i = 0; i < end.v.size(); ++i) end.v[i] += solution_.x[i];
+}
+
 // A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below 10⁻⁶, or
 // 10⁴ times the resolution, may be the tolerance of the solver.
 void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {

@@ -26,6 +26,8 @@ public:
     /// constraints nearer to 0.
     void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
                  StepSolver& solver, StepReport& report, std::string_view method, std::span<const double> late = {});
+    /// Changes end.v by the least, in the norm of H, to where the constraints stay: C_q v + C_t = 0.
+    void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 
 private:
     [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts, bool late);

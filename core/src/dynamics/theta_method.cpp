@@ -109,8 +109,10 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     }
     if (!settings_.linearly_implicit || !late_.empty() || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name, late_);
-    if (!late_.empty() && m_ > 0)  // the motion that was lacking is no small one
+    if (!late_.empty() && m_ > 0) {  // the motion that was lacking is no small one
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
+        projection_.project_velocities(end_, problem_.H, solver, report);
+    }
     if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
     if (settings_.linearly_implicit) remember_change(result_, h);
     last_h_ = h;
