@@ -407,6 +407,21 @@ TEST(Overconstrained, AFlatParallelogramLosesNoRowThatItNeeds) {
     EXPECT_EQ(left_out(run), 3);
 }
 
+TEST(Overconstrained, WhatIsLockedStandsWhateverItsVelocity) {
+    Running run(
+        parse_scene("step: 0.005\nend: 0.05\nbodies:\n"
+                    "- {name: b, mass: 1, inertia: {xx: 0.1, yy: 0.2, zz: 0.15}, position: [0.3, 0.1, 0.7], "
+                    "orientation: {axis: [1, 2, "
+                    "3], angle: 33}, velocity: [1.3, 0.7, 0.2], angular_velocity: [0.3, 1.7, -0.9]}\n"
+                    "joints:\n"
+                    "- {name: j0, kind: revolute, second: b, point: [0.1, 0.23, 0.31], axis: [0, 1, 0]}\n"
+                    "- {name: j1, kind: revolute, second: b, point: [0.4, 0.11, 0.37], axis: [1, 0.3, 0]}\n",
+                    "s"));
+    EXPECT_FALSE(run.simulation.warnings().empty()) << "its velocity is lost";
+    run.finish();
+    EXPECT_NEAR(run.pose("b").position[0], 0.3, 1e-9);
+}
+
 // Velocities that are not given follow those that are.
 TEST(Overconstrained, ADoorTurnsAsFastAsItsAngularVelocitySays) {
     Running run(parse_scene(

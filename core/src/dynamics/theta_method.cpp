@@ -344,6 +344,25 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     }
 }
 
+/// The velocities at the end of the step about the guess if nothing touched: for the first step, where no history tells
+/// them.
+Vector ThetaMethod::without_contacts(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    linearize(begin, h);
+    Problem problem = problem_;
+    const auto rows = static_cast<std::size_t>(m_);
+    problem.cones.resize(cones_.size());
+    problem.b.resize(rows);
+    problem.E = {};
+    problem.D.rows = m_;
+    problem.D.row_start.resize(rows + 1);
+    problem.D.column.resize(static_cast<std::size_t>(problem.D.row_start.back()));
+    problem.D.value.resize(problem.D.column.size());
+    Solution solution{.x = {guess_.begin(), guess_.end()}, .lambda = std::vector<double>(rows, 0.0)};
+    ++report.newton_iterations;
+    report.take(solver.solve(std::move(problem), solution, {}));
+    return Eigen::Map<const Vector>(solution.x.data(), n_);
+}
+
 // One problem. Two in the first step, which has no history to extrapolate from; a few where a contact bounces with
 // friction and the solver does not know Coulomb's law.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
@@ -358,6 +377,10 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
         return guess_.allFinite();
     };
+    if (contacts_.may_bounce()) {
+        const Vector smooth = changes_[0].empty() ? without_contacts(begin, h, solver, report) : guess_;
+        contacts_.time_bounces(problem_, {smooth.data(), static_cast<std::size_t>(n_)});
+    }
     linearize_at_guess();
     if (!found()) return;
     if (changes_[0].empty()) {

@@ -60,6 +60,7 @@ private:
     void scale();
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
+    [[nodiscard]] Vector without_contacts(const State& begin, double h, StepSolver& solver, StepReport& report);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);

@@ -286,18 +286,22 @@ void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& c
     }
 }
 
-/// `once`: bounces at their times, with the accelerations of the guess.
-void VelocityContacts::time_bounces(const Problem& problem, std::span<const double> guess) {
+bool VelocityContacts::may_bounce() const {
+    return std::any_of(rows_.blocks().begin(), rows_.blocks().end(),
+                       [](const UnilateralRows::Block& block) { return block.restitution > 0.0; });
+}
+
+void VelocityContacts::time_bounces(const Problem& problem, std::span<const double> smooth) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
         if (!contact.along_normal || block.restitution == 0.0) continue;
         const double gap = contact.resolved_gap(), speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
         if (contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap)) continue;  // it corrects
-        double end = problem.D.row_times(static_cast<std::int32_t>(first_row_ + contact.row), guess.data()) +
-                     rows_.rows()[contact.row].rate;
-        if (contact.smooth) end += (1.0 - theta_) / theta_ * (end - before_.speed(contact.before, guess.data()));
-        const auto bounce = bounce_within(h_, std::max(contact.gap, 0.0), speed, (end - speed) / h_, block.restitution);
+        const double end = problem.D.row_times(static_cast<std::int32_t>(first_row_ + contact.row), smooth.data()) +
+                           rows_.rows()[contact.row].rate;
+        const auto bounce =
+            bounce_within(h_, std::max(contact.gap, 0.0), block.speed, (end - block.speed) / h_, block.restitution);
         if (bounce && bounce->closing > settings_.restitution_speed) {
             contact.bounce = bounce;
             contact.bounces = !contact.pushed || gap > 0.0;
@@ -315,7 +319,6 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
-    timed_ = false;
     contacts_.clear();
     compliances_.clear();
     kept_.begin_walk();
@@ -344,7 +347,6 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.known = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
-            contact.smooth = block.restitution > 0.0 && nearly_equal(row, before->row, 1);
             contact.turns =
                 (contact.pushed || !contact.along_normal) && nearly_equal(row, before->row, block.cone.rows);
         } else {
@@ -369,8 +371,6 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                              double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
-    if (settings_.once && !timed_) time_bounces(problem, guess);
-    timed_ = true;
     const double share = std::max(settings_.once ? settled_share_once : settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));

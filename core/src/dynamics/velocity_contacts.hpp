@@ -56,6 +56,11 @@ public:
     /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
     /// law, else De Saxcé's term stands in b. The rows of problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
+    /// Whether a contact has restitution.
+    [[nodiscard]] bool may_bounce() const;
+    /// `once`, before set_b(): the bounces of the step at their times. smooth: the velocities at its end without
+    /// impacts, n.
+    void time_bounces(const Problem& problem, std::span<const double> smooth);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// solution: of the last iteration; natural_error: of the solves so far.
     void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
@@ -115,7 +120,6 @@ private:
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
         bool known = false;       ///< it is in before_
-        bool smooth = false;      ///< its normal row, which may bounce, only turns
         bool turns = false;       ///< b has what its rows turn until the end of the step
         double gap = 0.0;         ///< at the beginning
         double resolution = 0.0;  ///< of it
@@ -145,8 +149,6 @@ private:
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
-    [[nodiscard]] bool set_bounce(const UnilateralRows::Block& block, Contact& contact, double acceleration) const;
-    void time_bounces(const Problem& problem, std::span<const double> guess);
     template <class Visit>
     void for_each_bounced(const Solution& solution, const Visit& visit) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
@@ -167,7 +169,7 @@ private:
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     std::size_t first_row_ = 0;             // in the problem
-    bool coulomb_ = false, settled_ = true, timed_ = false;
+    bool coulomb_ = false, settled_ = true;
 };
 
 /// The options of timesteppers that take contacts, and what their values say.

@@ -478,8 +478,11 @@ Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<s
             follows.segment<3>(i).setConstant(v.segment<3>(i).isZero(0.0) ? 1.0 : 0.0);
         if (follows.minCoeff() < 1.0) v += nearest(values, values.J * v + values.rate, follows);
     }
+    const Eigen::VectorXd given = v;
     for (int pass = 0; pass < 3; ++pass)  // the later ones remove what rounding left
         v += shortest(values, values.J * v + values.rate, Metric::Mass, singular);
+    // Nothing can move: what is left of the velocities given is rounding, which would miss by all that adds up in it.
+    if (v.norm() <= rounding * given.norm()) v.setZero();
     for (std::size_t k = 0; k < members_.size(); ++k)
         Eigen::Map<Eigen::Matrix<double, 6, 1>>(state.v.data() +
                                                 (*bodies_)[static_cast<std::size_t>(members_[k])].column) =
