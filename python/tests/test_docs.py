@@ -49,6 +49,15 @@ class Documents(unittest.TestCase):
                     self.assertTrue(result.solved, (a, mu, law, result))
                     np.testing.assert_allclose(result.lam, solution, atol=1e-8)
 
+    def test_matrices_of_engines(self):
+        self.assertIn(": solved", self.run_blocks("docs/matrices-of-engines.md", 2))
+        result, J, M, h, force = (self.names[name] for name in ("result", "J", "M", "h", "force"))
+        self.assertLess(abs(result.lam[1]), 0.79 * result.lam[0])  # the foot holds: its two rows are equations
+        rows = J[:2]
+        expected = -np.linalg.solve(rows @ np.linalg.solve(M, rows.T), rows @ np.linalg.solve(M, force))
+        np.testing.assert_allclose(result.lam[:2] / h, expected, rtol=1e-8)
+        np.testing.assert_allclose(J @ result.x, 0, atol=1e-10)
+
     def test_readme(self):
         self.assertTrue(self.run_blocks("README.md", 1).startswith("solved"))
 

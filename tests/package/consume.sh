@@ -84,6 +84,20 @@ for engine in dart:dart:libdart-dev bullet:bullet-float64:libbullet-dev; do
     for solver in auto ssn; do "$scratch/engines/$folder/build/scenes" "$solver"; done
 done
 
+if pkg-config --exists mujoco || [ -e /usr/include/mujoco/mujoco.h ]; then
+    adapter=$scratch/engines/mujoco
+    cmake -S "$adapter" -B "$adapter/build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release >/dev/null
+    cmake --build "$adapter/build"
+    "$adapter/build/run" "$adapter/models/hand.xml" 0.2
+    # Times are for a quiet machine; creep is not.
+    "$adapter/build/grip" "$adapter/models/grip.xml" 1000 >"$scratch/grip" || true
+    awk '/Delassus.*hard/ { held++; if ($(NF-1) ^ 2 > 1e-18) exit 1 } END { exit held < 6 }' "$scratch/grip" ||
+        { cat "$scratch/grip"; echo "the grip creeps" >&2; exit 1; }
+    if [ -z "$flags" ]; then python3 "$adapter/grip.py"; fi
+else
+    echo "skipped: mujoco was not found (libmujoco-dev)"
+fi
+
 if ! command -v pkg-config >/dev/null; then
     echo "$prefix: used as strangers would, but for pkg-config, which was not found"
     exit 0
