@@ -5,7 +5,7 @@
 #   processes  starts processes of its own
 #   mpi        loads PETSc, MUMPS or MPI into the test's own process, or starts it under mpirun
 #   browser    draws a page in Chromium
-set(processes_tests "^(bench|check|command|faults|import)[.]")
+set(processes_tests "^(bench|check|command|faults|import|relations)[.]")
 set(mpi_tests "^(allocation|partitioned)[.]|Petsc|Mumps|ExampleScene|MeshFile|TrapezoidalRuleWithAJoint|Equilibrium")
 set(browser_tests "^bench[.](ReportTest|BenchReport)[.]|^command[.]View(Played|Browsed)[.]")
 

@@ -5,6 +5,7 @@
 
 #include <string_view>
 
+#include "bench/event_lines.hpp"
 #include "delassus/error.hpp"
 
 namespace delassus::bench {
@@ -20,33 +21,12 @@ bool had_no_memory(std::string_view line) {
            (line.starts_with(own_words) && line.ends_with("out of memory"));
 }
 
-/// Cuts the output into lines of JSON.
-class Lines {
-public:
-    explicit Lines(std::function<void(const Json&)> on_line) : on_line_(std::move(on_line)) {}
-
-    void add(std::string_view piece) {
-        rest_ += piece;
-        std::size_t begin = 0;
-        for (std::size_t end; (end = rest_.find('\n', begin)) != std::string::npos; begin = end + 1) {
-            const Json line = try_parse_ordered_json(std::string_view(rest_).substr(begin, end - begin));
-            // Anything else comes from a plugin that found our channel: the row must not depend on it.
-            if (line.is_object() && line.contains("event")) on_line_(line);
-        }
-        rest_.erase(0, begin);
-    }
-
-private:
-    std::function<void(const Json&)> on_line_;
-    std::string rest_;
-};
-
 }  // namespace
 
 ChildResult ask(const WorkerSettings& worker, const Json& request, const std::function<double(const Json&)>& hear,
                 int processes) {
     double allowed = loading_limit;
-    Lines lines([&](const Json& line) { allowed = hear(line); });
+    EventLines lines([&](const Json& line) { allowed = hear(line); });
     ChildSettings child;
     child.program = worker.command;
     child.arguments = {"worker"};

@@ -8,6 +8,7 @@
 #include "bench/compare_sets.hpp"
 #include "bench/reference.hpp"
 #include "bench/run_suite.hpp"
+#include "bench_relations.hpp"
 #include "command.hpp"
 #include "delassus/error.hpp"
 #include "measuring.hpp"
@@ -27,6 +28,7 @@ struct BenchArguments {
     std::vector<fs::path> plugin_path;
     std::vector<std::string> only;
     bool any_machine = false, json = false;
+    RelationsArguments relations;
 };
 
 /// Writes all that is made of results.jsonl, prints the summary and the path of the page.
@@ -46,8 +48,16 @@ void report(OutputFolder& output) {
     if (!no_page.empty()) fmt::print(stderr, "delassus: {}\n", no_page);
 }
 
-int run_bench(const BenchArguments& arguments) {
+int run_bench(BenchArguments& arguments) {
     const auto folders = absolute(arguments.plugin_path);
+    if (is_relations(arguments.suite)) {
+        arguments.relations.output = arguments.output;
+        arguments.relations.only = arguments.only;
+        arguments.relations.plugin_path = folders;
+        return run_relations(arguments.relations);
+    }
+    if (const auto* option = arguments.relations.given())
+        throw InputError(fmt::format("{} is for `delassus bench run relations`", option->get_name()));
     const Registry registry(folders);
     bench::RunPlan plan;
     plan.suite = bench::read_suite(bench::find_suite(arguments.suite), registry);
@@ -103,6 +113,7 @@ int list_suites(const BenchArguments& arguments) {
     const Registry registry(absolute(arguments.plugin_path));
     for (const auto& suite : bench::shipped_suites(registry))
         fmt::print("{}: {}\n    {}\n    {}\n", suite.name, suite.title, suite.description, suite.file.string());
+    fmt::print("{}\n", about_relations());
     return exit_solved;
 }
 
@@ -115,18 +126,21 @@ void add_bench(CLI::App& program, Action& action) {
     bench->require_subcommand(1);
 
     auto* run = bench->add_subcommand(
-        "run", "Run a suite, or what is left of it, and write the report. Exit code 0 if all of it was run, else 3");
+        "run",
+        "Run a suite, or what is left of it, and write the report. Exit code 0 if all of it was run (and, of "
+        "`relations`, nothing was violated), else 3");
     run->add_option("suite", arguments->suite, "Suite file (YAML), or the name of one of `delassus bench list`")
         ->required()
         ->type_name("SUITE");
     run->add_option("-o,--output", arguments->output,
                     "Folder for results.jsonl, report.html, summary.md and CSV files [delassus-bench-SUITE]")
         ->type_name("DIR");
-    run->add_option("--only", arguments->only, "Run only the axis of this name; may be given again")
+    run->add_option("--only", arguments->only, "Run only the axis, or the relation, of this name; may be given again")
         ->type_name("AXIS")
         ->allow_extra_args(false);
     run->add_option("--cache", arguments->cache, "Folder of reference solutions [~/.cache/delassus/references]")
         ->type_name("DIR");
+    add_relations_options(*run, arguments->relations);
     add_plugin_path(*run, arguments->plugin_path);
     run->callback([arguments, &action] { action.run = [arguments] { return run_bench(*arguments); }; });
 

@@ -32,6 +32,7 @@ void print_kinds() {
 
 void print_suites() {
     for (const auto& suite : bench::shipped_suites(Registry())) fmt::print("{}\n", suite.name);
+    fmt::print("relations\n");
 }
 
 constexpr const char* document_kinds = "man|bash|zsh|fish|solvers|integrators|kinds|suites";

@@ -30,7 +30,7 @@ int on_all_processes(const std::function<int(const std::shared_ptr<const Communi
     } catch (const std::bad_alloc&) {
         return end("out of memory while solving", exit_bad_input);
     } catch (const std::exception& error) {
-        return end(sentence_of(error).c_str(), exit_bad_input);
+        return end(delassus::sentence_of(error).c_str(), exit_bad_input);
     }
 }
 
