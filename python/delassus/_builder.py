@@ -119,7 +119,7 @@ class SceneBuilder(Mapping):
 
     def add_material_pair(self, first: str, second: str, friction: Optional[float] = None,
                           restitution: Optional[float] = None, **keys: Any) -> None:
-        """Values of their own for contacts of two materials."""
+        """Values of their own for contacts of two materials; touch=False: their shapes pass through each other."""
         self._add("material_pairs", first=first, second=second, friction=friction, restitution=restitution, **keys)
 
     def add_body(self, name: Optional[str] = None, *, mass: Optional[float] = None, density: Optional[float] = None,

@@ -2,8 +2,11 @@
 // delassus import: a model of another program as a scene.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "command.hpp"
 #include "delassus/error.hpp"
@@ -20,13 +23,14 @@ namespace {
 struct ImportArguments {
     std::filesystem::path model, output;
     ImportSettings settings;
-    bool strict = false;
+    bool strict = false, part_overlaps = false;
+    std::optional<double> height;
 };
 
 void print_items(const char* title, const std::vector<NotCarriedOver>& items) {
     if (items.empty()) return;
     fmt::print("{}:\n", title);
-    for (const auto& item : items) fmt::print("  {}: {}\n", item.what, item.why);
+    for (const auto& item : grouped(items)) fmt::print("  {}: {}\n", item.what, item.why);
 }
 
 /// Files that are there while the scene is looked at, and go unless it is kept.
@@ -49,13 +53,56 @@ private:
     std::map<std::filesystem::path, std::unique_ptr<OutputFolder>> folders_;
 };
 
-int import_scene(const ImportArguments& arguments) {
+/// Two bodies that overlap where the scene starts, by more than the contact envelope: steps do not take such an overlap
+/// for one that rounding or a step left, and push it out.
+struct Overlap {
+    std::array<std::string, 2> bodies;
+    double depth = 0.0;
+};
+
+std::vector<Overlap> overlaps_of(Scene& scene) {
+    std::vector<Overlap> all;
+    for (auto& one : scene.systems) {
+        MultibodySystem& system = *one.system;
+        if (!system.detects_contacts()) continue;
+        UnilateralRows rows;
+        system.collect_unilateral(system.initial_state(), one.step, rows);
+        for (const ContactPoint& contact : rows.contacts()) {
+            if (!(contact.gap < -system.envelope())) continue;
+            const auto [a, b] = system.contact_bodies(contact);
+            if (a < 0 || b < 0 || std::max(a, b) >= system.body_count()) continue;
+            const std::array<std::string, 2> bodies = {system.body(a).name, system.body(b).name};
+            auto found =
+                std::find_if(all.begin(), all.end(), [&](const Overlap& known) { return known.bodies == bodies; });
+            if (found == all.end()) found = all.insert(all.end(), Overlap{bodies, 0.0});
+            found->depth = std::max(found->depth, -contact.gap);
+        }
+    }
+    std::stable_sort(all.begin(), all.end(), [](const Overlap& a, const Overlap& b) { return a.depth > b.depth; });
+    return all;
+}
+
+void print_overlaps(const std::vector<Overlap>& overlaps, bool parted) {
+    if (overlaps.empty()) return;
+    constexpr std::size_t most_named = 10;
+    fmt::print("{}:\n", parted ? "Overlap at the start, and are kept apart"
+                               : "Overlap at the start (--part-overlaps keeps these apart)");
+    for (std::size_t k = 0; k < std::min(overlaps.size(), most_named); ++k)
+        fmt::print("  \"{}\" and \"{}\": {:.3g} m\n", overlaps[k].bodies[0], overlaps[k].bodies[1], overlaps[k].depth);
+    if (overlaps.size() > most_named) fmt::print("  and {} pairs more\n", overlaps.size() - most_named);
+}
+
+int import_scene(ImportArguments arguments) {
+    if (arguments.height) {
+        arguments.settings.ground = true;
+        arguments.settings.height = *arguments.height;
+    }
     std::error_code ignored;
     if (std::filesystem::equivalent(arguments.model, arguments.output, ignored))
         throw InputError(
             fmt::format("{}: the scene would replace the model; give another file to -o", arguments.output.string()));
     require_replaceable(arguments.output, "scene");
-    const ImportedScene imported = import_model(arguments.model, arguments.output, arguments.settings);
+    ImportedScene imported = import_model(arguments.model, arguments.output, arguments.settings);
     const auto report = [&] {
         print_items("Not carried over", imported.lost);
         print_items("Left out, without effect on the motion", imported.without_effect);
@@ -68,11 +115,17 @@ int import_scene(const ImportArguments& arguments) {
             imported.lost.size() == 1 ? "has" : "have"));
     }
     FilesBeside files(arguments, imported);
+    std::vector<Overlap> overlaps;
     try {
         // What `delassus run` does before its first step.
         Scene scene = parse_scene(imported.yaml, arguments.output.string());
         const Registry registry(std::vector<std::filesystem::path>{});
         for (auto& system : scene.systems) const Simulation simulation(system, registry);
+        overlaps = overlaps_of(scene);
+        if (arguments.part_overlaps && !overlaps.empty()) {
+            for (const Overlap& one : overlaps) arguments.settings.apart.push_back(one.bodies);
+            imported = import_model(arguments.model, arguments.output, arguments.settings);
+        }
     } catch (const Error& error) {
         throw InputError(fmt::format("{}: the scene that this model makes would be refused: {}",
                                      arguments.model.string(), error.what()));
@@ -82,6 +135,7 @@ int import_scene(const ImportArguments& arguments) {
     fmt::print("{}: from {} ({}): {} bodies, {} joints, {} shapes\n", arguments.output.string(),
                arguments.model.filename().string(), imported.format, imported.bodies, imported.joints, imported.shapes);
     report();
+    print_overlaps(overlaps, arguments.part_overlaps);
     return exit_solved;
 }
 
@@ -109,6 +163,18 @@ void add_import(CLI::App& program, Action& action) {
         ->type_name("NAME");
     command->add_flag("--floating", arguments->settings.floating,
                       "The root link of a URDF model moves freely; without it the world holds it");
+    command->add_flag("--fixed-base", arguments->settings.fixed_base,
+                      "The world holds the first body of each mechanism that floats");
+    command->add_flag("--ground", arguments->settings.ground,
+                      "Add a plane against gravity; the model's lowest point touches it at the start");
+    command->add_option("--height", arguments->height, "With such a ground: how high over it the lowest point is, m")
+        ->type_name("METRES");
+    command
+        ->add_option("--package-path", arguments->settings.package_paths,
+                     "Folder in which package:// and model:// addresses are looked for; may be given again")
+        ->type_name("FOLDER");
+    command->add_flag("--part-overlaps", arguments->part_overlaps,
+                      "Keep bodies apart that overlap at the start by more than the contact envelope");
     command->callback([arguments, &action] { action.run = [arguments] { return import_scene(*arguments); }; });
 }
 

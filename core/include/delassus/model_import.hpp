@@ -3,6 +3,7 @@
 // what is carried over.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -21,7 +22,18 @@ struct ImportSettings {
     double end = 10.0;      ///< of the scene, s, > 0
     std::string keyframe;   ///< of an MJCF model, where the scene starts; empty: the model's own start
     bool floating = false;  ///< the root link of a URDF model moves freely; else the world holds it
+    /// The world holds the first body of each mechanism that floats. Refused where none does.
+    bool fixed_base = false;
+    /// A plane is added, against gravity through the origin, and the model is moved so that its lowest point at the
+    /// start is `height` (m) above it. Contacts with it have the friction of the other surface.
+    bool ground = false;
+    double height = 0.0;
+    std::vector<std::filesystem::path> package_paths;  ///< folders in which package:// and model:// are looked for
+    std::vector<std::array<std::string, 2>> apart;     ///< names of bodies that never touch, besides the model's
 };
+
+/// One item for each kind, with a count and the first names: for people.
+[[nodiscard]] DELASSUS_API std::vector<NotCarriedOver> grouped(const std::vector<NotCarriedOver>& all);
 
 /// A scene as text, and the files that it names.
 struct ImportedScene {

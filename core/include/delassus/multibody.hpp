@@ -360,6 +360,7 @@ struct ElasticBeamParameters {
 struct ContactMaterial {
     double friction = 0.0;     ///< μ ≥ 0
     double restitution = 0.0;  ///< in [0, 1]
+    bool touch = true;         ///< of a pair: whether shapes of these materials touch at all
 };
 
 /// Two bodies whose shapes overlap.
@@ -446,7 +447,8 @@ public:
     /// share nodes are one mesh, and a mesh does not touch itself. Nodes touch no nodes.
     void add_node_contact(std::int32_t node, double radius, std::int32_t material);
     std::int32_t add_material(const ContactMaterial& material);
-    /// Contacts of these two materials. Unless set: the geometric mean of μ, the larger restitution.
+    /// Contacts of these two materials, or none. Unless set: the geometric mean of μ, the larger restitution. Nodes
+    /// have their contacts in any case.
     void set_material_pair(std::int32_t first, std::int32_t second, const ContactMaterial& material);
     /// m; how near shapes must be for a contact to be made. Unless set: a twentieth of the median shape's size.
     void set_envelope(double envelope);

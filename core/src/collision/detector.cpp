@@ -32,6 +32,7 @@ Detector::Detector(CollisionSetup setup)
         if (first > second) std::swap(first, second);
     }
     std::sort(setup_.apart.begin(), setup_.apart.end());
+    std::sort(setup_.passing.begin(), setup_.passing.end());
     const auto count = static_cast<std::int32_t>(setup_.shapes.size());
     solids_.reserve(setup_.shapes.size());
     placed_.resize(setup_.shapes.size());
@@ -72,6 +73,12 @@ bool Detector::may_touch(std::int32_t shape_a, std::int32_t shape_b) const {
     if (a == b || (is_fixed(a) && is_fixed(b))) return false;
     if (!setup_.group.empty() && a >= 0 && b >= 0 && setup_.group[a] >= 0 && setup_.group[a] == setup_.group[b])
         return false;
+    if (!setup_.passing.empty()) {
+        const std::int32_t first = setup_.material[shape_a], second = setup_.material[shape_b];
+        if (std::binary_search(setup_.passing.begin(), setup_.passing.end(),
+                               std::pair(std::min(first, second), std::max(first, second))))
+            return false;
+    }
     return !std::binary_search(setup_.apart.begin(), setup_.apart.end(), std::pair(std::min(a, b), std::max(a, b)));
 }
 

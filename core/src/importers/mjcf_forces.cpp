@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "delassus/error.hpp"
 #include "importers/mjcf_reader.hpp"
 
 namespace delassus::importers {
 
+using mjcf::EqualityType;
+using mjcf::Transmission;
 using std::abs;
 
 namespace {
@@ -18,83 +19,123 @@ namespace {
 /// m, rad: what a loop may be open by where the scene places the bodies.
 constexpr double most_gap = 1e-9;
 
+template <class Item>
+const Item* named(const std::vector<const Item*>& all, const std::string& name) {
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Item* one) { return one->name == name; });
+    return found == all.end() ? nullptr : *found;
+}
+
 }  // namespace
 
 void MjcfReader::read_equalities() {
-    const mjData& d = *data_;
-    if (disabled(mjDSBL_EQUALITY) || disabled(mjDSBL_CONSTRAINT)) {
-        if (m_.neq > 0) model_.without_effect.push_back({"equality constraints", "a flag disables them"});
+    if (!spec_.option.equality || !spec_.option.constraint) {
+        if (!spec_.equalities.empty())
+            model_.without_effect.push_back({"equality constraints", "a flag disables them"});
         return;
     }
-    for (int e = 0; e < m_.neq; ++e) {
-        const int type = m_.eq_type[e], first = m_.eq_obj1id[e], second = m_.eq_obj2id[e];
-        const std::string what = item("equality", mjOBJ_EQUALITY, e);
-        if (m_.eq_active[e] == 0) {
+    for (const mjcf::Equality& equality : spec_.equalities) {
+        const std::string what = fmt::format("equality \"{}\"", equality.name);
+        if (!equality.active) {
             model_.without_effect.push_back({what, "it is not active"});
             continue;
         }
-        if (type == mjEQ_TENDON || type == mjEQ_DISTANCE) {
-            model_.lose(what, type == mjEQ_TENDON ? "tendons" : "a distance of geoms");
+        if (equality.type == EqualityType::Other) {
+            model_.lose(what, equality.kind == "tendon" ? "tendons"
+                              : equality.kind == "distance"
+                                  ? "a distance of geoms"
+                                  : fmt::format("a constraint of the kind <{}>", equality.kind));
             continue;
         }
-        if (!std::equal(usual_solref.begin(), usual_solref.end(), m_.eq_solref + mjNREF * e) ||
-            !std::equal(usual_solimp.begin(), usual_solimp.end(), m_.eq_solimp + mjNIMP * e))
-            model_.lose(what, "solref and solimp: joints are rigid");
-        const std::string name = joint_names_.take(name_of(mjOBJ_EQUALITY, e), "loop");
-        if (type == mjEQ_JOINT) {
-            read_joint_equality(e, name);
-            continue;
-        }
-        if (!moves(first) && !moves(second)) continue;
-        double gap = 0.0;
-        for (int row = 0; row < d.nefc; ++row)
-            if (d.efc_type[row] == mjCNSTR_EQUALITY && d.efc_id[row] == e) gap = std::max(gap, abs(d.efc_pos[row]));
-        if (gap > most_gap) {
-            model_.lose(what, fmt::format("the bodies are {:.3g} m or rad from where it holds them", gap));
-            continue;
-        }
-        if (m_.body_weldid[first] == m_.body_weldid[second]) continue;  // they are one body
-        ModelJoint loop;
-        loop.closes_loop = true;
-        JointParameters& own = loop.parameters;
-        own.name = name;
-        own.kind = type == mjEQ_CONNECT ? JointKind::Spherical : JointKind::Fixed;
-        own.first = moving_body(first);
-        own.second = moving_body(second);
-        const Vector3d place = vector_at(d.xpos, first);
-        const Quaterniond turn = quaternion_at(d.xquat, first).normalized();
-        // The anchor of a connection is in the frame of the first body. Any point does for a weld.
-        own.point =
-            model_import::array(type == mjEQ_CONNECT ? Vector3d(place + turn * Vector3d(m_.eq_data + mjNEQDATA * e))
-                                                     : vector_at(d.xpos, second));
-        if (own.second < 0) std::swap(own.first, own.second);
-        model_.joints.push_back(std::move(loop));
-        if (own.first < 0) continue;
-        for (int a = 0; a < m_.ngeom; ++a)
-            for (int b = 0; b < m_.ngeom; ++b)
-                if (is_shape_[static_cast<std::size_t>(a)] != 0 && is_shape_[static_cast<std::size_t>(b)] != 0 &&
-                    m_.body_weldid[m_.geom_bodyid[a]] == m_.body_weldid[first] &&
-                    m_.body_weldid[m_.geom_bodyid[b]] == m_.body_weldid[second] && touches(a, b)) {
-                    model_.lose(what, "its bodies may touch: bodies with a joint between them never do in a scene");
-                    a = b = m_.ngeom;
-                }
+        if (!equality.softness.is_usual()) model_.lose(what, "solref and solimp: joints are rigid");
+        const std::string name = joint_names_.take(equality.name, "loop");
+        if (equality.type == EqualityType::Joint)
+            read_joint_equality(equality, name);
+        else
+            read_loop(equality, name);
     }
 }
 
+// A connection holds two points together: sites, or an anchor of the first body where it is at the reference of both. A
+// weld holds two frames together. The scene starts elsewhere where a keyframe has balls or free bodies elsewhere.
+void MjcfReader::read_loop(const mjcf::Equality& equality, const std::string& name) {
+    const std::string what = fmt::format("equality \"{}\"", equality.name);
+    const std::vector<mjcf::Placed> reference = mjcf::place(spec_, nullptr);
+    struct End {
+        std::int32_t body = 0;
+        mjcf::Frame local = mjcf::Frame::Identity();  // what is held, in the frame of the body
+    };
+    const auto end_of = [&](const std::string& of) {
+        End end;
+        for (std::size_t k = 0; k < spec_.bodies.size(); ++k) {
+            const mjcf::Body& body = spec_.bodies[k];
+            if (!equality.by_sites && body.name == of) end.body = static_cast<std::int32_t>(k);
+            for (const mjcf::Site& site : body.sites)
+                if (equality.by_sites && site.name == of)
+                    end = {static_cast<std::int32_t>(k), mjcf::frame_of(site.position, site.orientation)};
+        }
+        return end;
+    };
+    End first = end_of(equality.first), second = equality.second.empty() ? End{} : end_of(equality.second);
+    const auto frame_at = [](const std::vector<mjcf::Placed>& where, const End& end) {
+        return where[static_cast<std::size_t>(end.body)].frame * end.local;
+    };
+    const Vector3d anchor(equality.data.data());
+    if (!equality.by_sites && equality.type == EqualityType::Connect) {
+        first.local.translation() = anchor;
+        const Vector3d point = frame_at(reference, first).translation();
+        second.local.translation() = reference[static_cast<std::size_t>(second.body)].frame.inverse() * point;
+    } else if (!equality.by_sites) {
+        // The pose of the second body in the frame of the first: relpose, or else that of the reference.
+        const Quaterniond turn(equality.data[6], equality.data[7], equality.data[8], equality.data[9]);
+        if (equality.has_pose && turn.norm() > 0.0) {
+            // relpose places the anchor, which is in the frame of the second body.
+            second.local.translation() = anchor;
+            first.local = mjcf::frame_of(Vector3d(equality.data.data() + 3), turn.normalized());
+        } else {
+            first.local = frame_at(reference, first).inverse() * frame_at(reference, second);
+        }
+    }
+    if (!moves(first.body) && !moves(second.body)) return;
+    const mjcf::Frame one = frame_at(placed_, first), other = frame_at(placed_, second);
+    double gap = (one.translation() - other.translation()).norm();
+    if (equality.type == EqualityType::Weld)
+        gap = std::max(gap, 2.0 * Quaterniond(one.linear().transpose() * other.linear()).vec().norm());
+    if (gap > most_gap)
+        return model_.lose(what, fmt::format("the bodies are {:.3g} m or rad from where it holds them", gap));
+    if (body_at(first.body).weld == body_at(second.body).weld) return;  // they are one body
+    ModelJoint loop;
+    loop.closes_loop = true;
+    JointParameters& own = loop.parameters;
+    own.name = name;
+    own.kind = equality.type == EqualityType::Connect ? JointKind::Spherical : JointKind::Fixed;
+    own.first = moving_body(first.body);
+    own.second = moving_body(second.body);
+    own.point = model_import::array(other.translation());
+    if (own.second < 0) std::swap(own.first, own.second);
+    model_.joints.push_back(std::move(loop));
+}
+
 // q₁ − q₁(0) = Σ c_k (q₂ − q₂(0))^k; the coordinates of the scene are these differences.
-void MjcfReader::read_joint_equality(int e, const std::string& name) {
-    const int first = m_.eq_obj1id[e], second = m_.eq_obj2id[e];
-    const mjtNum* c = m_.eq_data + mjNEQDATA * e;
-    const std::string what = item("equality", mjOBJ_EQUALITY, e);
-    const auto place = [&](int j) { return joint_[static_cast<std::size_t>(j)]; };
-    const bool constant = second < 0 || (c[1] == 0.0 && c[2] == 0.0 && c[3] == 0.0 && c[4] == 0.0);
+void MjcfReader::read_joint_equality(const mjcf::Equality& equality, const std::string& name) {
+    const std::string what = fmt::format("equality \"{}\"", equality.name);
+    const mjcf::Joint *first = named(joints_, equality.first),
+                      *second = equality.second.empty() ? nullptr : named(joints_, equality.second);
+    const auto place = [&](const mjcf::Joint* joint) {
+        return joint_[static_cast<std::size_t>(std::find(joints_.begin(), joints_.end(), joint) - joints_.begin())];
+    };
+    if (first == nullptr || mjcf::freedoms_of(first->type) != 1 ||
+        (second != nullptr && mjcf::freedoms_of(second->type) != 1))
+        return model_.lose(what, "a coupling of balls or free joints");
+    const auto& c = equality.data;
+    const bool constant = second == nullptr || (c[1] == 0.0 && c[2] == 0.0 && c[3] == 0.0 && c[4] == 0.0);
     if (constant) {
         model_.locks.push_back({force_names_.take(name, "lock"), place(first), c[0]});
         return;
     }
     if (c[0] != 0.0 || c[2] != 0.0 || c[3] != 0.0 || c[4] != 0.0)
         return model_.lose(what, "a coupling of joints that is no ratio");
-    if (m_.jnt_type[first] != m_.jnt_type[second]) return model_.lose(what, "a coupling of an angle with a slide");
+    if (first->type != second->type) return model_.lose(what, "a coupling of an angle with a slide");
+    if (first == second) return model_.lose(what, "a coupling of a joint with itself");
     ModelJoint gear;
     JointParameters& own = gear.parameters;
     own.kind = JointKind::Gear;
@@ -102,14 +143,14 @@ void MjcfReader::read_joint_equality(int e, const std::string& name) {
     own.gear_first = place(second);
     own.gear_second = place(first);
     own.gear_ratio = c[1];
-    if (m_.jnt_type[first] == mjJNT_HINGE) {
+    if (first->type == mjcf::JointType::Hinge) {
         const auto [p, q] = model_import::nearest_fraction(c[1]);
         own.gear_ratio = p / q;
         if (abs(p / q - c[1]) > 1e-9 * abs(c[1]))
             model_.lose(what, fmt::format("its ratio {} becomes {}/{}", c[1], p, q));
     }
-    const auto start = [&](int j) {
-        const JointParameters& joint = model_.joints[static_cast<std::size_t>(place(j))].parameters;
+    const auto start = [&](const mjcf::Joint* of) {
+        const JointParameters& joint = model_.joints[static_cast<std::size_t>(place(of))].parameters;
         return (joint.kind == JointKind::Revolute ? joint.turn : joint.slide).start.value_or(0.0);
     };
     if (abs(start(first) - c[1] * start(second)) > most_gap)
@@ -118,11 +159,20 @@ void MjcfReader::read_joint_equality(int e, const std::string& name) {
 }
 
 void MjcfReader::read_actuators() {
-    if (disabled(mjDSBL_ACTUATION)) {
-        if (m_.nu > 0) model_.without_effect.push_back({"actuators", "a flag disables them"});
+    if (!spec_.option.actuation) {
+        if (!spec_.actuators.empty()) model_.without_effect.push_back({"actuators", "a flag disables them"});
         return;
     }
-    for (int k = 0; k < m_.nu; ++k) read_actuator(k, force_names_.take(name_of(mjOBJ_ACTUATOR, k), "actuator"));
+    for (std::size_t k = 0; k < spec_.actuators.size(); ++k) {
+        const mjcf::Actuator& one = spec_.actuators[k];
+        const auto& off = spec_.option.disabled_groups;
+        if (std::find(off.begin(), off.end(), one.group) != off.end()) {
+            model_.without_effect.push_back({fmt::format("actuator \"{}\"", one.name), "its group is disabled"});
+            continue;
+        }
+        const double control = key_ == nullptr || k >= key_->ctrl.size() ? 0.0 : key_->ctrl[k];
+        read_actuator(one, control, force_names_.take(one.name, "actuator"));
+    }
 }
 
 // With the length L = gear q of the transmission, the force is gain u + bias, both affine in L and L̇, and acts on the
@@ -131,40 +181,56 @@ void MjcfReader::read_actuators() {
 //     τ = gear (b₀ + b₁ L + b₂ L̇) = kp (p − c) + kd (s − ċ),    kp = −gear² b₁,  kd = −gear² b₂
 //
 // with c = q − reference and what is constant in p, or in s where kp = 0.
-void MjcfReader::read_actuator(int k, const std::string& name) {
-    const std::string what = item("actuator", mjOBJ_ACTUATOR, k);
-    const int transmission = m_.actuator_trntype[k], joint = m_.actuator_trnid[2 * k];
-    const char* const kinds[] = {"", "", "a slider-crank", "a tendon", "a site", "adhesion of a body"};
-    if (transmission != mjTRN_JOINT && transmission != mjTRN_JOINTINPARENT)
+void MjcfReader::read_actuator(const mjcf::Actuator& actuator, double control, const std::string& name) {
+    const std::string what = fmt::format("actuator \"{}\"", actuator.name);
+    const char* const kinds[] = {"nothing",  "a joint", "a joint",           "a slider-crank",
+                                 "a tendon", "a site",  "adhesion of a body"};
+    if (actuator.joint < 0)
         return model_.lose(what,
-                           fmt::format("it acts through {}", transmission <= mjTRN_BODY ? kinds[transmission] : "?"));
-    if (m_.jnt_type[joint] != mjJNT_HINGE && m_.jnt_type[joint] != mjJNT_SLIDE)
-        return model_.lose(what, "it acts on a ball or a free joint");
-    const int gain = m_.actuator_gaintype[k], bias = m_.actuator_biastype[k];
-    if (m_.actuator_dyntype[k] != mjDYN_NONE) return model_.lose(what, "it has a state of its own (activation)");
-    if (gain == mjGAIN_MUSCLE || gain == mjGAIN_USER || bias == mjBIAS_MUSCLE || bias == mjBIAS_USER)
-        return model_.lose(what, "its force is that of a muscle or of a user's code");
-    double control = key_ < 0 ? 0.0 : m_.key_ctrl[key_ * m_.nu + k];
-    if (m_.actuator_ctrllimited[k] != 0 && !disabled(mjDSBL_CLAMPCTRL))
-        control = std::clamp(control, m_.actuator_ctrlrange[2 * k], m_.actuator_ctrlrange[2 * k + 1]);
-    std::array<double, 3> b{};
-    for (int i = 0; i < 3; ++i) {
-        if (gain == mjGAIN_AFFINE || (gain == mjGAIN_FIXED && i == 0))
-            b[static_cast<std::size_t>(i)] += control * m_.actuator_gainprm[mjNGAIN * k + i];
-        if (bias == mjBIAS_AFFINE) b[static_cast<std::size_t>(i)] += m_.actuator_biasprm[mjNBIAS * k + i];
+                           fmt::format("it acts through {}", kinds[static_cast<std::size_t>(actuator.transmission)]));
+    const mjcf::Joint& joint = *joints_[static_cast<std::size_t>(actuator.joint)];
+    if (mjcf::freedoms_of(joint.type) != 1) return model_.lose(what, "it acts on a ball or a free joint");
+    if (actuator.dynamics != "none") return model_.lose(what, "it has a state of its own (activation)");
+    const auto is_known = [](const std::string& law) { return law == "none" || law == "fixed" || law == "affine"; };
+    if (!is_known(actuator.gain) || !is_known(actuator.bias)) {
+        const bool muscle = actuator.gain == "muscle" || actuator.gain == "user";
+        return model_.lose(what, muscle ? "its force is that of a muscle or of a user's code"
+                                        : fmt::format("its force has a law that scenes do not have ({})",
+                                                      is_known(actuator.gain) ? actuator.bias : actuator.gain));
     }
-    const double gear = m_.actuator_gear[6 * k];
-    const std::int32_t number = joint_[static_cast<std::size_t>(joint)];
-    const bool limited = m_.actuator_forcelimited[k] != 0;
-    const double low = m_.actuator_forcerange[2 * k], high = m_.actuator_forcerange[2 * k + 1];
+    if (actuator.delay != 0.0) model_.lose(what, "a delay of its control");
+    if (actuator.armature != 0.0 || actuator.damping != 0.0)
+        model_.lose(what, "an armature or a damping of the actuator");
+    if (actuator.is_control_limited && spec_.option.clamp_control)
+        control = std::clamp(control, actuator.control_range[0],
+                             std::max(actuator.control_range[0], actuator.control_range[1]));
+    std::array<double, 3> b{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (actuator.gain == "affine" || (actuator.gain == "fixed" && i == 0))
+            b[i] += control * actuator.gain_parameters[i];
+        if (actuator.bias == "affine") b[i] += actuator.bias_parameters[i];
+    }
+    const double gear = actuator.gear[0];
+    const std::int32_t number = joint_[static_cast<std::size_t>(actuator.joint)];
+    const double reference = joint.reference;
+    // What the actuator gives, and what all of a joint may give together (actuatorfrcrange, here of each by itself).
+    bool limited = actuator.is_force_limited;
+    double low = limited ? actuator.force_range[0] : -std::numeric_limits<double>::infinity(),
+           high = limited ? actuator.force_range[1] : -low;
+    if (joint.is_force_limited && gear != 0.0) {
+        const double ends[2] = {joint.force_range[0] / gear, joint.force_range[1] / gear};
+        low = std::max(low, std::min(ends[0], ends[1]));
+        high = std::min(high, std::max(ends[0], ends[1]));
+        limited = true;
+    }
     if (gear == 0.0 || (b[0] == 0.0 && b[1] == 0.0 && b[2] == 0.0)) {
         const JointParameters& own = model_.joints[static_cast<std::size_t>(number)].parameters;
         return model_.lose(what, fmt::format("a motor of the joint \"{}\" whose force is its control times {:.6g}; the "
                                              "control is 0",
-                                             own.name, gear * m_.actuator_gainprm[mjNGAIN * k]));
+                                             own.name, gear * actuator.gain_parameters[0]));
     }
     if (b[1] == 0.0 && b[2] == 0.0) {
-        const double force = limited ? std::clamp(b[0], low, high) : b[0];
+        const double force = limited ? std::clamp(b[0], low, std::max(low, high)) : b[0];
         model_.drives.push_back({name, number, gear * force});
         return;
     }
@@ -174,7 +240,6 @@ void MjcfReader::read_actuator(int k, const std::string& name) {
     servo.kp = -gear * gear * b[1];
     servo.kd = -gear * gear * b[2];
     if (servo.kp < 0.0 || servo.kd < 0.0) return model_.lose(what, "it pushes away from its goal, or along the speed");
-    const double reference = reference_[static_cast<std::size_t>(joint)];
     if (servo.kp > 0.0) {
         servo.position = gear * b[0] / servo.kp - reference;
     } else {
@@ -186,43 +251,32 @@ void MjcfReader::read_actuator(int k, const std::string& name) {
             model_.lose(
                 what, fmt::format("limits {:.6g} and {:.6g} of its force that differ: the larger holds both ways", low,
                                   high));
+        if (!(servo.limit > 0.0)) return model_.lose(what, "its force is limited to 0");
     }
     model_.actuators.push_back(std::move(servo));
 }
 
 void MjcfReader::note_others() {
-    for (int k = 0; k < m_.ntendon; ++k) {
-        const bool acts = m_.tendon_stiffness[k] != 0.0 || m_.tendon_damping[k] != 0.0 ||
-                          m_.tendon_frictionloss[k] != 0.0 || m_.tendon_limited[k] != 0;
-        const std::string what = item("tendon", mjOBJ_TENDON, k);
+    for (const mjcf::Tendon& tendon : spec_.tendons) {
+        const bool limited = tendon.limited == mjcf::Switch::On ||
+                             (tendon.limited == mjcf::Switch::Auto && tendon.range[0] < tendon.range[1]);
+        const bool acts = tendon.stiffness[0] != 0.0 || tendon.damping[0] != 0.0 || tendon.friction_loss != 0.0 ||
+                          tendon.armature != 0.0 || limited;
+        const std::string what = fmt::format("tendon \"{}\"", tendon.name);
         if (acts) {
             model_.lose(what, "its spring, damping, dry friction or limit");
         } else {
             model_.without_effect.push_back({what, "nothing acts in it of itself"});
         }
     }
-    const std::array<std::pair<const char*, std::pair<mjtObj, int>>, 10> kinds = {
-        {{"sites", {mjOBJ_SITE, m_.nsite}},
-         {"sensors", {mjOBJ_SENSOR, m_.nsensor}},
-         {"cameras", {mjOBJ_CAMERA, m_.ncam}},
-         {"lights", {mjOBJ_LIGHT, m_.nlight}},
-         {"textures", {mjOBJ_TEXTURE, m_.ntex}},
-         {"materials of looks", {mjOBJ_MATERIAL, m_.nmat}},
-         {"skins", {mjOBJ_SKIN, m_.nskin}},
-         {"numbers", {mjOBJ_NUMERIC, m_.nnumeric}},
-         {"texts", {mjOBJ_TEXT, m_.ntext}},
-         {"tuples", {mjOBJ_TUPLE, m_.ntuple}}}};
-    for (const auto& [kind, which] : kinds) {
-        std::vector<std::string> names;
-        for (int k = 0; k < which.second; ++k) names.push_back(name_of(which.first, k));
-        if (!names.empty()) model_.without_effect.push_back({kind, fmt::format("{}", fmt::join(names, ", "))});
-    }
     std::vector<std::string> keys;
-    for (int k = 0; k < m_.nkey; ++k)
-        if (k != key_) keys.push_back(name_of(mjOBJ_KEY, k));
+    for (const mjcf::Key& key : spec_.keys)
+        if (&key != key_) keys.push_back(key.name);
     if (!keys.empty())
         model_.without_effect.push_back(
             {"keyframes", fmt::format("{} (--keyframe starts at one)", fmt::join(keys, ", "))});
+    for (const auto& [kind, names] : spec_.seen)
+        model_.without_effect.push_back({kind, fmt::format("{}", fmt::join(names, ", "))});
 }
 
 }  // namespace delassus::importers

@@ -24,12 +24,13 @@ std::string messages_of(const sdf::Errors& errors) {
 }  // namespace
 
 extern "C" DELASSUS_API void delassus_import_sdf_read(const std::filesystem::path& file,
-                                                      const delassus::ImportSettings&,
+                                                      const delassus::ImportSettings& settings,
                                                       delassus::model_import::Model& model) {
     sdf::Console::Instance()->SetQuiet(true);
     sdf::ParserConfig config = sdf::ParserConfig::GlobalConfig();
-    config.SetFindCallback(
-        [&](const std::string& address) { return delassus::model_import::find_file(address, file).string(); });
+    config.SetFindCallback([&](const std::string& address) {
+        return delassus::model_import::find_file(address, file, settings.package_paths).string();
+    });
     sdf::Root root;
     sdf::Errors errors;
     try {

@@ -188,6 +188,16 @@ std::int32_t SdfReader::material_of(const sdf::Collision& collision, const std::
     if (number_at(surface, {"friction", "ode", "slip1"}, 0.0) != 0.0 ||
         number_at(surface, {"friction", "ode", "slip2"}, 0.0) != 0.0)
         model_.lose(what, "slip");
+    const auto differs = [&](std::initializer_list<const char*> path, double usual) {
+        return number_at(surface, path, usual) != usual;
+    };
+    std::vector<std::string> soft;
+    for (const auto& [name, usual] :
+         {std::pair("kp", 1e12), std::pair("kd", 1.0), std::pair("soft_cfm", 0.0), std::pair("soft_erp", 0.2)})
+        if (differs({"contact", "ode", name}, usual) || differs({"contact", "bullet", name}, usual))
+            soft.push_back(name);
+    if (!soft.empty()) model_.lose(what, fmt::format("{}: contacts are rigid", fmt::join(soft, ", ")));
+    if (element_at(surface, {"friction", "ode", "fdir1"})) model_.lose(what, "a direction of friction (fdir1)");
     auto& all = model_.materials;
     const auto known = std::find_if(all.begin(), all.end(), [&](const auto& one) {
         return one.friction == friction && one.restitution == restitution;
@@ -294,7 +304,7 @@ void SdfReader::read_joint(const sdf::Joint& joint, const Placed& model, const s
         case sdf::JointType::PRISMATIC: {
             ModelJoint result =
                 with_axis(0, joint.Type() == sdf::JointType::PRISMATIC ? JointKind::Prismatic : JointKind::Revolute);
-            if (joint.Axis(0) != nullptr) read_coordinate(*joint.Axis(0), what, result.parameters);
+            if (joint.Axis(0) != nullptr) read_coordinate(*joint.Axis(0), joint.Element(), what, result.parameters);
             return put(std::move(result));
         }
         case sdf::JointType::SCREW: {
@@ -306,7 +316,8 @@ void SdfReader::read_joint(const sdf::Joint& joint, const Placed& model, const s
             std::vector<ModelJoint> both = {with_axis(0, JointKind::Revolute), with_axis(1, JointKind::Revolute)};
             for (unsigned int k = 0; k < 2; ++k)
                 if (joint.Axis(k) != nullptr)
-                    read_coordinate(*joint.Axis(k), fmt::format("{}, axis {}", what, k + 1), both[k].parameters);
+                    read_coordinate(*joint.Axis(k), k == 0 ? joint.Element() : nullptr,
+                                    fmt::format("{}, axis {}", what, k + 1), both[k].parameters);
             const JointParameters &first = both[0].parameters, &second = both[1].parameters;
             const bool acts = std::any_of(both.begin(), both.end(), [](const ModelJoint& one) {
                 const auto& [damping, stiffness, rest, friction, armature, start, rate] = one.parameters.turn;
@@ -333,7 +344,8 @@ void SdfReader::read_joint(const sdf::Joint& joint, const Placed& model, const s
     }
 }
 
-void SdfReader::read_coordinate(const sdf::JointAxis& axis, const std::string& what, JointParameters& own) {
+void SdfReader::read_coordinate(const sdf::JointAxis& axis, const sdf::ElementPtr& joint_element,
+                                const std::string& what, JointParameters& own) {
     const bool turns = own.kind == JointKind::Revolute;
     JointCoordinate& coordinate = turns ? own.turn : own.slide;
     coordinate.damping = axis.Damping();
@@ -351,6 +363,21 @@ void SdfReader::read_coordinate(const sdf::JointAxis& axis, const std::string& w
     if (start != 0.0) {
         coordinate.start = start;
         model_.lose(what, "its 0 lies beyond its limits: it starts at the nearer one");
+    }
+    if (const sdf::ElementPtr physics = element_at(joint_element, {"physics"})) {
+        std::vector<std::string> acts;
+        for (const auto& path : {std::vector<const char*>{"ode", "cfm"},
+                                 {"ode", "erp"},
+                                 {"ode", "cfm_damping"},
+                                 {"ode", "limit", "cfm"},
+                                 {"ode", "limit", "erp"},
+                                 {"ode", "suspension"},
+                                 {"ode", "max_force"}}) {
+            sdf::ElementPtr at = physics;
+            for (const char* name : path) at = at && at->HasElement(name) ? at->GetElement(name) : nullptr;
+            if (at) acts.emplace_back(fmt::format("{}", fmt::join(path, "/")));
+        }
+        if (!acts.empty()) model_.lose(what, fmt::format("{}: joints and stops are rigid", fmt::join(acts, ", ")));
     }
     const auto limited = [](double limit) { return limit > 0.0 && limit < 1e15; };
     if (limited(axis.Effort()) || limited(axis.MaxVelocity())) efforts_.push_back(what);

@@ -32,7 +32,9 @@ private:
                     model_import::ModelBody& body);
     [[nodiscard]] std::int32_t material_of(const sdf::Collision& collision, const std::string& what);
     void read_joint(const sdf::Joint& joint, const Placed& model, const std::string& scope);
-    void read_coordinate(const sdf::JointAxis& axis, const std::string& what, JointParameters& result);
+    /// joint_element: for what only the element has; null: nothing.
+    void read_coordinate(const sdf::JointAxis& axis, const sdf::ElementPtr& joint_element, const std::string& what,
+                         JointParameters& result);
     void read_bitmasks();
     void note_plugins(const sdf::ElementPtr& element, const std::string& of, bool acts);
 

@@ -12,6 +12,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
+#include "importers/xml_tree.hpp"
 #include "model_import/model.hpp"
 #include "support/text_file.hpp"
 
@@ -112,8 +113,10 @@ private:
             body.position = place * at.translation();
             if (!(body.mass >= 0.0) || !std::isfinite(body.mass))
                 throw InputError(fmt::format("the mass of link \"{}\" is {}", link.name, body.mass));
-            if (body.mass == 0.0 && !body.inertia.isZero(0.0))
-                throw InputError(fmt::format("the link \"{}\" has an inertia and no mass", link.name));
+            if (body.mass == 0.0 && !body.inertia.isZero(0.0)) {
+                model_.lose(fmt::format("link \"{}\"", link.name), "an inertia without a mass: left out");
+                body.inertia.setZero();
+            }
         }
         for (const auto& collision : link.collision_array) read_shape(link, *collision, place, body);
         visuals_ += link.visual_array.size();
@@ -297,6 +300,38 @@ private:
     std::size_t visuals_ = 0;
 };
 
+/// What urdfdom passes over without a word.
+void note_unread(const XmlElement& robot, Model& model) {
+    static const std::set<std::string> of_link = {"inertial", "visual", "collision"};
+    static const std::set<std::string> of_joint = {
+        "origin", "parent", "child", "axis", "dynamics", "limit", "calibration", "mimic", "safety_controller"};
+    static const std::set<std::string> looks = {"material", "sensor", "visual", "dynamic_shadows", "laser_retro"};
+    const auto lose = [&](const XmlElement& element, const std::string& of) {
+        model.lose(fmt::format("element <{}> of {}", element.name, of), "URDF as it is read here does not have it");
+    };
+    for (const XmlElement& part : robot.children) {
+        const std::string name = part.text("name");
+        if (part.name == "link" || part.name == "joint") {
+            const auto& known = part.name == "link" ? of_link : of_joint;
+            for (const XmlElement& child : part.children)
+                if (!known.contains(child.name)) lose(child, fmt::format("{} \"{}\"", part.name, name));
+        } else if (part.name == "gazebo") {
+            std::vector<std::string> acts;
+            for (const XmlElement& child : part.children)
+                if (!looks.contains(child.name)) acts.push_back(child.name);
+            if (!acts.empty())
+                model.lose(fmt::format("gazebo \"{}\"", part.text("reference", robot.text("name"))),
+                           fmt::format("what only Gazebo reads: {}", fmt::join(acts, ", ")));
+        } else if (part.name == "transmission" || part.name == "ros2_control") {
+            model.without_effect.push_back({fmt::format("{} \"{}\"", part.name, name), "no motor drives the joints"});
+        } else if (part.name == "mujoco" || part.name == "sensor") {
+            model.without_effect.push_back({fmt::format("element <{}>", part.name), "settings of MuJoCo, and sensors"});
+        } else if (part.name != "material") {
+            model.lose(fmt::format("{} \"{}\"", part.name, name), "URDF as it is read here does not have it");
+        }
+    }
+}
+
 }  // namespace
 }  // namespace delassus::importers
 
@@ -311,5 +346,6 @@ extern "C" DELASSUS_API void delassus_import_urdf_read(const std::filesystem::pa
                          (reports.error.empty() ? "it gives no reason" : reports.error));
     if (!reports.error.empty()) model.lose("error of urdfdom", reports.error);
     for (const auto& warning : reports.warnings) model.without_effect.push_back({"warning of urdfdom", warning});
+    importers::note_unread(importers::read_xml(file, ""), model);
     importers::UrdfReader(*robot, file, model).read(settings.floating);
 }

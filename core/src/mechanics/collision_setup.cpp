@@ -97,6 +97,10 @@ void check_collision_setup(const CollisionSetup& setup) {
             fmt::format("There are solids for {} bodies of {}; each body should have one, or no body should.",
                         setup.solid.size(), setup.fixed.size()));
     }
+    if (!setup.passing.empty() && setup.material.size() != setup.shapes.size()) {
+        throw InputError(fmt::format("There are materials for {} shapes of {}; each shape should have one.",
+                                     setup.material.size(), setup.shapes.size()));
+    }
     const auto bodies = static_cast<std::int32_t>(setup.fixed.size());
     for (const auto& [first, second] : setup.apart) {
         if (std::min(first, second) < -1 || std::max(first, second) >= bodies) {

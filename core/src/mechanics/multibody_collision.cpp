@@ -130,8 +130,14 @@ void MultibodySystem::Implementation::make_detector() {
     // Where nearly all may touch, the first pairs tell; shapes of bodies that are all kept apart are few.
     const auto meets_another = [&](const Shape& one) {
         return std::any_of(shapes.begin(), shapes.end(), [&](const Shape& other) {
-            return one.body != other.body && (is_moved(one) || is_moved(other)) &&
-                   !apart.contains(std::minmax(one.body, other.body));
+            if (one.body == other.body || (!is_moved(one) && !is_moved(other)) ||
+                apart.contains(std::minmax(one.body, other.body)))
+                return false;
+            const auto material = [&](const Shape& of, const std::vector<Shape>& among) {
+                return shape_material[static_cast<std::size_t>(&of - among.data())];
+            };
+            const bool node = one.body >= static_cast<std::int32_t>(bodies.size());
+            return node || material_between(material(one, setup.shapes), material(other, shapes)).touch;
         });
     };
     const bool bodies_touch = moves && std::any_of(setup.shapes.begin(), setup.shapes.end(), meets_another);
@@ -147,6 +153,13 @@ void MultibodySystem::Implementation::make_detector() {
     for (const auto& shape : shapes) {
         const double half = size_of(shape);
         extents.push_back({largest_extent(shape), half > 0.0 ? half : HUGE_VAL});
+    }
+    for (const auto& [pair, material] : material_pairs)
+        if (!material.touch) setup.passing.emplace_back(pair);
+    if (!setup.passing.empty()) {
+        setup.material = shape_material;
+        // A node has its contacts whatever its material.
+        std::fill(setup.material.begin() + static_cast<std::ptrdiff_t>(shapes.size()), setup.material.end(), -1);
     }
     poses.resize(bodies.size() + nodes.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) poses[k] = bodies[k].parameters.pose;

@@ -8,6 +8,8 @@
 
 #include "delassus/error.hpp"
 #include "delassus/mesh_files.hpp"
+#include "mechanics/convex_hull.hpp"
+#include "model_import/mesh_reading.hpp"
 #include "model_import/model.hpp"
 
 namespace delassus::model_import {
@@ -52,16 +54,26 @@ bool is_convex(const Mesh& mesh) {
 
 }  // namespace
 
-fs::path find_file(const std::string& address, const fs::path& model) {
+fs::path find_file(const std::string& address, const fs::path& model, const std::vector<fs::path>& folders) {
     const fs::path folder = model.parent_path();
     const auto mark = address.find("://");
     const std::string scheme = mark == std::string::npos ? "" : address.substr(0, mark);
-    const fs::path rest = mark == std::string::npos ? address : address.substr(mark + 3);
+    fs::path rest = mark == std::string::npos ? address : address.substr(mark + 3);
     if (scheme.empty() || scheme == "file") {
         const fs::path file = rest.is_absolute() ? rest : folder / rest;
         return is_there(file) ? file : fs::path();
     }
     if ((scheme != "package" && scheme != "model") || rest.empty()) return {};
+    if (rest.is_absolute()) {  // package:///
+        if (is_there(rest)) return rest;
+        rest = rest.relative_path();
+        if (rest.empty()) return {};
+    }
+    for (const fs::path& place : folders) {
+        if (is_there(place / rest)) return place / rest;
+        if (place.filename() == *rest.begin() && is_there(place.parent_path() / rest))
+            return place.parent_path() / rest;
+    }
     // The first part names a folder, which lies somewhere above the model or beside such a folder.
     const fs::path name = *rest.begin();
     for (fs::path above = folder;; above = above.parent_path()) {
@@ -81,7 +93,7 @@ fs::path find_file(const std::string& address, const fs::path& model) {
 
 void add_mesh(Model& model, const ModelShape& at, const std::string& address, const Vector3d& scale,
               const fs::path& model_file, const std::string& what, std::vector<ModelShape>& shapes) {
-    const fs::path file = find_file(address, model_file);
+    const fs::path file = find_file(address, model_file, model.package_paths);
     if (file.empty() || std::filesystem::is_directory(file))
         return model.lose(what, fmt::format("its mesh \"{}\" is not there", address));
     if (!((scale.array() != 0.0).all() && scale.allFinite()))
@@ -96,8 +108,23 @@ void add_mesh(Model& model, const ModelShape& at, const std::string& address, co
             parts = {read_terrain(file, 1.0)};
             open = true;
         } catch (const InputError&) {
-            return model.lose(what, fmt::format("its mesh is of no use: {}", error.what()));
+            try {
+                const RawMesh raw = read_raw_mesh(file);
+                Mesh& mesh = parts.emplace_back();
+                for (const Vector3d& point : raw.points) mesh.vertices.push_back(array(point));
+                open = true;
+            } catch (const InputError&) {
+                return model.lose(what, fmt::format("its mesh is of no use: {}", error.what()));
+            }
         }
+    }
+    if (open) {
+        const ConvexHull hull = convex_hull(parts[0].vertices);
+        if (hull.vertices.empty()) return model.lose(what, "a mesh without volume: left out");
+        parts[0].vertices = hull.vertices;
+        parts[0].triangles.clear();
+        for (const auto& face : hull.faces)
+            for (std::size_t k = 2; k < face.size(); ++k) parts[0].triangles.push_back({face[0], face[k - 1], face[k]});
     }
     if (open)
         model.lose(what, "an open mesh: the convex hull of its points collides");
@@ -117,7 +144,6 @@ void add_mesh(Model& model, const ModelShape& at, const std::string& address, co
         shape.name = file.stem().string();
         for (std::size_t k = 0; k < part.vertices.size(); ++k)
             shape.points.push_back(scale.cwiseProduct(point_of(part, static_cast<std::int32_t>(k))));
-        if (open) continue;
         shape.triangles = part.triangles;
         if (turned_out)
             for (auto& triangle : shape.triangles) std::swap(triangle[1], triangle[2]);

@@ -97,6 +97,7 @@ struct ModelMaterial {
 struct ModelMaterialPair {
     std::int32_t first = 0, second = 0;
     double friction = 0.0, restitution = 0.0;
+    bool touch = true;  ///< false: shapes of these materials pass through each other
 };
 
 struct Model {
@@ -112,6 +113,7 @@ struct Model {
     std::vector<ModelMaterialPair> material_pairs;
     std::vector<std::array<std::int32_t, 2>> apart;  ///< bodies that never touch
     std::vector<NotCarriedOver> lost, without_effect;
+    std::vector<std::filesystem::path> package_paths;  ///< ImportSettings
 
     void lose(std::string what, std::string why) { lost.push_back({std::move(what), std::move(why)}); }
 };
@@ -126,6 +128,16 @@ DELASSUS_API void add_chain(Model& model, std::int32_t parent, std::int32_t body
 /// the world holds. Then drops bodies without mass that carry none, with a loss. Throws InputError for a body without
 /// mass that nothing holds.
 DELASSUS_API void merge_fixed(Model& model);
+
+/// Leaves out shapes without a size, with a loss for each. repair_inertias(): those that no body has become the nearest
+/// that one has, zero that of a ball of water; with a loss for each. After merge_fixed().
+DELASSUS_API void drop_flat_shapes(Model& model);
+DELASSUS_API void repair_inertias(Model& model);
+
+/// ImportSettings::fixed_base (before merge_fixed()), ground and height, apart. Throw InputError.
+DELASSUS_API void hold_base(Model& model);
+DELASSUS_API void add_ground(Model& model, double height);
+DELASSUS_API void part_bodies(Model& model, const std::vector<std::array<std::string, 2>>& pairs);
 
 /// The scene's text, and the files that it needs. path: of the scene.
 DELASSUS_API void write_scene(const Model& model, const std::filesystem::path& model_file,
@@ -154,9 +166,11 @@ DELASSUS_API std::vector<Vector3d> sphere_points();
 
 /// The file, or the folder, of a path or an address (file://, package://, model://) in a model: relative to the model's
 /// folder, or in a folder of that name above it, beside those, or on the search paths of ROS and Gazebo
-/// (ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH).
-/// Empty: none is there.
-DELASSUS_API std::filesystem::path find_file(const std::string& address, const std::filesystem::path& model);
+/// (ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH),
+/// or in the folders given. An address with three slashes is a path, or else lies below one of these. Empty: none is
+/// there.
+DELASSUS_API std::filesystem::path find_file(const std::string& address, const std::filesystem::path& model,
+                                             const std::vector<std::filesystem::path>& folders = {});
 
 /// Shapes of a mesh in a file, at the place of `at`: its closed parts, or the hull of an open one. what: names it in
 /// losses. Without a file, or with one that cannot be read, a loss.

@@ -23,7 +23,7 @@ struct Format {
 };
 
 constexpr std::array<Format, 3> formats = {
-    {{"mujoco", "MJCF", "delassus_import_mjcf", "delassus_import_mjcf_read", "libmujoco"},
+    {{"mujoco", "MJCF", "delassus_import_mjcf", "delassus_import_mjcf_read", "tinyxml2"},
      {"robot", "URDF", "delassus_import_urdf", "delassus_import_urdf_read", "liburdfdom"},
      {"sdf", "SDF", "delassus_import_sdf", "delassus_import_sdf_read", "libsdformat"}}};
 
@@ -161,6 +161,8 @@ ImportedScene import_model(const std::filesystem::path& file, const std::filesys
     using namespace model_import;
     if (!(settings.end > 0.0) || !std::isfinite(settings.end))
         throw InputError(fmt::format("the end of the scene is {} s; it must be positive", settings.end));
+    if (!std::isfinite(settings.height) || settings.height < 0.0)
+        throw InputError(fmt::format("the height over the ground is {} m; it must not be negative", settings.height));
     const Format& format = format_of(file);
     if (!settings.keyframe.empty() && std::string_view(format.name) != "MJCF")
         throw InputError(
@@ -175,9 +177,15 @@ ImportedScene import_model(const std::filesystem::path& file, const std::filesys
                       fmt::format("{}: {} cannot be imported", file.string(), format.name), format.library));
     const auto read_into = [&](Model& model) {
         try {
+            model.package_paths = settings.package_paths;
             read(std::filesystem::absolute(file), settings, model);
+            drop_flat_shapes(model);
+            if (settings.fixed_base) hold_base(model);
             merge_fixed(model);
+            repair_inertias(model);
             bound_frictions(model);
+            part_bodies(model, settings.apart);
+            if (settings.ground) add_ground(model, settings.height);
         } catch (const InputError& error) {
             throw InputError(fmt::format("{}: {}", file.string(), error.what()));
         }

@@ -125,7 +125,7 @@ private:
         const auto items = [&](const char* title, const std::vector<NotCarriedOver>& all) {
             if (all.empty()) return;
             put(out_, "# {}:\n", title);
-            for (const auto& one : all) put(out_, "#   {}: {}\n", one_line(one.what), one_line(one.why));
+            for (const auto& one : grouped(all)) put(out_, "#   {}: {}\n", one_line(one.what), one_line(one.why));
         };
         items("Not carried over", model_.lost);
         items("Left out, without effect on the motion", model_.without_effect);
@@ -150,6 +150,12 @@ private:
         for (const ModelMaterialPair& pair : model_.material_pairs) {
             const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
             if (used[a] == 0 || used[b] == 0) continue;
+            if (!pair.touch) {
+                if (std::exchange(first, false)) put(out_, "material_pairs:\n");
+                put(out_, "  - {{first: {}, second: {}, touch: false}}\n", quoted(model_.materials[a].name),
+                    quoted(model_.materials[b].name));
+                continue;
+            }
             const double mean = std::sqrt(model_.materials[a].friction * model_.materials[b].friction);
             const double restitution = std::max(model_.materials[a].restitution, model_.materials[b].restitution);
             if (std::abs(mean - pair.friction) <= 1e-15 * mean && restitution == pair.restitution) continue;

@@ -42,10 +42,13 @@ void SystemReader::read_materials(const YAML::Node& node) {
 
 void SystemReader::read_material_pair(const YAML::Node& item, const Copy&) {
     std::int32_t first = -1, second = -1;
-    const auto material =
-        read_contact_material(item, "a material pair",
-                              {{"first", [&](const YAML::Node& n) { first = material_named(n, "first"); }},
-                               {"second", [&](const YAML::Node& n) { second = material_named(n, "second"); }}});
+    bool touch = true;
+    auto material = read_contact_material(
+        item, "a material pair",
+        {{"first", [&](const YAML::Node& n) { first = material_named(n, "first"); }},
+         {"second", [&](const YAML::Node& n) { second = material_named(n, "second"); }},
+         {"touch", [&](const YAML::Node& n) { touch = value<bool>(source_, n, "touch", "true or false"); }}});
+    material.touch = touch;
     if (first < 0 || second < 0) source_.refuse(item, "a material pair needs the keys \"first\" and \"second\"");
     at(item, [&] { result_.system->set_material_pair(first, second, material); });
     result_.material_pairs.push_back({std::min(first, second), std::max(first, second), material});

@@ -20,8 +20,8 @@ Touching::Touching(const SceneSystem& system) : system_(system), apart_(system.a
     }
     for (auto first = bodies.begin(); first != bodies.end(); ++first)
         for (auto second = first; second != bodies.end(); ++second)
-            if (any_pair(first->second, second->second))
-                pairs_.push_back({first->first, second->first, friction_of(first->first, second->first)});
+            if (any_pair(first->second, second->second, contact_of(first->first, second->first).touch))
+                pairs_.push_back({first->first, second->first, contact_of(first->first, second->first).friction});
 }
 
 bool Touching::friction() const {
@@ -39,19 +39,22 @@ bool Touching::moves(BodyIndex body) const {
            (index >= system_.bodies.size() || (!system_.bodies[index].fixed && !system_.bodies[index].motion));
 }
 
-bool Touching::any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second) const {
+bool Touching::any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second, bool touch) const {
+    const auto bodies = static_cast<BodyIndex>(system_.bodies.size());
     for (const BodyIndex a : first)
         for (const BodyIndex b : second)
-            if (a != b && (moves(a) || moves(b)) && !apart_.contains({std::min(a, b), std::max(a, b)})) return true;
+            if (a != b && (touch || a >= bodies || b >= bodies) && (moves(a) || moves(b)) &&
+                !apart_.contains({std::min(a, b), std::max(a, b)}))
+                return true;
     return false;
 }
 
-double Touching::friction_of(std::int32_t first, std::int32_t second) const {
-    double result = std::sqrt(system_.materials[static_cast<std::size_t>(first)].contact.friction *
-                              system_.materials[static_cast<std::size_t>(second)].contact.friction);
+ContactMaterial Touching::contact_of(std::int32_t first, std::int32_t second) const {
+    ContactMaterial result;
+    result.friction = std::sqrt(system_.materials[static_cast<std::size_t>(first)].contact.friction *
+                                system_.materials[static_cast<std::size_t>(second)].contact.friction);
     for (const auto& pair : system_.material_pairs)
-        if (pair.first == std::min(first, second) && pair.second == std::max(first, second))
-            result = pair.contact.friction;
+        if (pair.first == std::min(first, second) && pair.second == std::max(first, second)) result = pair.contact;
     return result;
 }
 

@@ -12,7 +12,7 @@
 namespace delassus {
 
 /// The pairs of materials, each with its friction, of two shapes of different bodies of which at least one moves and
-/// which are not kept apart.
+/// which are not kept apart, by body or by material.
 class Touching {
 public:
     /// The system must outlive this.
@@ -33,8 +33,9 @@ public:
 
 private:
     [[nodiscard]] bool moves(BodyIndex body) const;
-    [[nodiscard]] bool any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second) const;
-    [[nodiscard]] double friction_of(std::int32_t first, std::int32_t second) const;
+    /// touch: whether shapes of their materials do; nodes of meshes do in any case.
+    [[nodiscard]] bool any_pair(const std::set<BodyIndex>& first, const std::set<BodyIndex>& second, bool touch) const;
+    [[nodiscard]] ContactMaterial contact_of(std::int32_t first, std::int32_t second) const;
 
     const SceneSystem& system_;
     std::set<std::array<BodyIndex, 2>> apart_;
