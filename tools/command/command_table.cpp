@@ -52,6 +52,7 @@ const std::map<std::string, Completion>& completions() {
         {"REAL", nothing},
         {"EPS", nothing},
         {"SECONDS", nothing},
+        {"METRES", nothing},
         {"MINUTES", nothing},
         {"M_OR_RAD", nothing},
         {"MIB", nothing},
