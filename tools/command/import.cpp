@@ -172,7 +172,7 @@ void add_import(CLI::App& program, Action& action) {
     command
         ->add_option("--package-path", arguments->settings.package_paths,
                      "Folder in which package:// and model:// addresses are looked for; may be given again")
-        ->type_name("FOLDER");
+        ->type_name("DIR");
     command->add_flag("--part-overlaps", arguments->part_overlaps,
                       "Keep bodies apart that overlap at the start by more than the contact envelope");
     command->callback([arguments, &action] { action.run = [arguments] { return import_scene(*arguments); }; });

@@ -79,10 +79,10 @@ struct MultibodySystem::Implementation {
     struct Extent {
         double largest, half_smallest;  ///< m; infinite of planes and terrains
     };
-    std::vector<Extent> extents;  // of shapes
-    PartNumbers numbers;                // of a part of another system; empty otherwise
-    std::optional<double> recovery;     // likewise, m/s
-    bool unilateral_whole = false;      // likewise: the other system has contacts or stops
+    std::vector<Extent> extents;     // of shapes
+    PartNumbers numbers;             // of a part of another system; empty otherwise
+    std::optional<double> recovery;  // likewise, m/s
+    bool unilateral_whole = false;   // likewise: the other system has contacts or stops
     std::unique_ptr<CollisionDetector> detector;
     struct MeshTouching;
     std::shared_ptr<MeshTouching> mesh_touching;  // null: no two meshes can meet
