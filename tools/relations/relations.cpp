@@ -113,7 +113,7 @@ public:
         return {spoken(base_) ? Verdict::Reported : Verdict::Violated, detail};
     }
 
-    /// One sentence that names something: a body, a joint, a key, or when.
+    /// One sentence that names something: a body, a joint or another item, or a line of the scene.
     Judgement refusal() const {
         if (base_.end != End::Refused) return {};
         const std::string& text = base_.message;
@@ -234,6 +234,7 @@ private:
     }
 
     bool names_something(const std::string& text) const {
+        if (text.find(", line ") != std::string::npos) return true;
         for (const char* list : {"bodies", "joints", "motors", "actuators", "springs", "bushings", "loads"})
             if (scene_.contains(list))
                 for (const auto& item : scene_[list])

@@ -104,8 +104,8 @@ constexpr double largest_turn_squared = 0.25;
 constexpr double steepest = 0.5;
 /// Of a step, from the point where D is taken to its end, at least.
 constexpr double shortest_rest = 0.05;
-/// What further iterations may move them by, as a share, unless the solver leaves more; and of an impact by `once`.
-constexpr double settled_share = 1e-6, settled_share_once = 1e-4;
+/// What further iterations may move them by, as a share, unless the solver leaves more.
+constexpr double settled_share = 1e-6;
 /// After so many iterations they only fall.
 constexpr int patience = 15;
 
@@ -371,7 +371,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                              double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
-    const double share = std::max(settings_.once ? settled_share_once : settled_share, 10.0 * natural_error);
+    const double share = std::max(settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
