@@ -42,7 +42,7 @@ void MultibodySystem::collect_overlaps(const State& state, double h, std::vector
         const auto [a, b] = std::minmax(self.shapes[shape_a].body, self.shapes[shape_b].body);
         const auto& of_a = self.extents[shape_a];
         const auto& of_b = self.extents[shape_b];
-        BodyOverlap& pair = pairs.try_emplace({a, b}, a, b, 0.0, HUGE_VAL, HUGE_VAL).first->second;
+        BodyOverlap& pair = pairs.try_emplace({a, b}, BodyOverlap{a, b, 0.0, HUGE_VAL, HUGE_VAL}).first->second;
         pair.depth = std::max(pair.depth, -contact.gap);
         pair.extent = std::min({pair.extent, of_a.largest, of_b.largest});
         pair.thickness = std::min({pair.thickness, of_a.half_smallest, of_b.half_smallest});
