@@ -515,8 +515,8 @@ public:
     [[nodiscard]] double envelope() const;
     [[nodiscard]] double size_of_shapes() const;
     /// Bodies that overlap at a state, by pairs, ascending; h (s): of the step that begins there. What it finds is kept
-    /// for collect_unilateral() of the same state and step. Not those of nodes.
-    void collect_overlaps(const State& state, double h, std::vector<BodyOverlap>& overlaps);
+    /// for collect_unilateral() of the same state and step. Not those of nodes. team: threads that may share the work.
+    void collect_overlaps(const State& state, double h, const sdk::Team& team, std::vector<BodyOverlap>& overlaps);
     /// Whether shapes or nodes could meet, so that contacts are looked for; after finish().
     [[nodiscard]] bool detects_contacts() const;
     /// Rows of joint `index` within all_constraints() and all_multipliers(): first row and count.

@@ -104,6 +104,14 @@ void PositionProjection::make_compliant() {
     }
 }
 
+/// From nothing.
+void PositionProjection::solve(StepSolver& solver, StepReport& report) {
+    solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
+    solution_.lambda.assign(problem_.b.size(), 0.0);
+    report.take(solver.solve(problem_, solution_, {.warm_start = true}));
+    ++report.newton_iterations;
+}
+
 void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
                                  const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
                                  std::string_view method, std::span<const double> late) {
@@ -118,10 +126,7 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     }
     problem_.a.assign(late.begin(), late.end());
     problem_.a.resize(static_cast<std::size_t>(n_));
-    solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
-    solution_.lambda.assign(problem_.b.size(), 0.0);
-    report.take(solver.solve(problem_, solution_, {.warm_start = true}));
-    ++report.newton_iterations;
+    solve(solver, report);
     delta_ = solution_.x;
     for (double& entry : delta_) entry *= h;
     const auto pushed = [](double impulse) { return impulse > 0.0; };
@@ -152,10 +157,7 @@ void PositionProjection::project_velocities(State& end, const SparseMatrix& H, S
     problem_.cones.clear();
     for (const std::int32_t rows : blocks_) problem_.cones.push_back(Cone::free(rows));
     problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
-    solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
-    solution_.lambda.assign(problem_.b.size(), 0.0);
-    report.take(solver.solve(problem_, solution_, {.warm_start = true}));
-    ++report.newton_iterations;
+    solve(solver, report);
     for (std::size_t i = 0; i < end.v.size(); ++i) end.v[i] += solution_.x[i];
 }
 

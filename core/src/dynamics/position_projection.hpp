@@ -32,6 +32,7 @@ public:
 private:
     [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts, bool late);
     void make_compliant();
+    void solve(StepSolver& solver, StepReport& report);
     void require_nearer(const State& begin, const State& end, double h, std::string_view method);
 
     DynamicalSystem& system_;

@@ -378,8 +378,8 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         return guess_.allFinite();
     };
     if (contacts_.may_bounce()) {
-        const Vector smooth = changes_[0].empty() ? without_contacts(begin, h, solver, report) : guess_;
-        contacts_.time_bounces(problem_, {smooth.data(), static_cast<std::size_t>(n_)});
+        smooth_ = changes_[0].empty() ? without_contacts(begin, h, solver, report) : guess_;
+        contacts_.time_bounces(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
     }
     linearize_at_guess();
     if (!found()) return;

@@ -93,6 +93,7 @@ private:
     /// implicit.
     std::array<std::vector<double>, 2> changes_;
     std::vector<char> bounced_;                  ///< by velocity, in this step
+    Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
     Vector result_, back_, linear_;

@@ -204,6 +204,20 @@ void weigh(Body& body, const Compiler& compiler, model_import::Model& model) {
     });
 }
 
+/// Mass, geoms and sites of a body from its frame to another one.
+void move_parts(Body& body, const Frame& to) {
+    const Quaterniond turn(to.linear());
+    body.own = moved(body.own, to);
+    for (Geom& geom : body.geoms) {
+        geom.position = to * geom.position;
+        geom.orientation = (turn * geom.orientation).normalized();
+    }
+    for (Site& site : body.sites) {
+        site.position = to * site.position;
+        site.orientation = (turn * site.orientation).normalized();
+    }
+}
+
 /// Everything that a model with global coordinates has in the world's frame becomes the body's own. world: of bodies.
 void localise(Body& body, const Frame& parent, Frame& own) {
     if (!body.placed && body.has_inertial) {
@@ -216,19 +230,10 @@ void localise(Body& body, const Frame& parent, Frame& own) {
     }
     own = frame_of(body.position, body.orientation);
     const Frame back = own.inverse();
-    const Quaterniond turn(back.linear());
-    body.own = moved(body.own, back);
+    move_parts(body, back);
     for (Joint& joint : body.joints) {
         joint.position = back * joint.position;
         joint.axis = back.linear() * joint.axis;
-    }
-    for (Geom& geom : body.geoms) {
-        geom.position = back * geom.position;
-        geom.orientation = (turn * geom.orientation).normalized();
-    }
-    for (Site& site : body.sites) {
-        site.position = back * site.position;
-        site.orientation = (turn * site.orientation).normalized();
     }
     const Frame local = parent.inverse() * own;
     body.position = local.translation();
@@ -250,16 +255,7 @@ void align(Body& body) {
     const Frame own = frame_of(body.position, body.orientation) * inertial;
     body.position = own.translation();
     body.orientation = Quaterniond(own.linear()).normalized();
-    body.own = moved(body.own, back);
-    const Quaterniond other(back.linear());
-    for (Geom& geom : body.geoms) {
-        geom.position = back * geom.position;
-        geom.orientation = (other * geom.orientation).normalized();
-    }
-    for (Site& site : body.sites) {
-        site.position = back * site.position;
-        site.orientation = (other * site.orientation).normalized();
-    }
+    move_parts(body, back);
 }
 
 void finish_joint(Joint& joint, const Compiler& compiler, model_import::Model& model) {

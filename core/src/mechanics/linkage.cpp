@@ -379,33 +379,22 @@ Eigen::VectorXd lengths_of_rows(const Eigen::SparseMatrix<double, Eigen::RowMajo
 
 }  // namespace
 
-Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& value, Metric metric,
-                                  double threshold) const {
+// With some velocities alone A z = −c has a solution or not: then z makes |A z + c| least. Rows that repeat each other
+// make A Aᵀ singular, and columns Aᵀ A; a small diagonal leaves the solution within their span.
+Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& value, Metric metric, double threshold,
+                                  const Eigen::VectorXd* marks) const {
     Eigen::SparseMatrix<double, Eigen::RowMajor> A = scaled(values, metric);
     const Eigen::VectorXd lengths = lengths_of_rows(A);
     A = lengths.cwiseInverse().asDiagonal() * A;
+    if (marks) A = A * marks->asDiagonal();
     const Eigen::VectorXd b = -value.cwiseQuotient(lengths);
     if (rows_.size() <= most_dense_rows) return unscaled(least_solution(A, b, threshold), metric);
-    // Rows that repeat each other make A Aᵀ singular; a small diagonal leaves the solution within their span.
+    const Eigen::SparseMatrix<double, Eigen::RowMajor> At = A.transpose();
+    Eigen::SparseMatrix<double> G = marks ? At * A : A * At;
     constexpr double shift = 1e-12;
-    Eigen::SparseMatrix<double> G = A * Eigen::SparseMatrix<double, Eigen::RowMajor>(A.transpose());
     for (Eigen::Index i = 0; i < G.rows(); ++i) G.coeffRef(i, i) += shift;
     const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(G);
-    return unscaled(A.transpose() * factor.solve(b), metric);
-}
-
-/// The shortest change, in the mass metric, of the velocities marked by 1 that brings values of rows nearest to 0.
-Eigen::VectorXd Linkage::nearest(const Values& values, const Eigen::VectorXd& value,
-                                 const Eigen::VectorXd& marks) const {
-    Eigen::SparseMatrix<double, Eigen::RowMajor> A = scaled(values, Metric::Mass);
-    const Eigen::VectorXd lengths = lengths_of_rows(A);
-    A = lengths.cwiseInverse().asDiagonal() * A * marks.asDiagonal();
-    const Eigen::VectorXd b = -value.cwiseQuotient(lengths);
-    if (rows_.size() <= most_dense_rows) return unscaled(least_solution(A, b, singular), Metric::Mass);
-    constexpr double shift = 1e-12;
-    Eigen::SparseMatrix<double> G = Eigen::SparseMatrix<double>(A.transpose()) * Eigen::SparseMatrix<double>(A);
-    for (Eigen::Index i = 0; i < G.rows(); ++i) G.coeffRef(i, i) += shift;
-    return unscaled(Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(G).solve(A.transpose() * b), Metric::Mass);
+    return unscaled(marks ? Eigen::VectorXd(factor.solve(At * b)) : Eigen::VectorXd(At * factor.solve(b)), metric);
 }
 
 // ---- Assembly ----
@@ -476,7 +465,8 @@ Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<s
         Eigen::VectorXd follows(n);
         for (Eigen::Index i = 0; i < n; i += 3)
             follows.segment<3>(i).setConstant(v.segment<3>(i).isZero(0.0) ? 1.0 : 0.0);
-        if (follows.minCoeff() < 1.0) v += nearest(values, values.J * v + values.rate, follows);
+        if (follows.minCoeff() < 1.0)
+            v += shortest(values, values.J * v + values.rate, Metric::Mass, singular, &follows);
     }
     const Eigen::VectorXd given = v;
     for (int pass = 0; pass < 3; ++pass)  // the later ones remove what rounding left

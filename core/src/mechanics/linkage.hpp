@@ -119,10 +119,9 @@ private:
     [[nodiscard]] Eigen::SparseMatrix<double, Eigen::RowMajor> scaled(const Values& values, Metric metric) const;
     [[nodiscard]] Eigen::VectorXd unscaled(const Eigen::VectorXd& change, Metric metric) const;
     /// The shortest change in the metric with C_q change = −value; directions below the threshold are left alone.
+    /// marks: 1 of entries that may change, else 0; then C_q change comes as near to −value as they let it.
     [[nodiscard]] Eigen::VectorXd shortest(const Values& values, const Eigen::VectorXd& value, Metric metric,
-                                           double threshold) const;
-    [[nodiscard]] Eigen::VectorXd nearest(const Values& values, const Eigen::VectorXd& value,
-                                          const Eigen::VectorXd& marks) const;
+                                           double threshold, const Eigen::VectorXd* marks = nullptr) const;
     void increment(State& state, const Eigen::VectorXd& change) const;
     /// Gauss–Newton iterations, at most so many.
     Residual settle(State& state, const std::vector<std::size_t>& rows, Metric metric, double threshold,

@@ -266,6 +266,8 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
     [[nodiscard]] Pose pose_of(std::size_t body, const State& state) const;
     /// The poses of all that collides, for the detector.
+    /// place(), and bodies with a given motion as they move in a step of length h (s).
+    void place_for_step(const State& state, double h);
     void place_shapes(const State& state);
     /// displacements ← of a step of length h (s).
     void predict_displacements(double h, const State& state);

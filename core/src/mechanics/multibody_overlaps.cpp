@@ -19,18 +19,17 @@ bool MultibodySystem::Implementation::is_detected() const {
                       detected.displacements.end(), same_displacement);
 }
 
-void MultibodySystem::collect_overlaps(const State& state, double h, std::vector<BodyOverlap>& overlaps) {
+void MultibodySystem::collect_overlaps(const State& state, double h, const sdk::Team& team,
+                                       std::vector<BodyOverlap>& overlaps) {
     auto& self = *implementation_;
     self.must_be_finished();
     overlaps.clear();
     if (!self.detector) return;
-    self.place(state);
-    for (const auto index : self.prescribed)
-        self.bodies[static_cast<std::size_t>(index)].prescribed->place_for_step(state.t, h, self.at[index]);
+    self.place_for_step(state, h);
     self.place_shapes(state);
     self.predict_displacements(h, state);
     if (!self.is_detected()) {
-        self.detector->detect(self.poses, self.envelope, self.detected.contacts, {}, self.displacements);
+        self.detector->detect(self.poses, self.envelope, self.detected.contacts, team, self.displacements);
         self.detected.poses = self.poses;
         self.detected.displacements = self.displacements;
     }

@@ -76,9 +76,7 @@ bool MultibodySystem::has_unilateral() const {
 void MultibodySystem::collect_unilateral(const State& state, double h, UnilateralRows& rows) {
     auto& self = *implementation_;
     rows.clear();
-    self.place(state);
-    for (const auto index : self.prescribed)
-        self.bodies[static_cast<std::size_t>(index)].prescribed->place_for_step(state.t, h, self.at[index]);
+    self.place_for_step(state, h);
     self.collect_limits(h, rows);
     self.collect_motors(state.t + h, rows);
     self.collect_frictions(rows);
@@ -99,6 +97,12 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
         self.collect_contacts(h, rows);
     }
     if (self.mesh_touching) self.collect_mesh_contacts(state, h, rows);
+}
+
+void MultibodySystem::Implementation::place_for_step(const State& state, double h) {
+    place(state);
+    for (const auto index : prescribed)
+        bodies[static_cast<std::size_t>(index)].prescribed->place_for_step(state.t, h, at[index]);
 }
 
 void MultibodySystem::Implementation::place_shapes(const State& state) {

@@ -64,7 +64,7 @@ using TakeStep = std::function<void(State& state, double h, StepReport& report)>
 
 /// After a step of size h from `begin` was too long for the timestepper: twice as many parts until it can take them
 /// all; how many. memory: the timestepper's at `begin`. Throws StepFailure, with the sentence of `failure`, where 64
-/// parts are too long as well; StepTooDeep where they leave bodies in one another, or shorter ones would.
+/// parts are too long as well; StepTooDeep where those leave bodies in one another.
 DELASSUS_API std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const State& begin,
                                         const std::vector<double>& memory, double h, State& state, StepReport& report,
                                         const StepTooLong& failure);

@@ -11,7 +11,7 @@ namespace delassus {
 namespace {
 
 std::string quoted_name(const MultibodySystem& system, BodyIndex body) {
-    return body == world_body ? "of the world" : fmt::format("\"{}\"", system.body(body).name);
+    return fmt::format("\"{}\"", body == world_body ? "world" : system.body(body).name);
 }
 
 }  // namespace
@@ -24,9 +24,9 @@ double OverlapWatch::depth_before(const BodyOverlap& pair) const {
     return found != before_.end() && found->a == pair.a && found->b == pair.b ? found->depth : 0.0;
 }
 
-void OverlapWatch::require_within(const State& state, double h) {
+void OverlapWatch::require_within(const State& state, double h, const sdk::Team& team) {
     constexpr double share_of_thickness = 0.1;
-    system_.collect_overlaps(state, h, now_);
+    system_.collect_overlaps(state, h, team, now_);
     const BodyOverlap* worst = nullptr;
     double beyond = 1.0, grown = 0.0;
     for (const BodyOverlap& pair : now_) {

@@ -33,9 +33,11 @@ public:
     OverlapWatch(MultibodySystem& system, double accuracy) : system_(system), accuracy_(accuracy) {}
 
     /// Notes the overlaps at the beginning of a step of size h, of the bodies.
-    void begin(const State& state, double h) { system_.collect_overlaps(state, h, before_); }
+    void begin(const State& state, double h, const sdk::Team& team = {}) {
+        system_.collect_overlaps(state, h, team, before_);
+    }
     /// Throws StepTooDeep if they have grown too much at the end of it. h: of the next step.
-    void require_within(const State& state, double h);
+    void require_within(const State& state, double h, const sdk::Team& team = {});
     /// They come to overlap however short the steps: they are not watched until they have come apart.
     void give_up(std::pair<BodyIndex, BodyIndex> bodies) { given_up_.insert(bodies); }
     /// After a step that was within.

@@ -272,105 +272,6 @@ bool Simulation::finished() const {
     return system_->control ? t >= system_->end : has_ended(t, system_->end, system_->step);
 }
 
-bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
-    State bodies;
-    if (overlaps_) overlaps_->begin(bodies_at(state, bodies), report.h);
-    const auto take = [&](State& moved, double h, StepReport& part) {
-        solver_->forget_misses();
-        take_step(moved, h, part);
-        solver_->require_usable();
-        if (overlaps_) overlaps_->require_within(bodies_at(moved, bodies), h);
-    };
-    record_.parts = 1;
-    try {
-        take(state, report.h, report.step);
-    } catch (const StepTooLong& failure) {
-        try {
-            record_.parts =
-                step_in_parts(*timestepper_, take, now_.state, memory, report.h, state, report.step, failure);
-        } catch (const StepTooDeep& deep) {
-            overlaps_->give_up(deep.bodies());
-            if (deep_.empty()) deep_ = deep.what();
-            return false;
-        }
-    }
-    return true;
-}
-
-void Simulation::advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
-    if (system_->control) {
-        report = control_->step(state, system_->end, *solver_);
-        return;
-    }
-    const FixedStep step = fixed_step(state.t, system_->end, system_->step);
-    report.h = step.h;
-    if (sleeping_) sleeping_->begin_step(report.h);
-    record_.parts = 1;
-    if (ahead_) {
-        advance_ahead(state, step.end, report.step);
-    } else if (control_) {
-        record_.parts = step_within_error(*control_, state, step.end, *solver_, report.step).taken;
-    } else {
-        while (!advance_fixed(state, report, memory)) {
-            state = now_.state;
-            timestepper_->restart();
-            timestepper_->load(memory);
-        }
-        if (overlaps_) overlaps_->end();
-    }
-    state.t = step.end;
-    if (sleeping_) sleeping_->end_step(now_.state, state);
-}
-
-// Where a step has leapt over a place at which constraints lose rank, its way cannot be returned to them, and one ends
-// at the state shown. If none can, as where that is the place itself, it is shown as the way has it.
-void Simulation::show_ahead(State& state, double end, StepReport& report) {
-    StepReport shown;
-    try {
-        solver_->forget_misses();
-        ahead_->show(end, state, *solver_, shown);
-        solver_->require_usable();
-        shown.follow(report);
-        std::swap(report, shown);
-        return;
-    } catch (const StepFailure&) {
-        state = now_.state;
-    }
-    const std::vector<double> memory = timestepper_->save(), control = control_->save();
-    try {
-        timestepper_->restart();
-        control_->set_largest(system_->step);
-        record_.parts = step_within_error(*control_, state, end, *solver_, shown).taken;
-        std::swap(report, shown);
-        state.t = end;
-        ahead_->begin(state);
-    } catch (const StepFailure&) {
-        timestepper_->restart();
-        timestepper_->load(memory);
-        control_->load(control);
-        ahead_->read(end, state);
-        std::vector<double> off(static_cast<std::size_t>(dynamics().m()));
-        dynamics().constraint(state, off.data());
-        const double limit = timestepper_->error_limit();
-        if (std::any_of(off.begin(), off.end(), [limit](double C) { return !(std::abs(C) <= limit); })) throw;
-    }
-}
-
-void Simulation::advance_ahead(State& state, double end, StepReport& report) {
-    report.clear();
-    std::int64_t parts = 0;
-    while (!ahead_->reaches(end)) {
-        AdaptiveStepReport part =
-            ahead_->advance(end, bodies_at(ahead_->front(), next_bodies_), *timestepper_, *control_, *solver_);
-        if (!ahead_->cut_by_corner()) ++parts;
-        part.step.follow(report);
-        std::swap(report, part.step);
-    }
-    record_.parts = std::max<std::int64_t>(parts, 1);
-    show_ahead(state, end, report);
-    report.multipliers.clear();
-}
-
 void Simulation::measure(const State& state, std::int64_t step) {
     const MultibodySystem& mechanics = *system_->system;
     record_.step = step;
@@ -407,11 +308,6 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
             "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
             "damps (limits.energy_growth: {:.3g})",
             totals.start_energy, record_.energy, scale, taken.h, system_->integrator, limits.energy_growth));
-}
-
-void Simulation::take_step(State& state, double h, StepReport& report) {
-    if (!shared_) return timestepper_->step(state, h, *solver_, report);
-    shared_->step(state, h, *timestepper_, *solver_, report);
 }
 
 const StepRecord& Simulation::step() {
