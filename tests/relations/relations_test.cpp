@@ -102,6 +102,21 @@ TEST(SceneDocument, IsReadAsItWasWritten) {
     }
 }
 
+TEST(SceneDocument, OfAFileThatSomebodyWroteHasItsSystems) {
+    const tests::ScratchFolder folder;
+    const fs::path file = folder / "scene.yaml";
+    std::ofstream(file) << "title: two\nsystems:\n  a: &a {step: 0.01, end: 0.2, bodies: [{name: ball, mass: 1}]}\n"
+                           "  b: {step: 0.02, end: 0.2, gravity: [0, 0, -1], bodies: [{name: ball, mass: 1, position: "
+                           "[1, 2, 3]}]}\n";
+    const auto systems = relations::read_systems(file);
+    ASSERT_EQ(systems.size(), 2);
+    EXPECT_EQ(systems[0].name, "a");
+    EXPECT_EQ(judged(systems[0].scene).at("placed").verdict, Verdict::Held);
+    EXPECT_EQ(judged(systems[1].scene).at("units").verdict, Verdict::Held);
+    std::ofstream(file) << "end: 1\ntolerance: 1e-6\nbodies: []\n";
+    EXPECT_THROW((void)relations::read_systems(file), InputError);
+}
+
 TEST(Relations, HoldForAPendulum) {
     const auto outcomes = judged(scene_of(pendulum));
     for (const char* name : {"sound", "placed", "units", "order", "pieces", "refined", "coordinates", "cut"})
@@ -116,6 +131,7 @@ step: 0.01
 end: 0.5
 gravity: [0, 0, 0]
 integrator: euler_explicit
+accuracy: 0.1
 bodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}, position: [1, 0, 0], velocity: [1, 0, 0]}]
 springs: [{name: s, first: world, second: b, first_point: [0, 0, 0], second_point: [1, 0, 0], stiffness: 4}]
 )"));

@@ -35,6 +35,53 @@ TEST(PlainMotion, ADiscThatRollsKeepsItsTilt) {
     EXPECT_NEAR(std::acos(1.0 - 2.0 * (x * x + y * y)), tilt, 0.01);
 }
 
+// The method gains energy there, by h² of it a second: parts of steps keep it within the accuracy of the run.
+TEST(PlainMotion, ADiscThatRollsGainsNoEnergy) {
+    const std::string disc =
+        "step: 0.0013\nend: {}\nmaterials: {{m: {{friction: 0.8}}}}\nbodies:\n"
+        "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+        "- {{name: disc, mass: 0.1, position: [0, 0, 0.02179947027021298], orientation: {{axis: [0, 1, 0], angle: "
+        "20}}, "
+        "angular_velocity: [-16.58310824355091, 0, 1.658310824355091], shapes: [{{cylinder: {{radius: 0.05, length: "
+        "0.01}}, material: m}}]}}\n";
+    for (const double end : {1.0, 5.0}) {
+        SCOPED_TRACE(end);
+        auto run = run_of(fmt::format(fmt::runtime(disc), end));
+        const double start = run.simulation.record().energy, moves = run.simulation.record().kinetic;
+        run.finish();
+        EXPECT_LT(run.simulation.totals().growth, 1e-3 * moves);
+        EXPECT_LT(run.simulation.record().energy - start, 1e-3 * moves);
+        EXPECT_EQ(run.simulation.warnings(), std::vector<std::string>());
+    }
+    // Whoever names a method has its steps, and is told.
+    auto named = run_of("integrator: linearly_implicit_trapezoidal\n" + fmt::format(fmt::runtime(disc), 5.0));
+    named.finish();
+    EXPECT_EQ(named.simulation.totals().divided_steps, 0);
+    ASSERT_EQ(named.simulation.warnings().size(), 1);
+    EXPECT_NE(named.simulation.warnings()[0].find("the energy rose by up to"), std::string::npos);
+}
+
+// The third impact of a box falls on the end of a step but for rounding: it bounces in that step or in the next, and
+// flies on alike.
+TEST(PlainMotion, AnImpactAtTheEndOfAStepBouncesOnce) {
+    const double g = 100.0, third = 0.55, speed = 1.25;
+    for (const double higher : {-3e-11, 0.0, 3e-11}) {
+        SCOPED_TRACE(higher);
+        auto run = run_of(fmt::format(
+            "step: {}\nend: 0.57\ngravity: [0, 0, -{}]\nmaterials: {{m: {{friction: 0.2, restitution: "
+            "0.5}}}}\nbodies:\n"
+            "- {{name: floor, fixed: true, position: [0, 0, -1], shapes: [{{box: {{size: [20, 20, 2]}}, material: "
+            "m}}]}}\n"
+            "- {{name: box, mass: 1, position: [0, 0, {:.17g}], orientation: {{axis: [0, 0, 1], angle: 15}}, "
+            "shapes: [{{box: {{size: [1, 1, 1]}}, material: m}}]}}\n",
+            1.0 / 60.0, g, 2.5 + higher));
+        run.finish();
+        const double t = run.simulation.state().t - third;
+        EXPECT_NEAR(run.pose("box").position[2] - 0.5, (speed - 0.5 * g * t) * t, 1e-8);
+        EXPECT_NEAR(run.velocities("box")[0][2], speed - g * t, 1e-6);
+    }
+}
+
 TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     auto run = run_of(
         "step: 0.0017\nend: 6\nmaterials: {m: {friction: 1}}\nbodies:\n"
@@ -92,6 +139,22 @@ TEST(PlainMotion, ThinPlatesDoNotGoThroughOneAnother) {
     EXPECT_GT(run.pose("two").position[2], 0.0);
 }
 
+TEST(PlainMotion, OverlapsOfTheStartAreNamed) {
+    const auto warnings = [](double height) {
+        auto run = run_of(fmt::format(
+            "step: 0.01\nend: 0.1\nbodies:\n- {{name: ground, fixed: true, shapes: [{{plane: {{}}}}]}}\n"
+            "- {{name: cube, mass: 1, position: [0, 0, {}], shapes: [{{box: {{size: [0.2, 0.2, 0.2]}}}}]}}\n",
+            height));
+        run.finish();
+        return run.simulation.warnings();
+    };
+    EXPECT_TRUE(warnings(0.0999).empty());
+    const auto deep = warnings(0.09);
+    ASSERT_EQ(deep.size(), 1);
+    EXPECT_NE(deep[0].find("bodies \"ground\" and \"cube\" overlap by 0.01 m at the start, and"), std::string::npos)
+        << deep[0];
+}
+
 TEST(PlainMotion, OverlapsThatGrowAreNamed) {
     auto scene = parse_scene(
         "step: 0.01\nend: 1\nbodies:\n"
@@ -99,8 +162,9 @@ TEST(PlainMotion, OverlapsThatGrowAreNamed) {
         "- {name: cube, mass: 1, position: [0, 0, 0.1], shapes: [{box: {size: [0.2, 0.2, 0.2]}}]}\n",
         "s");
     MultibodySystem& system = *scene.systems[0].system;
-    OverlapWatch watch(system, 1e-3);
     State state = system.initial_state();
+    OverlapWatch watch(system, 1e-3, state, 0.01);
+    EXPECT_EQ(watch.at_start(), "");
     const auto lowered = [&](double depth) {
         State moved = state;
         moved.q[2] -= depth;

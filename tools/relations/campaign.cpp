@@ -187,8 +187,12 @@ CampaignCounts run_campaign(const Campaign& campaign, OutputFolder& output,
 FileAnswer judge_file(const ApartSettings& settings, const std::filesystem::path& file,
                       const std::vector<std::string>& only) {
     FileAnswer result;
-    judge_documents(settings, {read_document(file)}, only, [&](const ScenesAnswer& answer) {
+    const auto systems = read_systems(file);
+    std::vector<Json> documents;
+    for (const auto& system : systems) documents.push_back(system.scene);
+    judge_documents(settings, documents, only, [&](const ScenesAnswer& answer) {
         for (const auto& told : answer.outcomes) {
+            if (systems.size() > 1) result.text += systems[answer.number].name + ": ";
             result.text +=
                 fmt::format("{}: {}{}{}\n", told.relation, told.verdict, told.detail.empty() ? "" : ": ", told.detail);
             result.violated += told.verdict == name_of(Verdict::Violated) ? 1 : 0;

@@ -125,6 +125,25 @@ Json read_document(const std::filesystem::path& file) {
     }
 }
 
+std::vector<SystemDocument> read_systems(const std::filesystem::path& file) {
+    const Json document = read_document(file);
+    std::vector<SystemDocument> result;
+    if (document.is_object() && document.contains("systems"))
+        for (const auto& [name, system] : document["systems"].items()) result.push_back({name, system});
+    else
+        result.push_back({"main", document});
+    for (auto& [name, scene] : result) {
+        if (!scene.is_object() || !scene.contains("step") || !scene.contains("bodies"))
+            throw InputError(fmt::format(
+                "{}: system \"{}\": relations compare bodies in fixed steps; \"bodies\" and \"step\" are needed",
+                file.string(), name));
+        if (!scene.contains("gravity")) scene["gravity"] = Json::array({0.0, 0.0, -9.81});
+        for (auto& body : scene["bodies"])
+            if (!body.contains("position")) body["position"] = Json::array({0.0, 0.0, 0.0});
+    }
+    return result;
+}
+
 bool moves(const Json& body) {
     return !body.value("fixed", false) && !body.contains("motion");
 }

@@ -25,6 +25,15 @@ inline constexpr std::array<std::string_view, 9> list_keys = {
 /// The inverse. Throws InputError if the file is absent or no YAML.
 [[nodiscard]] Json read_document(const std::filesystem::path& file);
 
+struct SystemDocument {
+    std::string name;  ///< "main" in a file of one system
+    Json scene;
+};
+
+/// The systems of a file that somebody wrote, each as a scene of its own, with what relations change written out where
+/// the file leaves it to the default. Throws InputError as read_document does, and for a system of variable steps.
+[[nodiscard]] std::vector<SystemDocument> read_systems(const std::filesystem::path& file);
+
 /// Whether the scene moves the body: it is neither fixed nor kinematic.
 [[nodiscard]] bool moves(const Json& body);
 

@@ -100,6 +100,9 @@ void scale_motion(Json& motion, double value, double time) {
         } else if (form == "ramp") {
             for (const char* key : {"from", "to"}) scale(parts, key, value);
             for (const char* key : {"start", "duration"}) scale(parts, key, time);
+        } else if (form == "table") {
+            scale(parts, "values", value);
+            scale(parts, "times", time);
         }
     }
 }

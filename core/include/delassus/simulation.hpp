@@ -60,8 +60,10 @@ struct SimulationTotals {
     double start_kinetic = 0.0;               ///< J
     double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
     double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
-    double growth = 0.0;                      ///< largest rise of the energy above its start and `recovered`, J
-    double growth_share = 0.0;  ///< largest growth over the energy that can have moved (running.md); 0: not judged
+    double start_overlap = 0.0;  ///< what is left of the deepest overlap of the start, m; 0 once it has not shrunk
+    double credit = 0.0;         ///< rise of the energy while the overlaps of the start shrank, J
+    double growth = 0.0;         ///< largest rise of the energy above its start and `credit`, J
+    double growth_share = 0.0;   ///< largest growth over the energy that can have moved (running.md); 0: not judged
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
     double worst_linearization = 0.0;
     std::int64_t most_contacts = 0;
@@ -96,6 +98,7 @@ struct SimulationState {
 };
 
 class EnergyGuard;
+class EnergyWatch;
 class OverlapWatch;
 class LookAhead;
 class SharedRun;
@@ -238,6 +241,7 @@ private:
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next
     std::vector<double> constraint_;
     std::unique_ptr<EnergyGuard> guard_;
+    std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or steps follow from errors
     std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or steps follow from their errors
     std::string deep_;                        // of this step: what came to overlap whatever its parts; or empty
     std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies

@@ -72,7 +72,7 @@ namespace delassus {
 //
 // with the recovery speed η. Then u⁻ = −g/(θ h) from the step before, and for θ = ½ the gap is gone in one step
 // (dynamics/theta_method.cpp has the same for constraints). u⁻ counts up to that size; more of it is a contact that
-// closes, and b = 0.
+// closes, and b = 0. A contact that bounced in the step before, and opens faster than a gap or η explains, is open.
 //
 // ---- Energy ----
 //
@@ -249,7 +249,8 @@ double VelocityContacts::set_servo(std::uint64_t key, Contact& contact) const {
     throw InputError("a system gave a row with a compliance within a step that it had not at its beginning");
 }
 
-/// Whether rows of rows_ are those of before_, but for a turn that a smooth motion explains.
+/// Whether rows of rows_ are those of before_, but for a turn that a smooth motion explains. Rows act on lengths and
+/// angles alike; what they change in velocities, H⁻¹ Dᵀ, compares these in any units (H by its diagonal_).
 bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const {
     double change = 0.0, size = 0.0;
     for (std::int32_t i = 0; i < rows; ++i) {
@@ -260,9 +261,10 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
         while (e < e_end || f < f_end) {
             const bool now = e < e_end && (f == f_end || rows_.column()[e] <= before_.column()[f]);
             const bool then = f < f_end && (e == e_end || before_.column()[f] <= rows_.column()[e]);
+            const double H = diagonal_[static_cast<std::size_t>(now ? rows_.column()[e] : before_.column()[f])];
             const double a = now ? rows_.value()[e++] : 0.0, b = then ? before_.value()[f++] : 0.0;
-            change += (a - b) * (a - b);
-            size += a * a;
+            change += (a - b) * (a - b) / H;
+            size += a * a / H;
         }
     }
     return change <= largest_turn_squared * size;
@@ -278,11 +280,11 @@ void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& c
         contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
                                 : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
         if (closes) contact.turns = contact.turns && contact.pushed;
-    } else if (settings_.once && (gap <= 0.0 || contact.pushed)) {
+    } else if (settings_.once && (gap <= 0.0 || contact.pushed) && !contact.left) {
         const double wanted = gap + std::clamp(drift, -std::abs(gap), std::abs(gap));
         contact.normal = std::max(wanted / (2.0 * theta_ * h_), -settings_.recovery_speed);
         contact.recovery = std::max(-contact.normal, 0.0);
-    } else if (gap > 0.0) {
+    } else if (gap > 0.0 || contact.left) {
         contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_);
     }
 }
@@ -300,6 +302,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     problem.cones.resize(cone + rows_.blocks().size());
     problem.b.resize(first_row_ + rows_.rows().size(), 0.0);
     lambda.resize(problem.b.size(), 0.0);
+    if (!rows_.blocks().empty()) diagonal_of(problem.H, diagonal_);
     for (std::size_t k = 0; k < rows_.blocks().size(); ++k) {
         const auto& block = rows_.blocks()[k];
         const auto size = static_cast<std::size_t>(block.cone.rows);
@@ -319,12 +322,17 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.known = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
-            contact.turns =
-                (contact.pushed || !contact.along_normal) && nearly_equal(row, before->row, block.cone.rows);
         } else {
             contact.gap = rows_.rows()[row].gap - theta_ * h_ * block.speed;
             contact.approach = -block.speed;
         }
+        const double opening = -contact.approach;
+        contact.left = settings_.once && block.restitution > 0.0 && opening > settings_.recovery_speed &&
+                       (1.0 - theta_) * h_ * opening > std::abs(contact.gap);
+        contact.pushed = contact.pushed && !contact.left;
+        if (before)
+            contact.turns =
+                (contact.pushed || !contact.along_normal) && nearly_equal(row, before->row, block.cone.rows);
         const auto entry = static_cast<std::size_t>(rows_.row_start()[row]);
         const auto entries = static_cast<std::size_t>(rows_.row_start()[row + 1]) - entry;
         contact.resolution =
@@ -402,12 +410,13 @@ void VelocityContacts::set_sliding_term(Contact& contact, double wanted, double 
 }
 
 // An interior point leaves impulses above 0 where nothing pushes: they change the speed of their row by next to nothing
-// beside the speed with which it opens.
+// beside the speed with which it opens, or beside all momentum, both as velocities in the norm of H (by its diagonal).
 void VelocityContacts::drop_negligible(const Problem& problem, Solution& solution) {
     constexpr double share = 1e-6, share_of_momentum = 1e-9;
     double scale = 0.0;
-    for (const double momentum : problem.a) scale = std::max(scale, std::abs(momentum));
     diagonal_of(problem.H, diagonal_);
+    for (std::size_t i = 0; i < problem.a.size(); ++i) scale += problem.a[i] * problem.a[i] / diagonal_[i];
+    scale = std::sqrt(scale);
     const auto& D = problem.D;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
@@ -424,7 +433,7 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
         double* impulse = solution.lambda.data() + first;
         contact.end_speed = speed + rows_.rows()[contact.row].rate;
         contact.change = mobility * impulse[0];
-        if (impulse[0] <= share_of_momentum * scale || contact.change <= share * opening)
+        if (impulse[0] * std::sqrt(mobility) <= share_of_momentum * scale || contact.change <= share * opening)
             std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
     }
 }

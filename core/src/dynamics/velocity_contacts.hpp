@@ -134,6 +134,7 @@ private:
         double recovery = 0.0;    ///< speed with which it is pushed apart
         const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
         bool pushed = false;                         ///< in the step before
+        bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool bounces = false;                        ///< b has restitution
         std::optional<Bounce> bounce;                ///< `once`: it bounces at a time within the step
 

@@ -5,6 +5,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/simulation.hpp"
+#include "simulation/energy_guard.hpp"
 #include "simulation/fixed_step.hpp"
 #include "simulation/look_ahead.hpp"
 #include "simulation/overlap_watch.hpp"
@@ -16,11 +17,15 @@ namespace delassus {
 bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
     const sdk::Team team = solver_->team();
     if (overlaps_) overlaps_->begin(bodies_at(state, next_bodies_), report.h, team);
+    if (energy_) energy_->begin(now_.totals, state.t, report.h);
+    const double end = state.t + report.h;
     const auto take = [&](State& moved, double h, StepReport& part) {
         solver_->forget_misses();
         take_step(moved, h, part);
         solver_->require_usable();
         if (overlaps_) overlaps_->require_within(bodies_at(moved, next_bodies_), h, team);
+        if (energy_ && moved.t > end - 0.5 * h)
+            energy_->require_within(system_->system->energy(bodies_at(moved, next_bodies_)), h);
     };
     try {
         take(state, report.h, report.step);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "delassus/simulation.hpp"
+#include "simulation/fixed_step.hpp"
 
 namespace delassus {
 namespace {
@@ -57,6 +58,26 @@ double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) c
     const double square = longest_step * longest_step;
     const double floor = fall_ * square + digits_ / square + 1e-10 * std::abs(totals.start_energy);
     return std::max(available, floor);
+}
+
+void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
+    const double budget = accuracy_ * guard_.scale(totals, std::max(totals.largest_step, h));
+    h_ = h;
+    start_ = totals.start_energy + totals.credit;
+    before_ = std::max(totals.growth, 0.0);
+    last_taken_ = HUGE_VAL;
+    allowed_ = before_ < budget && totals.start_overlap == 0.0 && guard_.watches(totals)
+                   ? std::max(0.5 * budget, before_ + (budget - before_) * std::min(h / (system_.end - t), 1.0))
+                   : HUGE_VAL;
+}
+
+void EnergyWatch::require_within(double energy, double h) {
+    constexpr double helps = 0.7;
+    const double growth = energy - start_;
+    const bool shortest = h < 1.5 * h_ / static_cast<double>(most_parts);
+    if (growth <= allowed_ || growth - before_ > helps * last_taken_ || shortest) return;
+    last_taken_ = growth - before_;
+    throw StepTooLong("the energy grows by more than the accuracy allows, though nothing supplies any");
 }
 
 }  // namespace delassus

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "delassus/scene.hpp"
+#include "delassus/timestepper.hpp"
 
 namespace delassus {
 
@@ -37,6 +38,35 @@ private:
     bool dissipates_;  // contacts, stops, friction or damping can take energy
     double fall_;      // ½ ‖2 g‖²_M, of a step of 1 s
     double digits_;    // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
+};
+
+// A growth G of the energy below that is an error all the same, and the part of it that does not come back adds up over
+// a run. All of it may come to B = accuracy · max(A, floor) until the time T at which the run ends. Half of B is free,
+// for what comes and goes; of the rest a step may take the share of the time that is left:
+//
+//     G⁺ ≤ max(B/2, G + (B − G) h/(T − t)),      G: the largest growth up to now
+//
+// A step that takes more is too long and goes in parts, each halving of which lowers what it takes by 2ᵖ for a method
+// of order p. Where a halving leaves more than 0.7 of it, as where an impact gives energy, parts do not help and the
+// step counts as it is, and so do all once B is used up.
+class EnergyWatch {
+public:
+    /// All outlive it. accuracy: a share, > 0.
+    EnergyWatch(const EnergyGuard& guard, const SceneSystem& system, double accuracy)
+        : guard_(guard), system_(system), accuracy_(accuracy) {}
+
+    /// Before a step of size h from t.
+    void begin(const SimulationTotals& totals, double t, double h);
+    /// After it, or after the last of its parts, of size h: throws StepTooLong if the step takes more than its share,
+    /// and shorter parts may take less.
+    void require_within(double energy, double h);
+
+private:
+    const EnergyGuard& guard_;
+    const SceneSystem& system_;
+    double accuracy_;
+    double h_ = 0.0, start_ = 0.0, before_ = 0.0, allowed_ = 0.0;
+    double last_taken_ = 0.0;  // by the trial before, of this step
 };
 
 }  // namespace delassus

@@ -24,10 +24,9 @@ Parts step_within_error(AdaptiveStepping& control, State& state, double end, Ste
 std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const State& begin,
                            const std::vector<double>& memory, double h, State& state, StepReport& report,
                            const StepTooLong& failure) {
-    constexpr std::int64_t most = 64;
     // Where rounding makes more of the linear model's error than this, nobody knows whether parts are short enough.
     constexpr double most_rounding = 0.1;
-    for (std::int64_t parts = 2; parts <= most; parts *= 2) {
+    for (std::int64_t parts = 2; parts <= most_parts; parts *= 2) {
         state = begin;
         timestepper.restart();
         timestepper.load(memory);
@@ -42,11 +41,11 @@ std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const
             }
             return parts;
         } catch (const StepTooDeep&) {
-            if (parts == most) throw;
+            if (parts == most_parts) throw;
         } catch (const StepTooLong&) {
         }
     }
-    throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most));
+    throw StepFailure(fmt::format("{}; {} parts of it are too long as well", failure.what(), most_parts));
 }
 
 }  // namespace delassus

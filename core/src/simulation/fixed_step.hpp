@@ -50,6 +50,9 @@ inline constexpr double shortest_part = 1e-6;
     return {.absolute = limit, .initial = h, .smallest = shortest_part * h, .largest = h};
 }
 
+/// Into which a step is divided, at most, where its method cannot take it.
+inline constexpr std::int64_t most_parts = 64;
+
 struct Parts {
     std::int64_t taken = 0;
     std::int32_t rejected = 0;  ///< trials that were thrown away
@@ -63,8 +66,8 @@ DELASSUS_API Parts step_within_error(AdaptiveStepping& control, State& state, do
 using TakeStep = std::function<void(State& state, double h, StepReport& report)>;
 
 /// After a step of size h from `begin` was too long for the timestepper: twice as many parts until it can take them
-/// all; how many. memory: the timestepper's at `begin`. Throws StepFailure, with the sentence of `failure`, where 64
-/// parts are too long as well; StepTooDeep where those leave bodies in one another.
+/// all; how many. memory: the timestepper's at `begin`. Throws StepFailure, with the sentence of `failure`, where
+/// most_parts are too long as well; StepTooDeep where those leave bodies in one another.
 DELASSUS_API std::int64_t step_in_parts(Timestepper& timestepper, const TakeStep& take, const State& begin,
                                         const std::vector<double>& memory, double h, State& state, StepReport& report,
                                         const StepTooLong& failure);

@@ -16,6 +16,29 @@ std::string quoted_name(const MultibodySystem& system, BodyIndex body) {
 
 }  // namespace
 
+OverlapWatch::OverlapWatch(MultibodySystem& system, double accuracy, const State& start, double h)
+    : system_(system), accuracy_(accuracy) {
+    system.collect_overlaps(start, h, {}, before_);
+    const BodyOverlap* worst = nullptr;
+    std::size_t others = 0;
+    for (const BodyOverlap& pair : before_) {
+        if (pair.depth <= allowed(pair)) continue;
+        if (worst) ++others;
+        if (!worst || pair.depth > worst->depth) worst = &pair;
+    }
+    if (!worst) return;
+    at_start_ = fmt::format(
+        "bodies {} and {} overlap by {:.3g} m at the start{}, and are pushed apart; move them, or name them in "
+        "\"keep_apart\" if they are not to touch",
+        quoted_name(system, worst->a), quoted_name(system, worst->b), worst->depth,
+        others == 0 ? "" : fmt::format(" ({} other pairs less)", others));
+}
+
+double OverlapWatch::allowed(const BodyOverlap& pair) const {
+    constexpr double share_of_thickness = 0.1;
+    return std::min(accuracy_ * pair.extent, share_of_thickness * pair.thickness);
+}
+
 double OverlapWatch::depth_before(const BodyOverlap& pair) const {
     const auto found =
         std::lower_bound(before_.begin(), before_.end(), pair, [](const BodyOverlap& one, const BodyOverlap& other) {
@@ -25,16 +48,14 @@ double OverlapWatch::depth_before(const BodyOverlap& pair) const {
 }
 
 void OverlapWatch::require_within(const State& state, double h, const sdk::Team& team) {
-    constexpr double share_of_thickness = 0.1;
     system_.collect_overlaps(state, h, team, now_);
     const BodyOverlap* worst = nullptr;
     double beyond = 1.0, grown = 0.0;
     for (const BodyOverlap& pair : now_) {
         const double more = pair.depth - depth_before(pair);
-        const double allowed = std::min(accuracy_ * pair.extent, share_of_thickness * pair.thickness);
-        if (more <= beyond * allowed || given_up_.contains({pair.a, pair.b})) continue;
+        if (more <= beyond * allowed(pair) || given_up_.contains({pair.a, pair.b})) continue;
         worst = &pair;
-        beyond = more / allowed;
+        beyond = more / allowed(pair);
         grown = more;
     }
     if (!worst) return;

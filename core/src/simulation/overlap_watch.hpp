@@ -29,8 +29,11 @@ private:
 /// thickness of the thinner one, beyond which it is soon pushed out on the other side.
 class DELASSUS_API OverlapWatch {
 public:
-    /// system: finished, outlives it. accuracy: a share, > 0.
-    OverlapWatch(MultibodySystem& system, double accuracy) : system_(system), accuracy_(accuracy) {}
+    /// system: finished, outlives it. accuracy: a share, > 0. start: of the bodies; h: the first step, s.
+    OverlapWatch(MultibodySystem& system, double accuracy, const State& start, double h);
+
+    /// What overlaps at the start by more than the accuracy allows, as a sentence with what to do; empty: nothing.
+    [[nodiscard]] const std::string& at_start() const { return at_start_; }
 
     /// Notes the overlaps at the beginning of a step of size h, of the bodies.
     void begin(const State& state, double h, const sdk::Team& team = {}) {
@@ -45,9 +48,11 @@ public:
 
 private:
     [[nodiscard]] double depth_before(const BodyOverlap& pair) const;
+    [[nodiscard]] double allowed(const BodyOverlap& pair) const;
 
     MultibodySystem& system_;
     double accuracy_;
+    std::string at_start_;
     std::vector<BodyOverlap> before_, now_;
     std::set<std::pair<BodyIndex, BodyIndex>> given_up_;
 };

@@ -160,8 +160,11 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (joint_) joint_->bodies_of(now_.state, bodies_);
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
+    if (!shared_ && !control_ && !system.method_reason.empty())
+        energy_ = std::make_unique<EnergyWatch>(*guard_, system, system.accuracy);
     if (!shared_ && !control_ && system.system->size_of_shapes() > 0.0)
-        overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy);
+        overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy, bodies_at(now_.state, next_bodies_),
+                                                   system.step);
     measure(state(), now_.step);
     now_.totals.start_energy = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
@@ -298,11 +301,14 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
     const double start_potential = totals.start_energy - totals.start_kinetic;
     totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
     totals.recovered += taken.step.recovered;
-    const double growth = record_.energy - totals.start_energy - totals.recovered;
+    const double left = record_.penetration;
+    totals.start_overlap = now_.step == 0 || left < totals.start_overlap ? left : 0.0;
+    if (totals.start_overlap > 0.0) totals.credit = std::max(totals.credit, record_.energy - totals.start_energy);
+    const double growth = record_.energy - totals.start_energy - totals.credit;
     const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
     totals.growth = std::max(totals.growth, growth);
     if (growth > 0.0) totals.growth_share = std::max(totals.growth_share, growth / scale);
-    if (growth > limits.energy_growth * scale)
+    if (growth - totals.recovered > limits.energy_growth * scale)
         throw StepFailure(fmt::format(
             "the energy has grown from {:.6g} J at the start to {:.6g} J though nothing supplies any (what can have "
             "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
@@ -358,6 +364,10 @@ const StepRecord& Simulation::step() {
             throw StepFailure("the state at the end of the step is not finite");
         if (!ahead_) settle_turns(next);
         measure(bodies_at(next, next_bodies_), now_.step + 1);
+        record_.penetration = 0.0;
+        for (const auto& contact : taken.step.contacts)
+            record_.penetration = std::max(record_.penetration, -contact.gap);
+        if (shared_) record_.penetration = shared_->penetration();
         judge(taken, judged);
     } catch (const Unsupported& error) {
         undo();
@@ -380,9 +390,6 @@ const StepRecord& Simulation::step() {
     ++now_.step;
 
     record_.contacts = report.unilateral_blocks;
-    record_.penetration = 0.0;
-    for (const auto& contact : report.contacts) record_.penetration = std::max(record_.penetration, -contact.gap);
-    if (shared_) record_.penetration = shared_->penetration();
     const SolverEffort& effort = solver_->effort();
     record_.newton_iterations = report.newton_iterations;
     record_.solver_iterations = effort.iterations;
@@ -479,16 +486,16 @@ std::vector<ContactRecord> Simulation::contacts() const {
 }
 
 std::vector<std::string> Simulation::warnings() const {
-    /// Of what can have moved: a growth that a plot would show.
+    /// Of what can have moved: a fall that a plot would show.
     constexpr double visible_share = 0.05;
     /// Of the size of a mechanism or its speed: more than coordinates of few digits explain.
     constexpr double large_assembly = 1e-3;
     std::vector<std::string> sentences;
-    if (const auto& totals = now_.totals; totals.growth_share > visible_share)
-        sentences.push_back(
-            fmt::format("system \"{}\": the energy rose by up to {:.3g} J above its start, {:.0f} % of what can have "
-                        "moved, though nothing supplies any: the steps are long for {}",
-                        system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator));
+    if (const auto& totals = now_.totals; totals.growth_share > system_->accuracy)
+        sentences.push_back(fmt::format(
+            "system \"{}\": the energy rose by up to {:.3g} J above its start, {:.2g} % of what can have "
+            "moved, though nothing supplies any: the steps are long for {} (accuracy: {:.3g})",
+            system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator, system_->accuracy));
     if (const auto& totals = now_.totals; guard_->conserved(totals)) {
         const double fall = totals.start_energy - totals.energy;
         const double share = fall / guard_->scale(totals, totals.largest_step);
@@ -501,6 +508,8 @@ std::vector<std::string> Simulation::warnings() const {
                             system_->name, fall, 100.0 * share, system_->integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
     }
+    if (overlaps_ && !overlaps_->at_start().empty())
+        sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
     if (const auto& totals = now_.totals; totals.deep_steps > 0)
         sentences.push_back(
             fmt::format("{} of {} steps leave bodies in one another by more than \"accuracy\" allows, and shorter "

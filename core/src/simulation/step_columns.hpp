@@ -85,14 +85,17 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 30> total_columns = {{
+inline constexpr std::array<TotalColumn, 32> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
     {"largest_step", "s", "of those taken, impacts apart", &SimulationTotals::largest_step, "/largest_step"},
     {"start_energy", "J", "at the start", &SimulationTotals::start_energy, "/energy/start"},
     {"energy", "J", "now", &SimulationTotals::energy, "/energy/end"},
-    {"growth", "J", "largest rise of the energy above its start and what was recovered", &SimulationTotals::growth,
+    {"start_overlap", "m", "what is left of the deepest overlap of the start; 0 once it has not shrunk",
+     &SimulationTotals::start_overlap},
+    {"credit", "J", "rise of the energy while the overlaps of the start shrank", &SimulationTotals::credit},
+    {"growth", "J", "largest rise of the energy above its start and that credit", &SimulationTotals::growth,
      "/energy/growth"},
     {"growth_share", "1", "the largest, of what energy there can have been to move", &SimulationTotals::growth_share,
      "/energy/growth_share"},
