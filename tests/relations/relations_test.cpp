@@ -117,6 +117,23 @@ TEST(SceneDocument, OfAFileThatSomebodyWroteHasItsSystems) {
     EXPECT_THROW((void)relations::read_systems(file), InputError);
 }
 
+TEST(SceneDocument, OfMotionsOfSeveralFormsIsNotTurned) {
+    Json scene = scene_of(pendulum);
+    EXPECT_TRUE(relations::can_be_placed(scene));
+    const auto with = [&](const char* translation) {
+        Json body = {{"name", "blade"}};
+        body["motion"]["translation"] = Json::parse(translation);
+        scene["bodies"].push_back(body);
+        const bool can = relations::can_be_placed(scene);
+        scene["bodies"].erase(scene["bodies"].size() - 1);
+        return can;
+    };
+    EXPECT_TRUE(with("[0, 0.5, 0]"));
+    EXPECT_TRUE(with("[{\"linear\": {\"rate\": 1}}, {\"linear\": {\"rate\": 0}}, {\"linear\": {\"rate\": 2}}]"));
+    EXPECT_FALSE(with("[{\"linear\": {\"rate\": 1}}, 0, 0]"));
+    EXPECT_FALSE(with("[{\"ramp\": {\"to\": 1, \"duration\": 1}}, 0, 0]"));
+}
+
 TEST(Relations, HoldForAPendulum) {
     const auto outcomes = judged(scene_of(pendulum));
     for (const char* name : {"sound", "placed", "units", "order", "pieces", "refined", "coordinates", "cut"})

@@ -128,6 +128,7 @@ public:
     }
 
     Judgement placed_elsewhere() {
+        if (!can_be_placed(scene_)) return {Verdict::NotJudged, "a motion has components of several forms"};
         Described described;
         described.placement = {Eigen::Quaterniond(0.62, 0.31, -0.47, 0.55).normalized(),
                                {2.3 * size_, -1.7 * size_, 0.9 * size_}};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "relations/transform.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -175,7 +176,33 @@ void scale_drives(Json& scene, const Json& original, const Units& units) {
     }
 }
 
+/// Whether three motions are numbers, or sines or linear ones that differ in their amplitudes only.
+bool can_be_turned(const Json& three) {
+    if (std::all_of(three.begin(), three.end(), [](const Json& one) { return one.is_number(); })) return true;
+    Json form;
+    for (Json one : three) {
+        if (!one.is_object() || !(one.contains("sine") || one.contains("linear"))) return false;
+        for (const auto& [name, key] : {std::pair("sine", "amplitude"), std::pair("linear", "rate")})
+            if (one.contains(name)) one[name].erase(key);
+        if (!form.is_null() && form != one) return false;
+        form = one;
+    }
+    return form.dump().find("offset") == std::string::npos && form.dump().find("start") == std::string::npos;
+}
+
 }  // namespace
+
+bool can_be_placed(const Json& scene) {
+    const auto items_of = [&](const char* key) { return scene.contains(key) ? scene[key] : Json::array(); };
+    for (const auto& body : items_of("bodies"))
+        if (body.contains("motion") && body["motion"].contains("translation") &&
+            !can_be_turned(body["motion"]["translation"]))
+            return false;
+    for (const auto& load : items_of("loads"))
+        for (const char* key : {"force", "torque"})
+            if (!load.value("follower", false) && load.contains(key) && !can_be_turned(load[key])) return false;
+    return true;
+}
 
 Json placed(const Json& scene, const Placement& placement) {
     Json result = scene;

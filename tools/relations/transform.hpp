@@ -21,6 +21,9 @@ struct Units {
     double length = 1.0, mass = 1.0, time = 1.0;
 };
 
+/// Whether the three components of each given motion and load have one form, so that turned ones have it too.
+[[nodiscard]] bool can_be_placed(const Json& scene);
+/// Of a scene that can be placed.
 [[nodiscard]] Json placed(const Json& scene, const Placement& placement);
 [[nodiscard]] Json in_units(const Json& scene, const Units& units);
 /// Its lists shuffled, but for material pairs; the order of a seed.

@@ -203,6 +203,7 @@ private:
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A step of fixed size, in parts where it is too long as one. False if bodies come to overlap whatever the parts:
     /// they are not watched any longer, and the step is to be taken again.
+    [[nodiscard]] std::string touching() const;  // of the last step, as the end of a sentence; or empty
     bool advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A state that is shown, by steps that are as long as their errors allow.
     void advance_ahead(State& state, double end, StepReport& report);

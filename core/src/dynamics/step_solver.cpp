@@ -398,8 +398,10 @@ void StepSolver::forget_misses() {
 void StepSolver::require_usable() const {
     const SolverEffort& effort = implementation_->effort;
     if (effort.worst_miss > 100.0)
-        throw StepTooLong(fmt::format("{}, {:.2g} times the tolerance: such an answer is not used", effort.unsolved,
-                                      effort.worst_miss));
+        throw StepTooLong(
+            fmt::format("no forces of contacts and joints were found that fit: the best answer misses the tolerance by "
+                        "{:.2g} times, and such an answer is not used ({})",
+                        effort.worst_miss, effort.unsolved.substr(0, effort.unsolved.find(": "))));
 }
 
 std::vector<std::string> StepSolver::loaded() const {

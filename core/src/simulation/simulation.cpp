@@ -380,7 +380,7 @@ const StepRecord& Simulation::step() {
         throw StepInterrupted(fmt::format("{}: {}", where(), error.what()));
     } catch (const StepFailure& error) {
         undo();
-        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
+        throw StepFailure(fmt::format("{}: {}{}", where(), error.what(), touching()));
     }
     const StepReport& report = taken.step;
     const std::string place = where();
@@ -466,6 +466,28 @@ void Simulation::add_unilateral_forces(std::vector<double>& force) const {
                     now.value()[k] * found->second[static_cast<std::size_t>(i)];
         }
     }
+}
+
+std::string Simulation::touching() const {
+    constexpr std::size_t most = 4;
+    if (overlaps_ && now_.step == 0 && !overlaps_->at_start().empty()) return "; " + overlaps_->at_start();
+    std::vector<ContactPoint> nearest(report().contacts.begin(), report().contacts.end());
+    std::sort(nearest.begin(), nearest.end(), [](const auto& a, const auto& b) { return a.gap < b.gap; });
+    std::vector<std::string> pairs;
+    const MultibodySystem& mechanics = *system_->system;
+    const auto name = [&](std::int32_t body) {
+        if (body >= mechanics.body_count()) return fmt::format("node {}", body - mechanics.body_count());
+        return body < 0 ? std::string("world") : mechanics.body(body).name;
+    };
+    for (const ContactPoint& contact : nearest) {
+        const auto bodies = mechanics.contact_bodies(contact);
+        if (bodies[0] < 0 && bodies[1] < 0) continue;
+        std::string pair = fmt::format("\"{}\" and \"{}\"", name(bodies[0]), name(bodies[1]));
+        if (std::find(pairs.begin(), pairs.end(), pair) == pairs.end()) pairs.push_back(std::move(pair));
+        if (pairs.size() == most) break;
+    }
+    return pairs.empty() ? ""
+                         : fmt::format("; bodies that touched last, the nearest first: {}", fmt::join(pairs, ", "));
 }
 
 std::vector<ContactRecord> Simulation::contacts() const {
