@@ -110,7 +110,7 @@ class Registered(unittest.TestCase):
         problem = delassus.read(SOURCE / "examples" / "problems" / "sphere_pile")
         result = delassus.solve(problem, "thirty", tolerance=1e-300, max_iterations=7, curve=True)
         self.assertEqual(result.status, "iteration_limit")
-        self.assertGreaterEqual(len(result.curve), 7)
+        self.assertGreaterEqual(len(result.curve), 2)  # as many as their measuring takes time for
         self.assertLess(result.curve[-1, 2], result.curve[0, 2])
         limited = delassus.solve(problem, "thirty", tolerance=1e-300, time_limit=0.05)
         self.assertEqual(limited.status, "time_limit")

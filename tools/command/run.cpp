@@ -136,7 +136,7 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
         const auto& system = simulation.system();
         const auto& totals = simulation.totals();
         fmt::print("{}: {} steps of {} to t = {:.6g} s in {:.3g} s\n", system.name, simulation.record().step,
-                   system.integrator, simulation.state().t, totals.seconds);
+                   simulation.method().integrator, simulation.state().t, totals.seconds);
         if (system.control)
             fmt::print("  steps from {:.2e} to {:.2e} s, {} trials rejected, {} impacts\n", totals.smallest_step,
                        totals.largest_step, totals.rejected, totals.impacts);
@@ -161,7 +161,7 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
             fmt::print("  worst linearisation error {:.1e}\n", totals.worst_linearization);
         if (totals.divided_steps > 0)
             fmt::print("  {} steps taken in up to {} parts: as one they are too long for {}\n", totals.divided_steps,
-                       totals.most_parts, system.integrator);
+                       totals.most_parts, simulation.method().integrator);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {

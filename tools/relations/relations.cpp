@@ -64,7 +64,8 @@ constexpr double accuracy = 1e-3, small_limit = 1e-7, solver_tolerance = 1e-10;
 constexpr double gap_resolution = 1e-9;
 
 // *Sound.* Where nothing supplies energy, more than a thousandth of what can have moved beyond the start's is a motion
-// that does not exist; so is a contact deeper than a thousandth of the size of what moves, unless the scene begins so.
+// that does not exist; so is a contact deeper than a thousandth of the extent of what moves, twice its size, unless the
+// scene begins so.
 constexpr double sound_share = 1e-3;
 
 double norm(const Json& vector) {
@@ -105,7 +106,7 @@ public:
             detail = fmt::format("the energy grows by {:.3g} J, {:.2g} of what can have moved", base_.growth,
                                  base_.growth / moved);
         const double deeper = base_.penetration - base_.start_penetration;
-        if (deeper > sound_share * size_)
+        if (deeper > sound_share * 2.0 * size_)
             detail += fmt::format("{}bodies go {:.3g} m into one another, {:.2g} of the size of what moves",
                                   detail.empty() ? "" : "; ", deeper, deeper / size_);
         if (detail.empty()) return {Verdict::Held, ""};

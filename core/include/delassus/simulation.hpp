@@ -62,7 +62,8 @@ struct SimulationTotals {
     double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
     double start_overlap = 0.0;  ///< what is left of the deepest overlap of the start, m; 0 once it has not shrunk
     double credit = 0.0;         ///< rise of the energy while the overlaps of the start shrank, J
-    double growth = 0.0;         ///< largest rise of the energy above its start and `credit`, J
+    double lowest = 0.0;         ///< least energy up to now but for `recovered`, J
+    double growth = 0.0;         ///< largest rise of the energy: above its start and `credit`, or above `lowest`, J
     double growth_share = 0.0;   ///< largest growth over the energy that can have moved (running.md); 0: not judged
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;
     double worst_linearization = 0.0;
@@ -81,6 +82,10 @@ struct SimulationTotals {
     /// Steps in which bodies came to overlap by more than the accuracy allows, and shorter ones did not help; when and
     /// which the first time.
     std::int64_t deep_steps = 0;
+    /// How often the method that was chosen could not go on, and the next one took its place; when and why the last
+    /// time.
+    std::int64_t method_changes = 0;
+    std::string last_change;
     std::string first_deep;
 };
 
@@ -95,6 +100,13 @@ struct SimulationState {
     std::vector<double> ahead;     ///< where the method is ahead of `state`, and how it came there; empty: it is not
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
     SimulationTotals totals;
+};
+
+/// How a simulation steps.
+struct SteppingMethod {
+    std::string integrator;
+    OptionTexts options;
+    Coordinates coordinates = Coordinates::Maximal;
 };
 
 class EnergyGuard;
@@ -123,6 +135,11 @@ public:
     DELASSUS_API Simulation(SceneSystem& system, const Registry& registry);
     DELASSUS_API ~Simulation();
     DELASSUS_API Simulation(Simulation&&) noexcept;
+
+    /// The scene's, or the one that took its place (totals().last_change).
+    [[nodiscard]] const SteppingMethod& method() const {
+        return methods_[static_cast<std::size_t>(now_.totals.method_changes)];
+    }
 
     /// Whether `end` is reached. The last step is shorter where `end` is no multiple of a fixed step.
     [[nodiscard]] DELASSUS_API bool finished() const;
@@ -203,15 +220,20 @@ private:
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A step of fixed size, in parts where it is too long as one. False if bodies come to overlap whatever the parts:
     /// they are not watched any longer, and the step is to be taken again.
-    [[nodiscard]] std::string touching() const;  // of the last step, as the end of a sentence; or empty
     bool advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A state that is shown, by steps that are as long as their errors allow.
     void advance_ahead(State& state, double end, StepReport& report);
     void show_ahead(State& state, double end, StepReport& report);
     /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
     void add_unilateral_forces(std::vector<double>& force) const;
-    /// The timestepper and what controls its steps.
+    /// Which bodies touched in the last step, and joints that repeat others, as the end of a sentence; or empty.
+    [[nodiscard]] std::string what_acts() const;
+    /// The timestepper of method(), and what controls its steps.
     void make_method();
+    /// Another of methods_, with its coordinates; the state stays to be set.
+    void change_method(std::size_t number);
+    /// The next of methods_ goes on from the state shown, if there is one. why: a sentence.
+    bool go_on(const std::string& why);
     /// Shares the bodies with the other processes, where there are any and the system, its method and solver allow it.
     void share(const Registry& registry);
     /// A step of the timestepper, with the other processes if need be.
@@ -227,6 +249,7 @@ private:
     void notice_changes();
 
     SceneSystem* system_;
+    std::vector<SteppingMethod> methods_;  // the scene's, and those that may take its place
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the parts of fixed ones; or empty

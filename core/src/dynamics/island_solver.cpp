@@ -61,7 +61,7 @@ void IslandSolver::solve(const Prepared& problem, Solution& solution, const Isla
     const IslandTraits traits = traits_of(problem);
     set_step_tolerance(config_, traits, goal_for(problem, request, traits), settings);
     if (share < suspicious) {
-        const double least = rounding_of_motion / share;
+        const double least = std::min(rounding_of_motion / share, 1.0);
         settings.tolerance = std::max(settings.tolerance, least);
         if (settings.loosest > 0.0) settings.loosest = std::max(settings.loosest, least);
     }

@@ -115,7 +115,7 @@ void PositionProjection::solve(StepSolver& solver, StepReport& report) {
 void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
                                  const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
                                  std::string_view method, std::span<const double> late) {
-    if (!assemble(end, h, contacts, !late.empty())) return;
+    if (n_ == 0 || !assemble(end, h, contacts, !late.empty())) return;
     problem_.name = "position";
     problem_.law = Law::Associated;
     problem_.H = H;

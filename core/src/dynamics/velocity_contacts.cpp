@@ -538,8 +538,12 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
     }
     kept_.keep(rows_.blocks(), rows_.contacts(), std::span(lambda).subspan(first_row_));
     const std::size_t first_contact = contacts_.size() - rows_.contacts().size();
-    for (std::size_t k = 0; k < rows_.contacts().size(); ++k)
-        rows_.contacts()[k].gap = contacts_[first_contact + k].gap;
+    for (std::size_t k = 0; k < rows_.contacts().size(); ++k) {
+        // Of a contact that nobody knew at the beginning the gap follows from its speed: it was no deeper than the
+        // others.
+        const Contact& contact = contacts_[first_contact + k];
+        rows_.contacts()[k].gap = contact.known ? contact.gap : std::max(contact.gap, deepest_);
+    }
     report.contacts.swap(rows_.contacts());
 }
 

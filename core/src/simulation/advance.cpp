@@ -17,12 +17,13 @@ namespace delassus {
 bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory) {
     const sdk::Team team = solver_->team();
     if (overlaps_) overlaps_->begin(bodies_at(state, next_bodies_), report.h, team);
-    if (energy_) energy_->begin(now_.totals, state.t, report.h);
-    const double end = state.t + report.h;
+    const double begin = state.t, end = begin + report.h;
     const auto take = [&](State& moved, double h, StepReport& part) {
+        if (energy_ && moved.t == begin) energy_->begin_trial();
         solver_->forget_misses();
         take_step(moved, h, part);
         solver_->require_usable();
+        if (energy_) energy_->note_recovered(part.recovered);
         if (overlaps_) overlaps_->require_within(bodies_at(moved, next_bodies_), h, team);
         if (energy_ && moved.t > end - 0.5 * h)
             energy_->require_within(system_->system->energy(bodies_at(moved, next_bodies_)), h);
@@ -36,6 +37,10 @@ bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const s
         } catch (const StepTooDeep& deep) {
             overlaps_->give_up(deep.bodies());
             if (deep_.empty()) deep_ = deep.what();
+            return false;
+        } catch (const StepFailure&) {
+            if (!dynamic_cast<const EnergyWatch::Gain*>(&failure)) throw;
+            energy_->give_up();
             return false;
         }
     }
@@ -56,6 +61,7 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     } else if (control_) {
         record_.parts = step_within_error(*control_, state, step.end, *solver_, report.step).taken;
     } else {
+        if (energy_) energy_->begin(now_.totals, state.t, report.h);
         while (!advance_fixed(state, report, memory)) {
             state = now_.state;
             timestepper_->restart();

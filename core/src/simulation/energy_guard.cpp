@@ -60,11 +60,16 @@ double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) c
     return std::max(available, floor);
 }
 
+double EnergyGuard::growth(const SimulationTotals& totals, double energy, double recovered) {
+    return std::max(energy - totals.start_energy - totals.credit,
+                    energy - totals.recovered - recovered - totals.lowest);
+}
+
 void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
     const double budget = accuracy_ * guard_.scale(totals, std::max(totals.largest_step, h));
     h_ = h;
-    start_ = totals.start_energy + totals.credit;
-    before_ = std::max(totals.growth, 0.0);
+    totals_ = &totals;
+    before_ = totals.growth;
     last_taken_ = HUGE_VAL;
     allowed_ = before_ < budget && totals.start_overlap == 0.0 && guard_.watches(totals)
                    ? std::max(0.5 * budget, before_ + (budget - before_) * std::min(h / (system_.end - t), 1.0))
@@ -73,11 +78,11 @@ void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
 
 void EnergyWatch::require_within(double energy, double h) {
     constexpr double helps = 0.7;
-    const double growth = energy - start_;
+    const double growth = EnergyGuard::growth(*totals_, energy, recovered_);
     const bool shortest = h < 1.5 * h_ / static_cast<double>(most_parts);
     if (growth <= allowed_ || growth - before_ > helps * last_taken_ || shortest) return;
     last_taken_ = growth - before_;
-    throw StepTooLong("the energy grows by more than the accuracy allows, though nothing supplies any");
+    throw Gain("the energy grows by more than the accuracy allows, though nothing supplies any");
 }
 
 }  // namespace delassus

@@ -2,6 +2,8 @@
 // Energy that nothing supplies: the sign of a step that is too long for its method (internal).
 #pragma once
 
+#include <cmath>
+
 #include "delassus/scene.hpp"
 #include "delassus/timestepper.hpp"
 
@@ -30,6 +32,9 @@ public:
     /// Whether energy is known, and nothing supplies or takes any: what it falls by is the method's damping.
     [[nodiscard]] bool conserved(const SimulationTotals& totals) const { return !dissipates_ && watches(totals); }
 
+    /// G at an energy after a step that recovered so much more than is in the totals, J.
+    [[nodiscard]] static double growth(const SimulationTotals& totals, double energy, double recovered);
+
     /// max(A, floor); longest_step: of the run, s.
     [[nodiscard]] double scale(const SimulationTotals& totals, double longest_step) const;
 
@@ -40,9 +45,15 @@ private:
     double digits_;    // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
 };
 
-// A growth G of the energy below that is an error all the same, and the part of it that does not come back adds up over
-// a run. All of it may come to B = accuracy · max(A, floor) until the time T at which the run ends. Half of B is free,
-// for what comes and goes; of the rest a step may take the share of the time that is left:
+// Below that a growth is an error all the same. Joints and contacts take energy or leave it, so that E never rises:
+//
+//     G = max(E − E₀, (E − W) − min(E − W))
+//
+// The one counts what bodies get that a step lets sink in and the next ones lift. The other sees a rise that friction
+// hides, and not what they lift. What overlaps at the start gives energy, which is no growth, as long as the deepest
+// overlap shrinks. What of G does not come back adds up over a run. All of it may come to B = accuracy · max(A, floor)
+// until the time T at which the run ends. Half of B is free, for what comes and goes; of the rest a step may take the
+// share of the time that is left:
 //
 //     G⁺ ≤ max(B/2, G + (B − G) h/(T − t)),      G: the largest growth up to now
 //
@@ -51,21 +62,33 @@ private:
 // step counts as it is, and so do all once B is used up.
 class EnergyWatch {
 public:
+    /// A step that takes more than its share.
+    class Gain : public StepTooLong {
+    public:
+        using StepTooLong::StepTooLong;
+    };
+
     /// All outlive it. accuracy: a share, > 0.
     EnergyWatch(const EnergyGuard& guard, const SceneSystem& system, double accuracy)
         : guard_(guard), system_(system), accuracy_(accuracy) {}
 
-    /// Before a step of size h from t.
+    /// Before a step of size h from t; the totals stay there until its end.
     void begin(const SimulationTotals& totals, double t, double h);
-    /// After it, or after the last of its parts, of size h: throws StepTooLong if the step takes more than its share,
-    /// and shorter parts may take less.
+    /// Before it is taken, as one or in parts.
+    void begin_trial() { recovered_ = 0.0; }
+    /// After each part: energy that contacts gave by pushing apart what penetrated, J.
+    void note_recovered(double energy) { recovered_ += energy; }
+    /// After the last, of size h: throws Gain if the step takes more than its share, and shorter parts may take less.
     void require_within(double energy, double h);
+    /// Parts cannot be taken: whatever this step takes is allowed.
+    void give_up() { allowed_ = HUGE_VAL; }
 
 private:
     const EnergyGuard& guard_;
     const SceneSystem& system_;
     double accuracy_;
-    double h_ = 0.0, start_ = 0.0, before_ = 0.0, allowed_ = 0.0;
+    const SimulationTotals* totals_ = nullptr;
+    double h_ = 0.0, before_ = 0.0, allowed_ = 0.0, recovered_ = 0.0;
     double last_taken_ = 0.0;  // by the trial before, of this step
 };
 

@@ -16,6 +16,7 @@
 #include "simulation/energy_guard.hpp"
 #include "simulation/fixed_step.hpp"
 #include "simulation/look_ahead.hpp"
+#include "simulation/method_change.hpp"
 #include "simulation/overlap_watch.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
@@ -102,6 +103,9 @@ void choose_method_to_share(SceneSystem& system, const Registry& registry) {
     if (system.coordinates_chosen) system.coordinates = Coordinates::Maximal;
 }
 
+/// Of the energy that can have moved: a change that a plot would show.
+constexpr double visible_share = 0.05;
+
 std::string describe(const Assembly& change) {
     return fmt::format(
         "bodies were moved by up to {:.3g} m and {:.3g} rad, and their velocities changed by up to {:.3g} "
@@ -115,6 +119,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
     if (!system.leave_out) solver_->leave_nothing_out();
     choose_method_to_share(system, registry);
+    methods_ = methods_of(system);
     const bool in_joints = system.coordinates == Coordinates::Joint;
     const auto with_name = [&](const auto& make) {
         try {
@@ -160,13 +165,13 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (joint_) joint_->bodies_of(now_.state, bodies_);
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     guard_ = std::make_unique<EnergyGuard>(system);
-    if (!shared_ && !control_ && !system.method_reason.empty())
+    if (!shared_ && !system.method_reason.empty())
         energy_ = std::make_unique<EnergyWatch>(*guard_, system, system.accuracy);
-    if (!shared_ && !control_ && system.system->size_of_shapes() > 0.0)
+    if (!shared_ && system.system->size_of_shapes() > 0.0)
         overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy, bodies_at(now_.state, next_bodies_),
                                                    system.step);
     measure(state(), now_.step);
-    now_.totals.start_energy = now_.totals.energy = record_.energy;
+    now_.totals.start_energy = now_.totals.lowest = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
     now_.totals.worst_drift = record_.drift;
 }
@@ -202,7 +207,7 @@ void Simulation::make_method() {
     control_.reset();
     ahead_.reset();
     revision_ = system_->system->revision();
-    timestepper_ = make_timestepper(system_->integrator, dynamics(), system_->integrator_options);
+    timestepper_ = make_timestepper(method().integrator, dynamics(), method().options);
     if (shared_) {
         shared_->restart();
         gathered_ = timestepper_->save();
@@ -216,7 +221,7 @@ void Simulation::make_method() {
             dynamics(), *timestepper_, control_within(limit, system_->step),
             fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
                         "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
-                        system_->integrator));
+                        method().integrator));
         if (timestepper_->has_extension() && system_->system->foreseeable())
             ahead_ =
                 std::make_unique<LookAhead>(dynamics(), *system_->system, system_->step, shortest_part * system_->step);
@@ -296,24 +301,28 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
         throw StepFailure(
             fmt::format("the constraints have drifted by {:.3g}, where limits.drift is {:.3g}: the step of {:.3g} s is "
                         "too long for {}",
-                        record_.drift, limits.drift, taken.h, system_->integrator));
+                        record_.drift, limits.drift, taken.h, method().integrator));
     if (!guard_->watches(totals)) return;
     const double start_potential = totals.start_energy - totals.start_kinetic;
     totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
     totals.recovered += taken.step.recovered;
     const double left = record_.penetration;
     totals.start_overlap = now_.step == 0 || left < totals.start_overlap ? left : 0.0;
-    if (totals.start_overlap > 0.0) totals.credit = std::max(totals.credit, record_.energy - totals.start_energy);
-    const double growth = record_.energy - totals.start_energy - totals.credit;
+    if (totals.start_overlap > 0.0) {
+        totals.credit = std::max(totals.credit, record_.energy - totals.start_energy);
+        totals.lowest = record_.energy - totals.recovered;
+    }
+    const double growth = guard_->growth(totals, record_.energy, 0.0);
+    totals.lowest = std::min(totals.lowest, record_.energy - totals.recovered);
     const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
     totals.growth = std::max(totals.growth, growth);
     if (growth > 0.0) totals.growth_share = std::max(totals.growth_share, growth / scale);
-    if (growth - totals.recovered > limits.energy_growth * scale)
+    if (record_.energy - totals.start_energy - totals.recovered > limits.energy_growth * scale)
         throw StepFailure(fmt::format(
             "the energy has grown from {:.6g} J at the start to {:.6g} J though nothing supplies any (what can have "
             "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
             "damps (limits.energy_growth: {:.3g})",
-            totals.start_energy, record_.energy, scale, taken.h, system_->integrator, limits.energy_growth));
+            totals.start_energy, record_.energy, scale, taken.h, method().integrator, limits.energy_growth));
 }
 
 const StepRecord& Simulation::step() {
@@ -321,6 +330,9 @@ const StepRecord& Simulation::step() {
     const auto where = [&] {
         return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
     };
+    if (joint_ && now_.totals.growth_share > visible_share)
+        go_on(fmt::format("the energy rose by {:.3g} J, {:.2g} % of what can have moved, though nothing supplies any",
+                          now_.totals.growth, 100.0 * now_.totals.growth_share));
     notice_changes();
     const bool advances = ahead_ && !ahead_->reaches(fixed_step(now_.state.t, system_->end, system_->step).end);
     State next = now_.state;
@@ -380,7 +392,9 @@ const StepRecord& Simulation::step() {
         throw StepInterrupted(fmt::format("{}: {}", where(), error.what()));
     } catch (const StepFailure& error) {
         undo();
-        throw StepFailure(fmt::format("{}: {}{}", where(), error.what(), touching()));
+        const std::string sentence = fmt::format("{}{}", error.what(), what_acts());
+        if (go_on(sentence)) return step();
+        throw StepFailure(fmt::format("{}: {}", where(), sentence));
     }
     const StepReport& report = taken.step;
     const std::string place = where();
@@ -468,7 +482,7 @@ void Simulation::add_unilateral_forces(std::vector<double>& force) const {
     }
 }
 
-std::string Simulation::touching() const {
+std::string Simulation::what_acts() const {
     constexpr std::size_t most = 4;
     if (overlaps_ && now_.step == 0 && !overlaps_->at_start().empty()) return "; " + overlaps_->at_start();
     std::vector<ContactPoint> nearest(report().contacts.begin(), report().contacts.end());
@@ -486,8 +500,23 @@ std::string Simulation::touching() const {
         if (std::find(pairs.begin(), pairs.end(), pair) == pairs.end()) pairs.push_back(std::move(pair));
         if (pairs.size() == most) break;
     }
-    return pairs.empty() ? ""
-                         : fmt::format("; bodies that touched last, the nearest first: {}", fmt::join(pairs, ", "));
+    std::string text;
+    if (!pairs.empty()) text = fmt::format("; bodies that touched last, the nearest first: {}", fmt::join(pairs, ", "));
+    if (const auto joints = mechanics.joints_with_rows_left_out(); !joints.empty())
+        text += fmt::format("; joints that repeat or contradict others: \"{}\"", fmt::join(joints, "\", \""));
+    if (!text.empty()) return text;
+    const std::vector<double>& v = state().v;
+    double fastest = 0.0;
+    for (BodyIndex body = 0; body < mechanics.body_count(); ++body) {
+        const auto column = mechanics.body_column(body);
+        if (column < 0) continue;
+        const auto at = static_cast<std::size_t>(column);
+        if (const double speed = std::hypot(v[at], v[at + 1], v[at + 2]); speed > fastest) {
+            fastest = speed;
+            text = fmt::format("; the body that moves fastest: \"{}\", {:.3g} m/s", name(body), speed);
+        }
+    }
+    return text;
 }
 
 std::vector<ContactRecord> Simulation::contacts() const {
@@ -508,16 +537,14 @@ std::vector<ContactRecord> Simulation::contacts() const {
 }
 
 std::vector<std::string> Simulation::warnings() const {
-    /// Of what can have moved: a fall that a plot would show.
-    constexpr double visible_share = 0.05;
     /// Of the size of a mechanism or its speed: more than coordinates of few digits explain.
     constexpr double large_assembly = 1e-3;
     std::vector<std::string> sentences;
     if (const auto& totals = now_.totals; totals.growth_share > system_->accuracy)
         sentences.push_back(fmt::format(
-            "system \"{}\": the energy rose by up to {:.3g} J above its start, {:.2g} % of what can have "
+            "system \"{}\": the energy rose by up to {:.3g} J, {:.2g} % of what can have "
             "moved, though nothing supplies any: the steps are long for {} (accuracy: {:.3g})",
-            system_->name, totals.growth, 100.0 * totals.growth_share, system_->integrator, system_->accuracy));
+            system_->name, totals.growth, 100.0 * totals.growth_share, method().integrator, system_->accuracy));
     if (const auto& totals = now_.totals; guard_->conserved(totals)) {
         const double fall = totals.start_energy - totals.energy;
         const double share = fall / guard_->scale(totals, totals.largest_step);
@@ -527,9 +554,11 @@ std::vector<std::string> Simulation::warnings() const {
                 fmt::format("system \"{}\": the energy fell by {:.3g} J, {:.0f} % of what can have moved, though "
                             "nothing takes any: {} damps in steps as long as these; take shorter ones or a method of "
                             "higher order, {}",
-                            system_->name, fall, 100.0 * share, system_->integrator,
+                            system_->name, fall, 100.0 * share, method().integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
     }
+    if (const auto& totals = now_.totals; totals.method_changes > 0)
+        sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
     if (overlaps_ && !overlaps_->at_start().empty())
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
     if (const auto& totals = now_.totals; totals.deep_steps > 0)
@@ -540,7 +569,7 @@ std::vector<std::string> Simulation::warnings() const {
                         totals.deep_steps, now_.step, totals.first_deep));
     if (shared_ && !system_->method_reason.empty() && system_->method_reason.find("several processes") == 0)
         sentences.push_back(fmt::format("system \"{}\": {}; {} took its place, which is less exact", system_->name,
-                                        system_->method_reason, system_->integrator));
+                                        system_->method_reason, method().integrator));
     if (equilibrium_ && equilibrium_->smallest_eigenvalue < 0.0)
         sentences.push_back(fmt::format(
             "system \"{}\": the equilibrium in which the run begins is unstable (smallest eigenvalue {:.3g} "
@@ -610,6 +639,14 @@ SimulationState Simulation::save() const {
 }
 
 void Simulation::load(SimulationState state) {
+    const auto number = static_cast<std::size_t>(state.totals.method_changes);
+    if (number >= methods_.size())
+        throw InputError(fmt::format("the checkpoint of system \"{}\" is of method {}; the system has {}",
+                                     system_->name, number + 1, methods_.size()));
+    if (state.totals.method_changes != now_.totals.method_changes) {
+        change_method(number);
+        now_.state = dynamics().initial_state();
+    }
     if (state.state.q.size() != now_.state.q.size() || state.state.v.size() != now_.state.v.size())
         throw InputError(fmt::format(
             "the checkpoint of system \"{}\" has {} positions and {} velocities; the system "

@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 32> total_columns = {{
+inline constexpr std::array<TotalColumn, 35> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -95,8 +95,9 @@ inline constexpr std::array<TotalColumn, 32> total_columns = {{
     {"start_overlap", "m", "what is left of the deepest overlap of the start; 0 once it has not shrunk",
      &SimulationTotals::start_overlap},
     {"credit", "J", "rise of the energy while the overlaps of the start shrank", &SimulationTotals::credit},
-    {"growth", "J", "largest rise of the energy above its start and that credit", &SimulationTotals::growth,
-     "/energy/growth"},
+    {"lowest", "J", "least energy up to now but for what was recovered", &SimulationTotals::lowest},
+    {"growth", "J", "largest rise of the energy, above its start and that credit or above the lowest",
+     &SimulationTotals::growth, "/energy/growth"},
     {"growth_share", "1", "the largest, of what energy there can have been to move", &SimulationTotals::growth_share,
      "/energy/growth_share"},
     {"recovered", "J", "energy that contacts gave by pushing apart what penetrated", &SimulationTotals::recovered,
@@ -127,6 +128,9 @@ inline constexpr std::array<TotalColumn, 32> total_columns = {{
     {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",
      &SimulationTotals::deep_steps, "/deep_steps"},
     {"first_deep", "", "when and which the first time", &SimulationTotals::first_deep, "/first_deep"},
+    {"method_changes", "1", "methods that were chosen, could not go on, and had another take their place",
+     &SimulationTotals::method_changes, "/method_changes"},
+    {"last_change", "", "when and why the last time", &SimulationTotals::last_change, "/last_change"},
     {"plugin_solves", "1", "solves by a plugin", &SimulationTotals::plugin_solves, "/effort/solves"},
     {"solver_iterations", "1", "iterations of the solver plugin", &SimulationTotals::solver_iterations,
      "/effort/iterations"},

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the method that was chosen for a scene cannot go on, another takes its place.
+#include <fmt/format.h>
+
+#include <memory>
+#include <utility>
+
+#include "delassus/simulation.hpp"
+#include "simulation/look_ahead.hpp"
+#include "simulation/method_change.hpp"
+
+namespace delassus {
+
+namespace {
+
+std::string described(const SteppingMethod& method) {
+    return fmt::format("{} in {} coordinates", method.integrator,
+                       method.coordinates == Coordinates::Joint ? "joint" : "maximal");
+}
+
+}  // namespace
+
+std::vector<SteppingMethod> methods_of(const SceneSystem& system) {
+    std::vector<SteppingMethod> methods = {{system.integrator, system.integrator_options, system.coordinates}};
+    if (system.method_reason.empty() || system.control || system.sleeping) return methods;
+    if (system.coordinates == Coordinates::Joint && system.coordinates_chosen && system.system->detects_contacts())
+        methods.push_back({"linearly_implicit_trapezoidal", {}, Coordinates::Maximal});
+    return methods;
+}
+
+void Simulation::change_method(std::size_t number) {
+    timestepper_.reset();
+    control_.reset();
+    ahead_.reset();
+    joint_.reset();
+    system_->system->assemble();
+    now_.totals.method_changes = static_cast<std::int64_t>(number);
+    if (method().coordinates == Coordinates::Joint) joint_ = std::make_unique<JointCoordinates>(*system_->system);
+    make_method();
+}
+
+bool Simulation::go_on(const std::string& why) {
+    const auto next = static_cast<std::size_t>(now_.totals.method_changes) + 1;
+    if (next >= methods_.size() || shared_) return false;
+    const bool leaves_joints = joint_ && methods_[next].coordinates == Coordinates::Maximal;
+    State state = leaves_joints ? bodies_ : now_.state;
+    state.t = now_.state.t;
+    now_.totals.last_change = fmt::format("from t = {:.6g} s on {} took the place of {}, which could not go on: {}",
+                                          state.t, described(methods_[next]), described(method()), why);
+    change_method(next);
+    now_.state = std::move(state);
+    if (leaves_joints) system_->system->renew_rows(now_.state, 0);
+    if (joint_) joint_->bodies_of(now_.state, bodies_);
+    if (ahead_) ahead_->begin(now_.state);
+    report_ = {};
+    return true;
+}
+
+}  // namespace delassus
