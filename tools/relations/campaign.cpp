@@ -40,8 +40,9 @@ public:
         for (const auto& told : answer.outcomes) {
             ++table_[told.relation][told.verdict];
             outcomes[told.relation] = told.detail.empty() ? Json(told.verdict) : Json({told.verdict, told.detail});
-            if (told.verdict != name_of(Verdict::Violated)) continue;
-            ++counts_.violated;
+            const bool violated = told.verdict == name_of(Verdict::Violated);
+            if (!violated && told.verdict != name_of(Verdict::OnlyOneRefused)) continue;
+            counts_.violated += violated ? 1 : 0;
             failures.push_back(told);
         }
         lines_ << json_text({{"seed", campaign_.seed},

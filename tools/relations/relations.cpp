@@ -129,7 +129,8 @@ public:
     }
 
     Judgement placed_elsewhere() {
-        if (!can_be_placed(scene_)) return {Verdict::NotJudged, "a motion has components of several forms"};
+        if (!can_be_placed(scene_))
+            return {Verdict::NotJudged, "it has motions of several forms, or axes of the world"};
         Described described;
         described.placement = {Eigen::Quaterniond(0.62, 0.31, -0.47, 0.55).normalized(),
                                {2.3 * size_, -1.7 * size_, 0.9 * size_}};

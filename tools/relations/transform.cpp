@@ -198,6 +198,8 @@ bool can_be_placed(const Json& scene) {
         if (body.contains("motion") && body["motion"].contains("translation") &&
             !can_be_turned(body["motion"]["translation"]))
             return false;
+    for (const auto& bushing : items_of("bushings"))
+        if (bushing.value("first", std::string("world")) == "world") return false;
     for (const auto& load : items_of("loads"))
         for (const char* key : {"force", "torque"})
             if (!load.value("follower", false) && load.contains(key) && !can_be_turned(load[key])) return false;

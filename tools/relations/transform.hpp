@@ -21,7 +21,8 @@ struct Units {
     double length = 1.0, mass = 1.0, time = 1.0;
 };
 
-/// Whether the three components of each given motion and load have one form, so that turned ones have it too.
+/// Whether the three components of each given motion and load have one form, so that turned ones have it too, and no
+/// bushing has the axes of the world.
 [[nodiscard]] bool can_be_placed(const Json& scene);
 /// Of a scene that can be placed.
 [[nodiscard]] Json placed(const Json& scene, const Placement& placement);

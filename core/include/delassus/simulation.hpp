@@ -99,6 +99,7 @@ struct SimulationState {
         rows_left_out;             ///< of the bilateral constraints (MultibodySystem::kept_rows()); ascending
     std::vector<double> ahead;     ///< where the method is ahead of `state`, and how it came there; empty: it is not
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
+    std::vector<std::int32_t> overlapping;  ///< pairs of bodies that come to overlap however short the steps, a then b
     SimulationTotals totals;
 };
 

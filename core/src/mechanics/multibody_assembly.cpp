@@ -88,17 +88,23 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
     }
     if (const auto held = with(linkage.start_rates());
         !Linkage::is_rounding_of_rates(linkage.rate_residual(state, held))) {
+        // Where nothing moves in any row, all that adds up in them is rounding of the velocities that were given.
+        const auto speed = linkage.speed(given);
+        const double fastest = std::max(speed.linear / linkage.size(), speed.angular);
+        const auto fits = [&](const Linkage::Residual& left) {
+            return std::min(left.share, left.value / fastest) <= assembled_velocity;
+        };
         auto left = linkage.assemble_velocities(state, held, at_start);
-        if (held.size() > rows.size() && !(left.share <= assembled_velocity)) {
+        if (held.size() > rows.size() && !fits(left)) {
             left = linkage.assemble_velocities(state, rows, at_start);
             const auto missed = linkage.rate_residual(state, linkage.start_rates());
-            if (left.share <= assembled_velocity && missed.share > most_drift)
+            if (fits(left) && missed.share > most_drift)
                 throw InputError(fmt::format(
                     "{} has a rate that cannot be had: with the velocities that fit the joints, motors and other "
                     "starts, it is off by {:.3g} of what adds up in it",
                     linkage.owner_of(missed.row), missed.share));
         }
-        if (!(left.share <= assembled_velocity))
+        if (!fits(left))
             throw InputError(
                 fmt::format("no velocities fit the joints and motors at t = {:.9g} s: {} misses by {:.3g} of what "
                             "adds up in it; the mechanism cannot move that way from there",

@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 9;
+constexpr int version = 10;
 constexpr std::size_t digits = 16;
 
 /// How a checkpoint of this text ends.
@@ -138,6 +138,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"ahead", bits(simulation.ahead)},
                                    {"rows_left_out", simulation.rows_left_out},
                                    {"sleeping", bits(simulation.sleeping)},
+                                   {"overlapping", simulation.overlapping},
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)},
                                    {"picture_times", bits(system.picture_times)},
@@ -169,6 +170,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             system.simulation.ahead = numbers(one.at("ahead"));
             system.simulation.sleeping = numbers(one.at("sleeping"));
             one.at("rows_left_out").get_to(system.simulation.rows_left_out);
+            one.at("overlapping").get_to(system.simulation.overlapping);
             system.simulation.totals = totals_of(one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             system.picture_times = numbers(one.at("picture_times"));

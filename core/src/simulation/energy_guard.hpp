@@ -33,7 +33,7 @@ public:
     [[nodiscard]] bool conserved(const SimulationTotals& totals) const { return !dissipates_ && watches(totals); }
 
     /// G at an energy after a step that recovered so much more than is in the totals, J.
-    [[nodiscard]] static double growth(const SimulationTotals& totals, double energy, double recovered);
+    [[nodiscard]] DELASSUS_API static double growth(const SimulationTotals& totals, double energy, double recovered);
 
     /// max(A, floor); longest_step: of the run, s.
     [[nodiscard]] double scale(const SimulationTotals& totals, double longest_step) const;

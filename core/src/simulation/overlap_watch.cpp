@@ -66,6 +66,17 @@ void OverlapWatch::require_within(const State& state, double h, const sdk::Team&
         worst->a, worst->b);
 }
 
+std::vector<BodyIndex> OverlapWatch::given_up() const {
+    std::vector<BodyIndex> pairs;
+    for (const auto& [a, b] : given_up_) pairs.insert(pairs.end(), {a, b});
+    return pairs;
+}
+
+void OverlapWatch::set_given_up(const std::vector<BodyIndex>& pairs) {
+    given_up_.clear();
+    for (std::size_t i = 0; i + 1 < pairs.size(); i += 2) given_up_.insert({pairs[i], pairs[i + 1]});
+}
+
 void OverlapWatch::end() {
     std::erase_if(given_up_, [&](const std::pair<BodyIndex, BodyIndex>& bodies) {
         return std::none_of(now_.begin(), now_.end(),

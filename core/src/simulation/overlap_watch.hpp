@@ -43,6 +43,9 @@ public:
     void require_within(const State& state, double h, const sdk::Team& team = {});
     /// They come to overlap however short the steps: they are not watched until they have come apart.
     void give_up(std::pair<BodyIndex, BodyIndex> bodies) { given_up_.insert(bodies); }
+    /// Those that are not watched, a then b of each pair, ascending.
+    [[nodiscard]] std::vector<BodyIndex> given_up() const;
+    void set_given_up(const std::vector<BodyIndex>& pairs);
     /// After a step that was within.
     void end();
 

@@ -635,6 +635,7 @@ SimulationState Simulation::save() const {
     if (control_) result.control = control_->save();
     if (ahead_) result.ahead = ahead_->save();
     if (sleeping_) result.sleeping = sleeping_->save();
+    if (overlaps_) result.overlapping = overlaps_->given_up();
     return result;
 }
 
@@ -675,12 +676,14 @@ void Simulation::load(SimulationState state) {
     if (ahead_ && state.ahead.empty()) ahead_->begin(state.state);
     if (ahead_ && !state.ahead.empty()) ahead_->load(state.ahead);
     if (sleeping_) sleeping_->load(state.sleeping);
+    if (overlaps_) overlaps_->set_given_up(state.overlapping);
     now_ = std::move(state);
     now_.memory.clear();
     now_.rows_left_out.clear();
     now_.control.clear();
     now_.ahead.clear();
     now_.sleeping.clear();
+    now_.overlapping.clear();
     record_ = {};
     report_ = {};
     measure(this->state(), now_.step);
