@@ -366,6 +366,8 @@ namespace {
 
 /// Directions in which rows differ by less are singular, where the kept rows alone are asked.
 constexpr double singular = 1e-10;
+/// Rows that are dependent to this relative measure repeat each other: coordinates of six digits are no better.
+constexpr double dependent = 1e-5;
 
 /// The lengths of rows; 1 of rows of zeros.
 Eigen::VectorXd lengths_of_rows(const Eigen::SparseMatrix<double, Eigen::RowMajor>& A) {
@@ -379,14 +381,19 @@ Eigen::VectorXd lengths_of_rows(const Eigen::SparseMatrix<double, Eigen::RowMajo
 
 }  // namespace
 
-// With some velocities alone A z = −c has a solution or not: then z makes |A z + c| least. Rows that repeat each other
-// make A Aᵀ singular, and columns Aᵀ A; a small diagonal leaves the solution within their span.
+// With some velocities alone A z = −c has a solution or not: then z makes |A z + c| least. A row in which these have
+// next to no part, as where a body would turn about a point that lies in the row's direction, does not hold them:
+// coordinates of few digits, or turned ones, would ask for any speed there. Rows that repeat each other make A Aᵀ
+// singular, and columns Aᵀ A; a small diagonal leaves the solution within their span.
 Eigen::VectorXd Linkage::shortest(const Values& values, const Eigen::VectorXd& value, Metric metric, double threshold,
                                   const Eigen::VectorXd* marks) const {
     Eigen::SparseMatrix<double, Eigen::RowMajor> A = scaled(values, metric);
     const Eigen::VectorXd lengths = lengths_of_rows(A);
     A = lengths.cwiseInverse().asDiagonal() * A;
-    if (marks) A = A * marks->asDiagonal();
+    if (marks) {
+        A = A * marks->asDiagonal();
+        A.prune(1.0, dependent);
+    }
     const Eigen::VectorXd b = -value.cwiseQuotient(lengths);
     if (rows_.size() <= most_dense_rows) return unscaled(least_solution(A, b, threshold), metric);
     const Eigen::SparseMatrix<double, Eigen::RowMajor> At = A.transpose();
@@ -432,8 +439,6 @@ Linkage::Residual Linkage::settle(State& state, const std::vector<std::size_t>& 
 
 namespace {
 
-/// Rows that are dependent to this relative measure repeat each other: coordinates of six digits are no better.
-constexpr double dependent = 1e-5;
 /// For directions and residuals on the way to a configuration.
 constexpr double coarse = 1e-4;
 
@@ -466,7 +471,7 @@ Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<s
         for (Eigen::Index i = 0; i < n; i += 3)
             follows.segment<3>(i).setConstant(v.segment<3>(i).isZero(0.0) ? 1.0 : 0.0);
         if (follows.minCoeff() < 1.0)
-            v += shortest(values, values.J * v + values.rate, Metric::Mass, singular, &follows);
+            v += shortest(values, values.J * v + values.rate, Metric::Mass, dependent, &follows);
     }
     const Eigen::VectorXd given = v;
     for (int pass = 0; pass < 3; ++pass)  // the later ones remove what rounding left
