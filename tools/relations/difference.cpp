@@ -55,6 +55,8 @@ std::vector<double> distances(const Motion& base, const Motion& other, const Des
             static_cast<std::size_t>(std::find(other.bodies.begin(), other.bodies.end(), name) - other.bodies.begin()));
     std::vector<double> result;
     for (std::size_t k = 0; k < base.poses.size() && k * every < other.poses.size(); ++k) {
+        const double t = base.t[k] * described.units.time;
+        if (std::abs(t - other.t[k * every]) > 1e-9 * t) break;
         double largest = 0.0;
         for (std::size_t i = 0; i < base.bodies.size(); ++i) {
             if (place[i] == other.bodies.size()) continue;

@@ -20,9 +20,9 @@ struct Described {
     Placement placement;
 };
 
-/// For each common time the largest distance of a body that both have: of its position, as a share of size, and of its
-/// orientation, in radians. The second motion is taken back to how the first is described; it may have `every` as many
-/// steps.
+/// For each common time, up to where the last steps share what remains, the largest distance of a body that both have:
+/// of its position, as a share of size, and of its orientation, in radians. The second motion is taken back to how the
+/// first is described; it may have `every` as many steps.
 [[nodiscard]] std::vector<double> distances(const Motion& base, const Motion& other, const Described& described,
                                             double size, std::size_t every = 1);
 

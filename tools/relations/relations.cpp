@@ -285,9 +285,9 @@ private:
         return answer <= chaos ? answer / disturbance : std::numeric_limits<double>::infinity();
     }
 
-    /// By the same method, its error limit small.
+    /// By the same method, its error limit small, or in whole steps: a chosen one is divided where it gains energy.
     const Motion& named() {
-        if (base_.error_limit == 0.0) return base_;
+        if (base_.error_limit == 0.0 && base_.parts + 1.0 <= static_cast<double>(base_.t.size())) return base_;
         if (!named_) named_ = std::make_unique<Motion>(motion(with_method(scene_, base_)));
         return *named_;
     }
