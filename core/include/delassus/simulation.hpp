@@ -82,11 +82,11 @@ struct SimulationTotals {
     /// Steps in which bodies came to overlap by more than the accuracy allows, and shorter ones did not help; when and
     /// which the first time.
     std::int64_t deep_steps = 0;
+    std::string first_deep;
     /// How often the method that was chosen could not go on, and the next one took its place; when and why the last
     /// time.
     std::int64_t method_changes = 0;
     std::string last_change;
-    std::string first_deep;
 };
 
 /// All that a simulation carries from step to step: with equal scenes, going on from it gives the same bits.
@@ -219,8 +219,8 @@ private:
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     /// memory: of the timestepper, before the step.
     void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
-    /// A step of fixed size, in parts where it is too long as one. False if bodies come to overlap whatever the parts:
-    /// they are not watched any longer, and the step is to be taken again.
+    /// A step of fixed size, in parts where it is too long as one. False where parts cannot help, whether bodies
+    /// overlap or energy grows: that is not watched any longer, and the step is to be taken again.
     bool advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
     /// A state that is shown, by steps that are as long as their errors allow.
     void advance_ahead(State& state, double end, StepReport& report);
@@ -266,8 +266,8 @@ private:
     AdaptiveStepReport report_, next_report_;  // of the last step, and memory for the next
     std::vector<double> constraint_;
     std::unique_ptr<EnergyGuard> guard_;
-    std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or steps follow from errors
-    std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or steps follow from their errors
+    std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or processes share bodies
+    std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or processes share them
     std::string deep_;                        // of this step: what came to overlap whatever its parts; or empty
     std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies
     std::vector<double> gathered_;            // the memory of the method for all bodies, after step gathered_at_

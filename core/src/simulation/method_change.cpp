@@ -41,17 +41,14 @@ void Simulation::change_method(std::size_t number) {
 
 bool Simulation::go_on(const std::string& why) {
     const auto next = static_cast<std::size_t>(now_.totals.method_changes) + 1;
-    if (next >= methods_.size() || shared_) return false;
-    const bool leaves_joints = joint_ && methods_[next].coordinates == Coordinates::Maximal;
-    State state = leaves_joints ? bodies_ : now_.state;
-    state.t = now_.state.t;
+    if (next >= methods_.size()) return false;
+    State bodies = bodies_;
+    bodies.t = now_.state.t;
     now_.totals.last_change = fmt::format("from t = {:.6g} s on {} took the place of {}, which could not go on: {}",
-                                          state.t, described(methods_[next]), described(method()), why);
+                                          bodies.t, described(methods_[next]), described(method()), why);
     change_method(next);
-    now_.state = std::move(state);
-    if (leaves_joints) system_->system->renew_rows(now_.state, 0);
-    if (joint_) joint_->bodies_of(now_.state, bodies_);
-    if (ahead_) ahead_->begin(now_.state);
+    now_.state = std::move(bodies);
+    system_->system->renew_rows(now_.state, 0);
     report_ = {};
     return true;
 }

@@ -15,7 +15,7 @@ namespace delassus {
 // refuses what it cannot bring back to the joints, as where a mechanism jams: there nothing else may take over, which
 // would pull the joints apart. Whoever names a method keeps it.
 
-/// The method of a scene, and those that may take its place, in their order.
+/// The method of a scene, and after one in joint coordinates the one in maximal ones that may take its place.
 [[nodiscard]] std::vector<SteppingMethod> methods_of(const SceneSystem& system);
 
 }  // namespace delassus

@@ -312,7 +312,7 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
         totals.credit = std::max(totals.credit, record_.energy - totals.start_energy);
         totals.lowest = record_.energy - totals.recovered;
     }
-    const double growth = guard_->growth(totals, record_.energy, 0.0);
+    const double growth = EnergyGuard::growth(totals, record_.energy, 0.0);
     totals.lowest = std::min(totals.lowest, record_.energy - totals.recovered);
     const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
     totals.growth = std::max(totals.growth, growth);
