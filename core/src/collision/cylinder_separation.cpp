@@ -18,11 +18,15 @@ class Search {
 public:
     Search(const Placed& a, const Placed& b, const Vector3d& offset) : a_(a), b_(b), offset_(offset) {}
 
+    // s of every normal is at most its product with the difference of any two points, such as those of the best so far.
     void take(const Vector3d& normal) {
-        const double value = normal.dot(between(normal));
+        if (normal.dot(apart_) <= value_) return;
+        const Vector3d apart = between(normal);
+        const double value = normal.dot(apart);
         if (value > value_) {
             value_ = value;
             normal_ = normal;
+            apart_ = apart;
         }
     }
 
@@ -77,29 +81,52 @@ private:
         }
     }
 
-    /// Bisects the derivative of s along the circle n ⟂ pole, which falls through zero at a maximum, kink or not.
+    // The maximum of s along the circle n ⟂ pole is bracketed by slopes of different signs. It is looked for in turns
+    // where the planes of both ends meet, which is where s has a kink, where the secant of the slopes vanishes, which
+    // is near a smooth maximum, and in the middle.
     void along_circle(const Vector3d& pole, const Vector3d& start) {
         const Vector3d across = start - pole.dot(start) * pole;
         if (across.norm() < 0.1) return;
         const Vector3d u = across.normalized(), v = pole.cross(u);
         const auto at = [&](double angle) -> Vector3d { return std::cos(angle) * u + std::sin(angle) * v; };
-        const auto slope = [&](double angle) {
-            return (std::cos(angle) * v - std::sin(angle) * u).dot(between(at(angle)));
+        struct End {
+            double angle, slope;
+            Vector3d apart;
+        };
+        const auto look = [&](double angle) {
+            const Vector3d apart = between(at(angle));
+            return End{angle, (std::cos(angle) * v - std::sin(angle) * u).dot(apart), apart};
         };
         // Uphill from the start until the slope turns.
-        const double uphill = slope(0.0) > 0.0 ? 1.0 : -1.0;
-        double low = 0.0, high = 0.01;
-        while (uphill * slope(uphill * high) > 0.0) {
+        End low = look(0.0);
+        const double uphill = low.slope > 0.0 ? 1.0 : -1.0;
+        End high = look(uphill * 0.01);
+        while (uphill * high.slope > 0.0) {
             low = high;
-            high *= 2.0;
-            if (high > 1.0) return;
+            if (std::abs(high.angle) > 0.5) return;
+            high = look(2.0 * high.angle);
         }
-        for (int i = 0; i < 52; ++i) {
-            const double middle = 0.5 * (low + high);
-            (uphill * slope(uphill * middle) > 0.0 ? low : high) = middle;
+        const double flat = 1e-16 * (a_.solid->reach + b_.solid->reach);
+        for (int i = 0; i < 100; ++i) {
+            const double way = high.angle - low.angle;
+            if (std::abs(way) <= 4e-16) break;
+            double angle = low.angle + 0.5 * way;
+            bool meets = false;
+            if (i % 3 == 0) {
+                const Vector3d turn = low.apart - high.apart;
+                const double kink = std::atan(-u.dot(turn) / v.dot(turn));
+                meets = (kink - low.angle) * (kink - high.angle) < 0.0;
+                if (meets) angle = kink;
+            } else if (i % 3 == 1) {
+                angle = low.angle + way * low.slope / (low.slope - high.slope);
+            }
+            const End next = look(angle);
+            meets = meets && (next.apart == low.apart || next.apart == high.apart);
+            (uphill * next.slope > 0.0 ? low : high) = next;
+            if (meets || std::abs(next.slope) <= flat) break;
         }
-        take(at(uphill * low));
-        take(at(uphill * high));
+        take(at(low.angle));
+        take(at(high.angle));
     }
 
     // Newton's method on the sphere. A rim of radius R adds R/|n_⟂| t tᵀ to the Hessian of a support function, n_⟂
@@ -134,6 +161,7 @@ private:
     const Vector3d offset_;
     double value_ = -std::numeric_limits<double>::infinity();
     Vector3d normal_ = Vector3d::UnitZ();
+    Vector3d apart_ = Vector3d::Zero();  // from the support point of a to that of b, of the best normal
 };
 
 /// The end points of the edge that supports a direction, or twice the vertex.

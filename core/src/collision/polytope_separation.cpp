@@ -9,22 +9,46 @@
 namespace delassus::collision {
 namespace {
 
-/// The best face of first against second; sign −1 if first is b.
+/// The index of the vertex of a core that is least along a direction, of equals the first; value: where.
+std::size_t least_vertex(const Placed& placed, const Vector3d& direction, double& value) {
+    value = std::numeric_limits<double>::infinity();
+    std::size_t least = 0;
+    for (std::size_t i = 0; i < placed.vertices.size(); ++i) {
+        const double along = direction.dot(placed.vertices[i]);
+        if (along < value) {
+            value = along;
+            least = i;
+        }
+    }
+    return least;
+}
+
+// The best face of first against second; sign −1 if first is b. Each vertex v of second bounds the distance that a face
+// finds from above, n·v − offset: with the vertex of the best face so far, few faces of a large polytope have to look
+// at all vertices. The face that this bound promises most is looked at before the others, for what it is worth.
 void face_axes(const Placed& first, const Placed& second, const Vector3d& to_second, double sign, double preference,
                Separation& best) {
-    for (std::size_t f = 0; f < first.normals.size(); ++f) {
+    if (first.normals.empty()) return;
+    const auto& faces = first.solid->core.faces;
+    double unused = 0.0;
+    std::size_t witness = least_vertex(second, to_second, unused);
+    const auto distance_of = [&](std::size_t f, double least) {
+        return least + first.normals[f].dot(to_second) - faces[f].offset;
+    };
+    const auto bound = [&](std::size_t f) { return distance_of(f, first.normals[f].dot(second.vertices[witness])); };
+    std::size_t promising = 0;
+    for (std::size_t f = 1; f < faces.size(); ++f)
+        if (bound(f) > bound(promising)) promising = f;
+    double least = 0.0;
+    witness = least_vertex(second, first.normals[promising], least);
+    const double reached = distance_of(promising, least) - 3.0 * preference;
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+        if (bound(f) <= std::max(best.distance + preference, reached)) continue;
         const Vector3d& normal = first.normals[f];
-        double least = std::numeric_limits<double>::infinity();
-        std::size_t nearest = 0;
-        for (std::size_t i = 0; i < second.vertices.size(); ++i) {
-            const double value = normal.dot(second.vertices[i]);
-            if (value < least) {
-                least = value;
-                nearest = i;
-            }
-        }
-        const double distance = least + normal.dot(to_second) - first.solid->core.faces[f].offset;
+        const std::size_t nearest = least_vertex(second, normal, least);
+        const double distance = distance_of(f, least);
         if (distance <= best.distance + preference) continue;
+        witness = nearest;
         best.distance = distance;
         best.normal = sign * normal;
         const Vector3d vertex = second.vertices[nearest];
@@ -59,12 +83,41 @@ bool arcs_cross(const Placed& a, const Polytope::Edge& edge_a, const Vector3d& d
     return edge_a.left < 0 || edge_b.left < 0 || m1 * n2 > 0.0;
 }
 
+// With a normal n on the arc of an edge, between the normals l and r of its faces, two polytopes are at most n·x apart,
+// x leading from the edge to any point of the other polytope. Of all n on the arc that is at most the length of x
+// across the edge where x points between l and r, and else the larger of l·x and r·x.
+bool may_exceed(const Placed& placed, std::size_t edge, const Vector3d& x, double distance) {
+    const auto& [tail, head, left, right, direction] = placed.solid->core.edges[edge];
+    if (left < 0) return true;
+    const Vector3d &l = placed.normals[left], &r = placed.normals[right];
+    const double along_l = l.dot(x), along_r = r.dot(x);
+    if (std::max(along_l, along_r) > distance) return true;
+    if (distance <= 0.0) return false;  // a sum of l and r with positive shares is at most as long as their sum
+    const double cosine = l.dot(r);
+    if (along_r <= cosine * along_l || along_l <= cosine * along_r) return false;
+    const double along = placed.directions[edge].dot(x);
+    return x.squaredNorm() - along * along > distance * distance;
+}
+
+// Most pairs of edges are left out by the bound of one of the two, with the vertices as points that are nearest along
+// the best face.
 void edge_axes(const Placed& a, const Placed& b, const Vector3d& offset, double preference, Separation& best) {
     const Polytope& core_a = a.solid->core;
     const Polytope& core_b = b.solid->core;
+    double unused = 0.0;
+    const bool known = best.distance > -std::numeric_limits<double>::infinity();
+    const Vector3d direction = known ? best.normal : offset;
+    const Vector3d nearest_of_a = a.vertices[least_vertex(a, -direction, unused)];
+    const Vector3d nearest_of_b = offset + b.vertices[least_vertex(b, direction, unused)];
+    thread_local std::vector<std::size_t> edges_of_b;
+    edges_of_b.clear();
+    for (std::size_t j = 0; j < core_b.edges.size(); ++j)
+        if (may_exceed(b, j, nearest_of_a - offset - b.vertices[core_b.edges[j].tail], best.distance))
+            edges_of_b.push_back(j);
     for (std::size_t i = 0; i < core_a.edges.size(); ++i) {
         const Polytope::Edge& edge_a = core_a.edges[i];
-        for (std::size_t j = 0; j < core_b.edges.size(); ++j) {
+        if (!may_exceed(a, i, nearest_of_b - a.vertices[edge_a.tail], best.distance)) continue;
+        for (const std::size_t j : edges_of_b) {
             const Polytope::Edge& edge_b = core_b.edges[j];
             if (!arcs_cross(a, edge_a, a.directions[i], b, edge_b, b.directions[j])) continue;
             Vector3d normal = a.directions[i].cross(b.directions[j]);

@@ -69,6 +69,7 @@ Solid make_solid(const Shape& shape, std::int32_t index) {
         case ShapeKind::Convex:
             solid.radius = shape.margin;
             solid.core = hull_of(shape, index);
+            for (const Vector3d& vertex : solid.core.vertices) solid.half = solid.half.cwiseMax(vertex.cwiseAbs());
             break;
         case ShapeKind::Plane:
             break;
@@ -123,6 +124,7 @@ Vector3d half_extent(const Placed& placed) {
     Vector3d half = Vector3d::Constant(solid.radius);
     switch (solid.kind) {
         case ShapeKind::Box:
+        case ShapeKind::Convex:
             return half + magnitude * solid.half;
         case ShapeKind::Capsule:
             return half + solid.half_length * magnitude.col(2);
@@ -132,8 +134,6 @@ Vector3d half_extent(const Placed& placed) {
                 half[i] += solid.half_length * cosine + solid.cylinder_radius * std::sqrt(1.0 - cosine * cosine);
             }
             return half;
-        case ShapeKind::Convex:
-            return Vector3d::Constant(solid.reach);
         default:
             return half;
     }
