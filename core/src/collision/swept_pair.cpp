@@ -120,6 +120,7 @@ void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Swe
         contact.point_a = array(on_a);
         contact.point_b = array(on_b);
         contact.gap = vector(contact.normal).dot(on_b - on_a);
+        contact.on_the_way = true;
     }
 }
 

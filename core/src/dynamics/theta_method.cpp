@@ -377,9 +377,10 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
         return guess_.allFinite();
     };
-    if (contacts_.may_bounce()) {
-        smooth_ = changes_[0].empty() ? without_contacts(begin, h, solver, report) : guess_;
-        contacts_.time_bounces(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
+    if (contacts_.any()) {
+        const bool known = !changes_[0].empty() || !contacts_.may_bounce();
+        smooth_ = known ? guess_ : without_contacts(begin, h, solver, report);
+        contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
     }
     linearize_at_guess();
     if (!found()) return;

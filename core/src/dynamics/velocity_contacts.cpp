@@ -20,9 +20,9 @@ namespace delassus {
 //
 // with the guess ṽ⁺ of v⁺ (of the last iteration). So contacts are looked for twice, at q and at q̄, and paired by keys.
 // The term counts for contacts that pushed in the step before, which is where rows turn along with a smooth motion. A
-// contact that closes gets its impulse in the configuration D̄ alone: then u⁺ = −e u⁻ with one D on both sides, and e ≤
-// 1 gains no energy. It does not count either where rows changed by more than a turn of a smooth motion explains: the
-// tangents of a contact may jump.
+// contact that closes gets its impulse in one configuration, D̄ or (`once`) that in which it meets: then u⁺ = −e u⁻ with
+// one D on both sides, and e ≤ 1 gains no energy. It does not count either where rows changed by more than a turn of a
+// smooth motion explains: the tangents of a contact may jump.
 //
 // Rates, those of bodies with a given motion, are means over the step that rows are collected for: at q over all of it,
 // at q̄ over the rest (1 − θ) h. So they belong to t + h/2 and t + (1 + θ) h/2, and the same formula gives the rate at
@@ -61,8 +61,7 @@ namespace delassus {
 //     M x = (1 − θ − τ/h) h Dᵀ P
 //
 // is what positions lack, where the step moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end
-// of the step (position_projection.cpp). Of an impulse that holds a contact besides, the part counts that changes the
-// speed as a bounce does.
+// of the step (position_projection.cpp).
 //
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)
@@ -322,6 +321,9 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             contact.known = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
+            const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
+            contact.met_on_the_way =
+                before->block >= first_before && before_.contacts()[before->block - first_before].on_the_way;
         } else {
             contact.gap = rows_.rows()[row].gap - theta_ * h_ * block.speed;
             contact.approach = -block.speed;
@@ -330,9 +332,8 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.left = settings_.once && block.restitution > 0.0 && opening > settings_.recovery_speed &&
                        (1.0 - theta_) * h_ * opening > std::abs(contact.gap);
         contact.pushed = contact.pushed && !contact.left;
-        if (before)
-            contact.turns =
-                (contact.pushed || !contact.along_normal) && nearly_equal(row, before->row, block.cone.rows);
+        if (before) contact.nearly_as_before = nearly_equal(row, before->row, block.cone.rows);
+        contact.turns = contact.nearly_as_before && (contact.pushed || !contact.along_normal);
         const auto entry = static_cast<std::size_t>(rows_.row_start()[row]);
         const auto entries = static_cast<std::size_t>(rows_.row_start()[row + 1]) - entry;
         contact.resolution =

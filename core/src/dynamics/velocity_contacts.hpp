@@ -58,9 +58,9 @@ public:
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
     /// Whether a contact has restitution.
     [[nodiscard]] bool may_bounce() const;
-    /// `once`, before set_b(): the bounces of the step at their times. smooth: the velocities at its end without
-    /// impacts, n.
-    void time_bounces(const Problem& problem, std::span<const double> smooth);
+    /// `once`, before set_b(): contacts that meet within the step get the rows of that time, and bounce then. smooth:
+    /// the velocities at the end of the step without impacts, n.
+    void time_meetings(Problem& problem, std::span<const double> smooth);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// solution: of the last iteration; natural_error: of the solves so far.
     void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
@@ -119,19 +119,21 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
-        bool known = false;       ///< it is in before_
-        bool turns = false;       ///< b has what its rows turn until the end of the step
-        double gap = 0.0;         ///< at the beginning
-        double resolution = 0.0;  ///< of it
-        double approach = 0.0;    ///< speed with which it closes there
-        double normal = 0.0;      ///< b of the first row but for what follows from the guess
-        double friction = 0.0;    ///< of a contact with De Saxcé's term
-        double sliding = -1.0;    ///< the term; negative: not known yet
-        double moved = 0.0;       ///< by which it changed last
-        double wanted = 0.0;      ///< what it should have been before
-        double end_speed = 0.0;   ///< of the normal row
-        double change = 0.0;      ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
-        double recovery = 0.0;    ///< speed with which it is pushed apart
+        bool known = false;             ///< it is in before_
+        bool turns = false;             ///< b has what its rows turn until the end of the step
+        bool nearly_as_before = false;  ///< it is known, and its rows turn as a smooth motion lets them
+        bool met_on_the_way = false;    ///< its rows in before_ are those of the meeting
+        double gap = 0.0;               ///< at the beginning
+        double resolution = 0.0;        ///< of it
+        double approach = 0.0;          ///< speed with which it closes there
+        double normal = 0.0;            ///< b of the first row but for what follows from the guess
+        double friction = 0.0;          ///< of a contact with De Saxcé's term
+        double sliding = -1.0;          ///< the term; negative: not known yet
+        double moved = 0.0;             ///< by which it changed last
+        double wanted = 0.0;            ///< what it should have been before
+        double end_speed = 0.0;         ///< of the normal row
+        double change = 0.0;            ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        double recovery = 0.0;          ///< speed with which it is pushed apart
         const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
         bool pushed = false;                         ///< in the step before
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
@@ -148,6 +150,9 @@ private:
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
+    /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
+    /// that cannot be.
+    bool take_rows_at(double time, std::size_t block, Problem& problem);
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
     template <class Visit>

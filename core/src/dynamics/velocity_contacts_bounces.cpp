@@ -12,25 +12,75 @@ bool VelocityContacts::may_bounce() const {
                        [](const UnilateralRows::Block& block) { return block.restitution > 0.0; });
 }
 
-void VelocityContacts::time_bounces(const Problem& problem, std::span<const double> smooth) {
+// In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²),
+// and their rates likewise, which are means about h/2 and (1 + θ) h/2. What shapes meet on their way has rows of the
+// meeting at the beginning.
+bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& problem) {
+    const Contact& contact = contacts_[block];
+    if (!contact.nearly_as_before && !contact.met_on_the_way) return false;
+    const std::size_t first = first_row_ + contact.row;
+    const auto rows = static_cast<std::size_t>(rows_.blocks()[block].cone.rows);
+    auto& D = problem.D;
+    const auto begin = static_cast<std::size_t>(D.row_start[first]);
+    const auto entries = static_cast<std::size_t>(D.row_start[first + rows]) - begin;
+    const auto then = static_cast<std::size_t>(before_.row_start()[contact.before]);
+    if (static_cast<std::size_t>(before_.row_start()[contact.before + rows]) != then + entries ||
+        !std::equal(D.column.begin() + static_cast<std::ptrdiff_t>(begin),
+                    D.column.begin() + static_cast<std::ptrdiff_t>(begin + entries),
+                    before_.column().begin() + static_cast<std::ptrdiff_t>(then)))
+        return false;
+    const double share = contact.met_on_the_way ? 0.0 : time / (theta_ * h_);
+    for (std::size_t e = 0; e < entries; ++e)
+        D.value[begin + e] += (1.0 - share) * (before_.value()[then + e] - D.value[begin + e]);
+    for (std::size_t i = 0; i < rows; ++i) {
+        double& rate = rows_.rows()[contact.row + i].rate;
+        rate += (1.0 - (time - 0.5 * h_) / (0.5 * theta_ * h_)) * (before_.rows()[contact.before + i].rate - rate);
+    }
+    return true;
+}
+
+// The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). The row of that time, which
+// stays, meets at the same time from another gap.
+void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
-        if (!contact.along_normal || block.restitution == 0.0) continue;
-        const double gap = contact.resolved_gap(), speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
-        if (contact.pushed && std::abs(drift) <= 2.0 * std::abs(gap)) continue;  // it corrects
-        const double end = problem.D.row_times(static_cast<std::int32_t>(first_row_ + contact.row), smooth.data()) +
-                           rows_.rows()[contact.row].rate;
-        const auto bounce =
-            bounce_within(h_, std::max(contact.gap, 0.0), block.speed, (end - block.speed) / h_, block.restitution);
-        if (bounce && bounce->closing > settings_.restitution_speed) {
+        double gap = contact.resolved_gap();
+        const bool bounces = block.restitution > 0.0;
+        if (!contact.along_normal || !(bounces || (gap > 0.0 && !contact.pushed))) continue;
+        double speed = -contact.approach;
+        if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap)) continue;  // it corrects
+        const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
+        const auto speed_of = [&](const double* v) {
+            return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
+        };
+        const auto acceleration = [&] { return (speed_of(smooth.data()) - speed_of(begin_speeds_)) / h_; };
+        const auto meeting_from = [&](double from, double begin, double turning) {
+            return bounce_within(h_, from, begin, acceleration() + turning, block.restitution);
+        };
+        const double open = std::max(contact.gap, 0.0);
+        const double turning = contact.met_on_the_way ? 0.0 : (block.speed - speed) / (theta_ * h_);
+        const auto meeting = meeting_from(open, speed, turning);
+        const double time = meeting ? meeting->meets : h_;
+        const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
+        std::optional<Bounce> bounce;
+        if (take_rows_at(time, k, problem)) {
+            speed = speed_of(begin_speeds_);
+            gap = left - (speed + 0.5 * acceleration() * time) * time;
+            if (meeting) bounce = meeting_from(std::max(gap, 0.0), speed, 0.0);
+            contact.turns = false;
+        } else {
+            bounce = meeting_from(open, block.speed, 0.0);
+        }
+        const double drift = (1.0 - theta_) * h_ * speed;
+        if (bounces && bounce && bounce->closing > settings_.restitution_speed) {
             contact.bounce = bounce;
             contact.bounces = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;
             contact.normal = -bounce->end_speed;
             contact.recovery = 0.0;
-        } else if (gap > 0.0 && speed < -settings_.restitution_speed) {
-            contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
+        } else if (gap > 0.0 && (!bounces || speed < -settings_.restitution_speed)) {
+            contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_) - (bounces ? speed : 0.0);
             contact.recovery = 0.0;
         }
     }
@@ -54,9 +104,8 @@ bool VelocityContacts::bounced(const Solution& solution) const {
 void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& solution,
                                         std::vector<double>& momentum) const {
     const auto& D = problem.D;
-    for_each_bounced(solution, [&](const Contact& contact, const Bounce& bounce, std::size_t first, std::size_t rows) {
-        const double share = std::min(bounce.change / contact.change, 1.0);
-        const double late = share * (1.0 - theta_ - bounce.acts / h_);
+    for_each_bounced(solution, [&](const Contact&, const Bounce& bounce, std::size_t first, std::size_t rows) {
+        const double late = 1.0 - theta_ - bounce.acts / h_;
         for (std::size_t row = first; row < first + rows; ++row)
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 momentum[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] +=
