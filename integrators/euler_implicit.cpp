@@ -13,8 +13,9 @@ namespace {
 // increment of the position, so that the lower right-hand side is −C; seed eq. 156 with its unknown Δv = Δq/h has −C/h
 // (not −C_q/h, and Δq = h Δv, not (h/2) Δv as the line above it says).
 //
-// L-stable: the energy of linear systems never grows, and motions much faster than 1/h vanish within a step. λ is of
-// first order from the second step on. In the first step v̇, and so λ, is off by a share that does not fall with h,
+// L-stable: motions much faster than 1/h vanish within a step, and the energy of linear systems never grows, as the
+// balance M (v⁺ − v) = −h K q⁺ − h R v⁺ times v⁺ is E⁺ − E = −½‖v⁺ − v‖²_M − ½‖q⁺ − q‖²_K − h v⁺ᵀR v⁺. λ is of first
+// order from the second step on. In the first step v̇, and so λ, is off by a share that does not fall with h,
 // because (q_1 − q_0)/h is the velocity in the middle of the step.
 const RegisterTimestepper euler_implicit_row{
     {.name = "euler_implicit",

@@ -33,7 +33,7 @@ namespace {
 //
 // and the third stage is the end of the step. What (1) lets drift, C itself, is returned to 0 at the end of each step.
 //
-// Why this method: measured against steps of BDF by SUNDIALS' IDA, see docs/integrators.md.
+// Why this method: measured against steps of BDF by SUNDIALS' IDA, see docs/measurements.md.
 
 struct Coefficients {
     Eigen::Vector3d c, error;

@@ -17,7 +17,7 @@ namespace {
 // −C/h and so converges at half speed.
 //
 // In a constrained system, v̇_n is forced through λ_n: the error of λ changes its sign every step and is not damped, as
-// the rule has the eigenvalue −1 (twice) at infinite frequency. docs/integrators.md gives its order.
+// the rule has the eigenvalue −1 (twice) at infinite frequency. docs/measurements.md has its order.
 const RegisterTimestepper trapezoidal_row{
     {.name = "trapezoidal",
      .description = "trapezoidal rule by Newton's method; no damping, its multipliers oscillate",

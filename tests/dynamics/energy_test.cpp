@@ -127,7 +127,7 @@ TEST(Energy, OfStiffModesFallsByTheFactorChosen) {
         }
 }
 
-// What never grows with the generalised-α form (docs/integrators.md, "Energy of stiff linear systems"): with
+// What never grows with the generalised-α form (derived in integrators/generalized_alpha.cpp): with
 // r = M (a − v̇), δ = ½ − α_f, g = α_f − α_m and b = β − γ/2 = g²/4,
 //     E + ½ b h² aᵀM a + δ/(2g) rᵀK⁻¹ r
 TEST(Energy, WithItsAlgorithmicTermsNeverGrowsWithGeneralizedAlpha) {

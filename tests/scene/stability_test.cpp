@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ten seconds of stiff mechanisms: constraints hold and nothing runs away (docs/integrators.md has the figures).
+// Ten seconds of stiff mechanisms: constraints hold and nothing runs away (docs/measurements.md has the figures).
 #include <gtest/gtest.h>
 
 #include <cmath>

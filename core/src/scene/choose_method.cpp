@@ -21,7 +21,7 @@ namespace {
 // eigenvalues of A among them. None is above the largest of the bodies without joints, as eigenvalues of a projected
 // pencil lie between those of the whole: so the joints are looked at only where the bodies alone are too fast.
 
-/// h ω up to which explicit parts cost less than an implicit step (measured: docs/integrators.md).
+/// h ω up to which explicit parts cost less than an implicit step (measured).
 constexpr double most_explicit_rate = 50.0;
 /// With elements: they vibrate in as many ways as they have nodes or bodies, without damping, and a share of each
 /// tolerance feeds all of them where steps are near the stability limit.
