@@ -12,7 +12,7 @@ add_dependencies(product delassus_command delassus_documents delassus_pages ${mo
 install(TARGETS delassus_command EXPORT delassusSdkTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 # The suites of `delassus bench`, with what they name; they are found beside libdelassus, in the build tree too.
 file(CREATE_LINK "${PROJECT_SOURCE_DIR}/examples" "${DELASSUS_MODULE_DIRECTORY}/examples" SYMBOLIC)
-install(DIRECTORY examples/suites examples/problems examples/scenes DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/examples
+install(DIRECTORY examples/suites examples/problems examples/scenes examples/models DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/examples
         COMPONENT command)
 install(FILES docs/scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/delassus COMPONENT command)
 install(FILES "${DELASSUS_PLUGIN_DIRECTORY}/not-built.list" DESTINATION ${CMAKE_INSTALL_LIBDIR}/delassus/plugins
