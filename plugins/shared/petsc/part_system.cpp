@@ -283,11 +283,16 @@ double PartSystem::natural(const sdk::Vector& lambda, const sdk::Vector& u) cons
     return std::sqrt(processes().sum(sum)) / reference_;
 }
 
-double PartSystem::measured(const sdk::LocalProblemView& problem, const sdk::Vector& lambda, sdk::Vector& x) const {
-    x = velocity(problem, lambda);
+sdk::Vector PartSystem::velocities(const sdk::LocalProblemView& problem, const sdk::Vector& lambda,
+                                   const sdk::Vector& x) const {
     sdk::Vector u = problem.b + apply_D(x);
     if (E_.nonZeros() > 0) u += E_ * lambda;
-    return natural(lambda, u);
+    return u;
+}
+
+double PartSystem::measured(const sdk::LocalProblemView& problem, const sdk::Vector& lambda, sdk::Vector& x) const {
+    x = velocity(problem, lambda);
+    return natural(lambda, velocities(problem, lambda, x));
 }
 
 void PartSystem::dense_rows(std::int32_t first, std::int32_t rows, std::vector<std::int32_t>& local,
