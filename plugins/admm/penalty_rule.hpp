@@ -33,12 +33,7 @@ public:
     }
 
     /// Takes an iterate (m each, scaled), the best natural error so far and the penalty in use; the penalty to use.
-    [[nodiscard]] double next(const sdk::Vector& lambda, const sdk::Vector& z, double best, std::int64_t iteration,
-                              double penalty) {
-        return next(lambda, z, best, iteration, penalty, [](const sdk::Vector& v) { return v.norm(); });
-    }
-
-    /// As above for the own rows of a problem in parts: norm(v) is that of all processes' rows.
+    /// norm(v): of all rows, those of other processes too.
     template <class Norm>
     [[nodiscard]] double next(const sdk::Vector& lambda, const sdk::Vector& z, double best, std::int64_t iteration,
                               double penalty, const Norm& norm) {

@@ -79,7 +79,7 @@ double longest_step_in_cone(const Triple& ell, const Triple& d) {
 
 }  // namespace
 
-void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& system) {
+void Complementarity::load(const sdk::ProblemView& problem, const sdk::Vector& z_scale) {
     path_ = problem.coulomb ? Path::Product : Path::Associated;
     share_ = 1.0;
     intervals_.clear();
@@ -89,7 +89,7 @@ void Complementarity::load(const sdk::ProblemView& problem, const ScaledSystem& 
     held_.assign(static_cast<std::size_t>(problem.m), 0);
     held_value_.setZero(problem.m);
     const auto add_interval = [&](std::int32_t row, double lower, double upper) {
-        const double lo = lower / system.z_scale[row], hi = upper / system.z_scale[row];
+        const double lo = lower / z_scale[row], hi = upper / z_scale[row];
         if (!(lo < hi)) {
             held_[static_cast<std::size_t>(row)] = 1;
             held_value_[row] = lo;

@@ -54,8 +54,8 @@ public:
     /// θ of a row that is held where it is.
     static constexpr double held = 1e40;
 
-    /// Takes the cones' parameters in units of system.
-    void load(const sdk::ProblemView& problem, const ScaledSystem& system);
+    /// Takes the cones' parameters in scaled units; z_scale: λ = z_scale ∘ ẑ, m.
+    void load(const sdk::ProblemView& problem, const sdk::Vector& z_scale);
 
     /// Starts from ẑ, with ŝ as wanted, both moved into the interior, at least as far from its boundary as the margins.
     void start(const sdk::Vector& z, const sdk::Vector& s, double z_margin, double s_margin);

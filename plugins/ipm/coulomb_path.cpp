@@ -34,14 +34,14 @@ bool InteriorPoint::follow_shift(const Judge& judge, double tau, double goal, in
     for (int k = 0;; ++k) {
         find_residuals();
         cones_.scale(theta_);
-        const double rest = std::max(cones_.distance_from_centre(tau), std::hypot(f_.norm(), g_.norm()) / size);
+        const double rest = std::max(cones_.distance_from_centre(tau), system_.norm(f_, g_) / size);
         if (!std::isfinite(rest)) return false;
         if (k > 0 && rest < goal) return true;
         if (k == most || is_stopped_) return false;
-        kkt_.factorize(cones_, theta_);
+        system_.factorize(cones_, theta_);
         cones_.rows_to_basis(g_);
         cones_.target(tau, false, target_);
-        find_direction(corrector_residual);
+        find_direction(Equations::tightest_residual);
         if (!move(std::min(1.0, 0.9 * cones_.longest_step()))) return false;
         is_stopped_ = judge();
     }
@@ -61,14 +61,14 @@ bool InteriorPoint::hop(const Judge& judge, double tau) {
     };
     for (int k = 0; k < longest_flow && !is_stopped_; ++k) {
         cones_.set_share(h / (1.0 + h));
-        const std::int64_t before = kkt_.factorizations();
+        const std::int64_t before = system_.factorizations();
         if (!follow_shift(judge, tau, newton_goal, most_newton_steps)) {
             undo();
             h *= 0.4;
             if (++failures > 10) break;
             continue;
         }
-        const std::int64_t steps = kkt_.factorizations() - before;
+        const std::int64_t steps = system_.factorizations() - before;
         failures = 0;
         lag = cones_.shift_lag() / size;
         cones_.advance_shift();

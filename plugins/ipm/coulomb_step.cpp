@@ -23,18 +23,18 @@ constexpr double equations_for_jam = 0.3;  // rest of the equations from which s
 
 void InteriorPoint::aim(double tau, bool second_order) {
     cones_.target(tau, second_order, target_);
-    find_direction(corrector_residual);
+    find_direction(Equations::tightest_residual);
 }
 
 // After a short step the next ones aim at the present products first.
-bool InteriorPoint::coulomb_step() {
+bool InteriorPoint::step() {
     cones_.scale(theta_);
-    kkt_.factorize(cones_, theta_);
+    system_.factorize(cones_, theta_);
     cones_.rows_to_basis(g_);
     const double tau = cones_.mean_product();
     if (!(tau > 0.0)) {
         cones_.target_zero(target_);
-        find_direction(corrector_residual);
+        find_direction(Equations::tightest_residual);
         return move(std::min(1.0, step_fraction_ * cones_.longest_step()));
     }
     const double smallest = cones_.smallest_product(0.0) / tau;
@@ -42,7 +42,7 @@ bool InteriorPoint::coulomb_step() {
         aim(centre_next_ > 1 ? tau : 0.8 * tau, false);
     } else {
         cones_.target_zero(target_);
-        find_direction(predictor_residual);
+        find_direction(Equations::predictor_residual);
         const double predicted = std::min(1.0, cones_.longest_step()), rest = 1.0 - predicted;
         const double reduction = std::max(predicted < 0.9 ? rest * rest * rest : rest * rest, least_reduction);
         aim(reduction * tau, predicted > fair_prediction);
@@ -50,7 +50,7 @@ bool InteriorPoint::coulomb_step() {
             aim(std::max(reduction, careful_reduction) * tau, false);
             if (allowed_length() < length) {
                 cones_.target_zero(target_);
-                find_direction(predictor_residual);
+                find_direction(Equations::predictor_residual);
                 aim(reduction * tau, true);
             }
         }
@@ -65,7 +65,7 @@ bool InteriorPoint::coulomb_step() {
 }
 
 bool InteriorPoint::is_jammed() const {
-    return jam_ >= jammed && std::hypot(f_.norm(), g_.norm()) < equations_for_jam;
+    return jam_ >= jammed && system_.norm(f_, g_) < equations_for_jam;
 }
 
 }  // namespace delassus::ipm

@@ -204,7 +204,7 @@ void KktSystem::add_normal_block(std::size_t group) {
     }
 }
 
-void KktSystem::solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz) {
+void KktSystem::solve_factored(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz) {
     if (form_ == Form::Reduced) {
         dx.resize(0);
         dz = g;
@@ -265,51 +265,30 @@ void KktSystem::subtract_beside(const sdk::Vector& dz, sdk::Vector& rest) const 
     }
 }
 
-double KktSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
-                        sdk::Vector& dx, sdk::Vector& dz) {
-    const auto norm = [this](const sdk::Vector& x, const sdk::Vector& z) {
-        return std::sqrt(x.squaredNorm() + z.cwiseProduct(weight_).squaredNorm());
-    };
-    const double size = norm(f, g);
-    dx.setZero(n_);
-    dz.setZero(m_);
-    if (!(size > 0.0)) return 0.0;
-    f_rest_ = f;
-    g_rest_ = g;
-    double rest = size;
-    for (int refinement = 0;; ++refinement) {
-        solve_once(f_rest_, g_rest_, correction_x_, correction_z_);
-        for (Eigen::Index i = 0; i < m_; ++i)
-            if (cones.is_held(i)) correction_z_[i] = 0.0;
-        dx += correction_x_;
-        dz += correction_z_;
-        unrotated_ = dz;
-        cones.reactions_from_basis(unrotated_);
-        f_rest_ = f;
-        product_.setZero(m_);
-        if (n_ > 0) {
-            f_rest_.noalias() -= system_->H * dx;
-            f_rest_.noalias() += system_->D.transpose() * unrotated_;
-            product_.noalias() += system_->D * dx;
-        }
-        if (system_->E.nonZeros() > 0) product_.noalias() += system_->E * unrotated_;
-        cones.rows_to_basis(product_);
-        g_rest_ = g - product_ - theta_.cwiseProduct(dz);
-        if (unsymmetric_) subtract_beside(dz, g_rest_);
-        for (Eigen::Index i = 0; i < m_; ++i)
-            if (cones.is_held(i)) g_rest_[i] = 0.0;
-        const double next = norm(f_rest_, g_rest_);
-        if (!(next < rest)) {
-            if (refinement > 0) {
-                dx -= correction_x_;
-                dz -= correction_z_;
-            }
-            return (refinement > 0 ? rest : next) / size;
-        }
-        const bool slow = next > 0.5 * rest;
-        rest = next;
-        if (rest <= enough * size || slow || refinement >= settings_.refinements) return rest / size;
+void KktSystem::solve_once(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double,
+                           sdk::Vector& dx, sdk::Vector& dz) {
+    solve_factored(f, g, dx, dz);
+    for (Eigen::Index i = 0; i < m_; ++i)
+        if (cones.is_held(i)) dz[i] = 0.0;
+}
+
+void KktSystem::find_rest(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g,
+                          const sdk::Vector& dx, const sdk::Vector& dz, sdk::Vector& f_rest, sdk::Vector& g_rest) {
+    unrotated_ = dz;
+    cones.reactions_from_basis(unrotated_);
+    f_rest = f;
+    product_.setZero(m_);
+    if (n_ > 0) {
+        f_rest.noalias() -= system_->H * dx;
+        f_rest.noalias() += system_->D.transpose() * unrotated_;
+        product_.noalias() += system_->D * dx;
     }
+    if (system_->E.nonZeros() > 0) product_.noalias() += system_->E * unrotated_;
+    cones.rows_to_basis(product_);
+    g_rest = g - product_ - theta_.cwiseProduct(dz);
+    if (unsymmetric_) subtract_beside(dz, g_rest);
+    for (Eigen::Index i = 0; i < m_; ++i)
+        if (cones.is_held(i)) g_rest[i] = 0.0;
 }
 
 std::string KktSystem::description() const {

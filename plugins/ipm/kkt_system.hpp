@@ -14,6 +14,7 @@
 // without exchanging pivots.
 #pragma once
 
+#include <cmath>
 #include <string>
 
 #include "complementarity.hpp"
@@ -43,10 +44,17 @@ public:
     /// sdk::NumericalFailure if it does not for any.
     void factorize(const Complementarity& cones, const sdk::Vector& theta);
 
-    /// Solves for δx (n) and δz (m) from f (n) and g (m); rows of g and δz in the bases. Refines until the
-    /// relative residual, which it returns, is at most `enough`.
-    double solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
-                 sdk::Vector& dx, sdk::Vector& dz);
+    // What Refinement takes. f: n, g: m; rows of g and δz in the bases.
+    /// δx and δz from the factor.
+    void solve_once(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double, sdk::Vector& dx,
+                    sdk::Vector& dz);
+    /// What δx and δz leave of the system.
+    void find_rest(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, const sdk::Vector& dx,
+                   const sdk::Vector& dz, sdk::Vector& f_rest, sdk::Vector& g_rest);
+    [[nodiscard]] double weighted_norm(const sdk::Vector& f, const sdk::Vector& g) const {
+        return std::sqrt(f.squaredNorm() + g.cwiseProduct(weight_).squaredNorm());
+    }
+    [[nodiscard]] int refinements() const { return settings_.refinements; }
 
     /// The form in use, its fill and the regularisation, for a message.
     [[nodiscard]] std::string description() const;
@@ -81,7 +89,7 @@ private:
         return (unsymmetric_ ? d_reactions_ : d_rotated_).data() + d_blocks_[group].value;
     }
     void add_normal_block(std::size_t group);
-    void solve_once(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz);
+    void solve_factored(const sdk::Vector& f, const sdk::Vector& g, sdk::Vector& dx, sdk::Vector& dz);
 
     KktSettings settings_;
     Form form_ = Form::Automatic;
@@ -111,7 +119,7 @@ private:
     std::vector<Triple> t_;                                  // rows of T, three a group
     sdk::SparseFactor factor_;
     std::int64_t analyses_ = 0, factorizations_ = 0;
-    sdk::Vector stacked_, f_rest_, g_rest_, correction_x_, correction_z_, unrotated_, product_;
+    sdk::Vector stacked_, unrotated_, product_;
     sdk::Vector weight_, theta_;
 };
 

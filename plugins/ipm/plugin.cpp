@@ -5,7 +5,6 @@ namespace {
 
 using delassus::sdk::choice_option;
 using delassus::sdk::integer_option;
-using delassus::sdk::real_option;
 
 constexpr const char* forms[] = {"auto", "normal", "augmented"};
 
@@ -15,10 +14,9 @@ constexpr delassus_option options[] = {
     choice_option(
         "form", "auto", forms,
         "what is factored where n > 0: H + D'TD (if E couples no two cones), or the quasi-definite saddle point"),
-    real_option("step_fraction", "0.99", 0.5, 0.9999, "", "part of the way to the boundary that a step may take"),
-    real_option("regularization", "1e-13", 1e-15, 1e-4, "",
-                "static regularisation of the rows, relative to the diagonal of N; refinement removes its effect"),
-    integer_option("refinements", "3", 0, 100, "", "largest number of refinements of a linear solve"),
+    delassus::ipm::step_fraction_option,
+    delassus::ipm::regularization_option,
+    delassus::ipm::refinements_option,
     integer_option("stall_iterations", "15", 0, 1e9, "iterations",
                    "give up after this many iterations without an improvement by 1 % (exact Coulomb near the end: by "
                    "half); 0: never"),

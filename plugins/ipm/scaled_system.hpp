@@ -2,6 +2,7 @@
 // The problem in variables without units whose friction cones are second-order cones.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "delassus/sdk/delassus_operator.hpp"
@@ -33,6 +34,24 @@ struct ScaledSystem {
     sdk::Vector z_scale;   ///< m: λ = z_scale ∘ ẑ
 };
 
+/// The diagonal of P, from that of N; m. mean: what rows whose diagonal is zero take for theirs.
+inline sdk::Vector row_scale(const sdk::ConeRange& cones, const sdk::Vector& diagonal, double mean) {
+    sdk::Vector p(diagonal.size());
+    for (const delassus_cone& cone : cones) {
+        const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
+        const double mu = friction ? sdk::friction_coefficient(cone) : 0.0;
+        const double normal = mu > 0.0 ? 1.0 / mu : 1.0;
+        double square = 0.0;
+        for (std::int32_t i = 0; i < cone.rows; ++i)
+            square += diagonal[cone.first_row + i] * (i == 0 ? normal * normal : 1.0) / cone.rows;
+        for (std::int32_t i = 0; i < cone.rows; ++i) {
+            const double size = friction ? square : diagonal[cone.first_row + i];
+            p[cone.first_row + i] = (i == 0 && friction ? normal : 1.0) / std::sqrt(size > 0.0 ? size : mean);
+        }
+    }
+    return p;
+}
+
 /// Measures N and the natural error in the problem's units, and makes the scaled system.
 class Scaling {
 public:
@@ -44,12 +63,9 @@ public:
 
     [[nodiscard]] const ScaledSystem& system() const { return system_; }
 
-    struct Error {
-        double natural = 0.0, balance = 0.0;
-    };
-    /// The errors by which the host judges λ (m); x (n) is read where H is semidefinite, otherwise H⁻¹(a + Dᵀλ) is
-    /// written there, and balance is zero.
-    [[nodiscard]] Error measure(const sdk::ProblemView& problem, sdk::Vector& x, const sdk::Vector& lambda) const;
+    /// The error by which the host judges λ (m). Where H is definite x ← H⁻¹(a + Dᵀλ) first, and it is the natural
+    /// error; otherwise x (n) is read, and the balance ‖Hx − Dᵀλ − a‖ over its largest term counts too.
+    [[nodiscard]] double measure(const sdk::ProblemView& problem, sdk::Vector& x, const sdk::Vector& lambda) const;
 
     /// Whether H is known to be definite.
     [[nodiscard]] bool definite() const { return definite_; }

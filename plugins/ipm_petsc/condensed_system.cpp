@@ -2,6 +2,8 @@
 #include "condensed_system.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -17,24 +19,32 @@ constexpr double most_gained = 1e-10;  // factor by which conjugate gradients lo
 
 }  // namespace
 
-void CondensedSystem::analyze(const PartSystem& system, const sdk::LocalProblemView& problem) {
-    system_ = &system;
+double CondensedSystem::corrector_residual(double tau, double degree, double equations) {
+    constexpr double loosest = 1e-3;
+    const double root = std::sqrt(degree), size = root * std::sqrt(tau);
+    const double forcing = 0.1 * std::min(root * tau, std::sqrt(tau) * std::max(equations, root * tau));
+    return std::clamp(forcing / std::max(size, equations), tightest_residual, loosest);
+}
+
+void CondensedSystem::analyze(const sdk::LocalProblemView& problem) {
+    PartSystem::analyze(Processes(*problem.raw), problem);
     groups_ = coupled_rows(problem);
-    kind_ = wanted_ == "hypre"                                               ? LinearSolver::Hypre
-            : wanted_ == "bjacobi"                                           ? LinearSolver::BlockJacobi
-            : wanted_ == "schwarz"                                           ? LinearSolver::Schwarz
-            : wanted_ == "mumps"                                             ? LinearSolver::Mumps
-            : problem.raw->n_all > most_factored * system.processes().size() ? LinearSolver::Schwarz
-                                                                             : LinearSolver::Mumps;
+    const std::string& wanted = settings_.preconditioner;
+    kind_ = wanted == "hypre"                                         ? LinearSolver::Hypre
+            : wanted == "bjacobi"                                     ? LinearSolver::BlockJacobi
+            : wanted == "schwarz"                                     ? LinearSolver::Schwarz
+            : wanted == "mumps"                                       ? LinearSolver::Mumps
+            : problem.raw->n_all > most_factored * processes().size() ? LinearSolver::Schwarz
+                                                                      : LinearSolver::Mumps;
     krylov_.reset();
     matrix_.reset();
     ++analyses_;
 }
 
-void CondensedSystem::load(const PartSystem& system, const sdk::LocalProblemView& problem, const sdk::Vector& scale) {
-    system_ = &system;
-    scale_ = scale;
-    delta_ = regularization_;
+void CondensedSystem::load(const sdk::LocalProblemView& problem, PartCones& cones) {
+    problem_ = &problem;
+    PartSystem::load(problem);
+    delta_ = settings_.regularization;
     R_.setOnes(problem.n);
     for (Eigen::Index i = 0; i < problem.n; ++i) {
         const auto row = static_cast<std::size_t>(i);
@@ -43,11 +53,22 @@ void CondensedSystem::load(const PartSystem& system, const sdk::LocalProblemView
             if (problem.H.column[e] == problem.first_column() + i && problem.H.value[e] > 0.0)
                 R_[i] = 1.0 / std::sqrt(problem.H.value[e]);
     }
+    double rho = reference();
+    if (problem.raw->m_all == 0)
+        if (const double size = norm(R_.cwiseProduct(problem.a)); size > 0.0) rho = size;
+    std::array<double, 2> sums = {diagonal().sum(), static_cast<double>((diagonal().array() > 0.0).count())};
+    processes().sum(sums);
+    p_ = ipm::row_scale(problem.cones, diagonal(), sums[1] > 0.0 ? sums[0] / sums[1] : 1.0);
+    x_scale_ = rho * R_;
+    z_scale_ = rho * p_;
+    a_ = R_.cwiseProduct(problem.a) / rho;
+    b_ = p_.cwiseProduct(problem.b) / rho;
+    cones.load(PartSystem::rows(), z_scale_, processes());
 }
 
-sdk::Vector CondensedSystem::apply_E(const sdk::Vector& z) const {
-    if (system_->E().nonZeros() == 0) return sdk::Vector::Zero(z.size());
-    return scale_.cwiseProduct(system_->E() * scale_.cwiseProduct(z));
+sdk::Vector CondensedSystem::times_E(const sdk::Vector& z) const {
+    if (E().nonZeros() == 0) return sdk::Vector::Zero(z.size());
+    return p_.cwiseProduct(E() * p_.cwiseProduct(z));
 }
 
 void CondensedSystem::find_T(const Complementarity& cones, const sdk::Vector& theta) {
@@ -55,11 +76,11 @@ void CondensedSystem::find_T(const Complementarity& cones, const sdk::Vector& th
     std::int32_t first = 0;
     for (std::size_t g = 0; g < groups_.size(); first += groups_[g++]) {
         const int rows = groups_[g];
-        Eigen::Matrix3d E = Eigen::Matrix3d::Zero();
+        Eigen::Matrix3d block = Eigen::Matrix3d::Zero();  // Ê, then Uᵀ Ê U + θ + δ
         for (int i = 0; i < rows; ++i)
             for (int j = 0; j < rows; ++j)
-                E(i, j) = scale_[first + i] * system_->E().coeff(first + i, first + j) * scale_[first + j];
-        if (E.isZero(0.0)) {
+                block(i, j) = p_[first + i] * E().coeff(first + i, first + j) * p_[first + j];
+        if (block.isZero(0.0)) {
             for (int i = 0; i < rows; ++i)
                 t_[3 * g + static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] =
                     1.0 / (theta[first + i] + delta_);
@@ -70,14 +91,14 @@ void CondensedSystem::find_T(const Complementarity& cones, const sdk::Vector& th
             for (int k = 0; k < 3; ++k)
                 for (int i = 0; i < 3; ++i)
                     U(i, k) = (*basis)[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)];
-            E = U.transpose() * E * U;
+            block = U.transpose() * block * U;
         }
-        for (int i = 0; i < rows; ++i) E(i, i) += theta[first + i] + delta_;
+        for (int i = 0; i < rows; ++i) block(i, i) += theta[first + i] + delta_;
         const Eigen::Matrix3d inverse = [&] {
             Eigen::Matrix3d result = Eigen::Matrix3d::Zero();
             // The rows' sizes differ by up to 80 decades where one is held: scaled, the inverse exists.
-            Eigen::VectorXd root = E.diagonal().head(rows).cwiseSqrt().cwiseInverse();
-            const Eigen::MatrixXd scaled = root.asDiagonal() * E.topLeftCorner(rows, rows) * root.asDiagonal();
+            Eigen::VectorXd root = block.diagonal().head(rows).cwiseSqrt().cwiseInverse();
+            const Eigen::MatrixXd scaled = root.asDiagonal() * block.topLeftCorner(rows, rows) * root.asDiagonal();
             result.topLeftCorner(rows, rows) = root.asDiagonal() * scaled.inverse() * root.asDiagonal();
             return result;
         }();
@@ -98,25 +119,24 @@ void CondensedSystem::apply_T(sdk::Vector& v) const {
     }
 }
 
-void CondensedSystem::factorize(const sdk::LocalProblemView& problem, const Complementarity& cones,
-                                const sdk::Vector& theta) {
-    const auto span = system_->processes().meter()->span(DELASSUS_PHASE_LINEAR_SYSTEMS);
+void CondensedSystem::factorize(const Complementarity& cones, const sdk::Vector& theta) {
+    const auto span = processes().meter()->span(DELASSUS_PHASE_LINEAR_SYSTEMS);
     theta_ = theta;
-    if (problem.raw->n_all == 0) return;
-    if (!matrix_.get()) system_->make_matrix(problem, groups_, matrix_);
+    if (problem_->raw->n_all == 0) return;
+    if (!matrix_.get()) make_matrix(*problem_, groups_, matrix_);
     std::vector<std::int32_t> local;
     Eigen::MatrixXd values, weighted, block;
     while (true) {
         ++factorizations_;
         find_T(cones, theta);
         check(MatZeroEntries(matrix_.get()));
-        PartSystem::fill_H(problem, matrix_.get());
+        fill_H(*problem_, matrix_.get());
         std::int32_t first = 0;
         for (std::size_t g = 0; g < groups_.size(); first += groups_[g++]) {
             const int rows = groups_[g];
-            system_->dense_rows(first, rows, local, values);
+            dense_rows(first, rows, local, values);
             if (local.empty()) continue;
-            for (int i = 0; i < rows; ++i) values.row(i) *= scale_[first + i];
+            for (int i = 0; i < rows; ++i) values.row(i) *= p_[first + i];
             if (const ipm::Basis* basis = cones.row_basis(g)) {
                 Eigen::MatrixXd U(rows, rows);
                 for (int k = 0; k < rows; ++k)
@@ -131,11 +151,11 @@ void CondensedSystem::factorize(const sdk::LocalProblemView& problem, const Comp
                     weighted.row(i) +=
                         t_[3 * g + static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] * values.row(j);
             block.noalias() = values.transpose() * weighted;
-            system_->add(local, block, matrix_.get());
+            add(local, block, matrix_.get());
         }
-        PartSystem::assemble(matrix_.get());
-        system_->scale(matrix_.get(), R_);
-        if (!krylov_.get()) make_linear_solver(system_->processes(), matrix_.get(), kind_, krylov_, schwarz_);
+        assemble(matrix_.get());
+        scale(matrix_.get(), R_);
+        if (!krylov_.get()) make_linear_solver(processes(), matrix_.get(), kind_, krylov_, settings_.schwarz);
         if (set_up(krylov_.get())) return;
         delta_ *= 10.0;
         if (!(delta_ <= largest_regularization))
@@ -150,17 +170,15 @@ void CondensedSystem::solve_once(const Complementarity& cones, const sdk::Vector
     dz = g;
     apply_T(dz);
     cones.reactions_from_basis(dz);
-    dx = f + system_->apply_transpose(scale_.cwiseProduct(dz));
+    dx = f + times_transposed_D(dz);
     if (krylov_.get()) {
-        check(KSPSetTolerances(krylov_.get(), most_gained, enough, 1e10, static_cast<PetscInt>(most_inner_)));
-        dx.array() *= R_.array();
-        system_->solve(krylov_.get(), dx);
-        dx.array() *= R_.array();
+        check(KSPSetTolerances(krylov_.get(), most_gained, enough, 1e10, static_cast<PetscInt>(settings_.most_inner)));
+        PartSystem::solve(krylov_.get(), dx);
         PetscInt count = 0;
         check(KSPGetIterationNumber(krylov_.get(), &count));
         inner_iterations_ += count;
     }
-    dz = scale_.cwiseProduct(system_->apply_D(dx));
+    dz = times_D(dx);
     cones.rows_to_basis(dz);
     dz = g - dz;
     apply_T(dz);
@@ -168,61 +186,22 @@ void CondensedSystem::solve_once(const Complementarity& cones, const sdk::Vector
         if (cones.is_held(i)) dz[i] = 0.0;
 }
 
-double CondensedSystem::solve(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g, double enough,
-                              Start start, sdk::Vector& dx, sdk::Vector& dz) {
-    const auto norm = [this](const sdk::Vector& x, const sdk::Vector& z) {
-        double square = z.size() > 0 ? z.cwiseQuotient((theta_.array() + 1.0).matrix().cwiseSqrt()).squaredNorm() : 0.0;
-        square += x.cwiseProduct(R_).squaredNorm();
-        return std::sqrt(system_->processes().sum(square));
-    };
-    const double size = norm(f, g);
-    if (start == Start::Zero || !(size > 0.0)) {
-        dx.setZero(f.size());
-        dz.setZero(g.size());
-    }
-    if (!(size > 0.0)) return 0.0;
-    f_rest_ = f;
-    g_rest_ = g;
-    double rest = size;
-    if (start == Start::Given) {
-        find_rest(cones, f, g, dx, dz);
-        rest = norm(f_rest_, g_rest_);
-        if (rest <= enough * size) return rest / size;
-        if (!(rest < size)) return solve(cones, f, g, enough, Start::Zero, dx, dz);
-    }
-    // By rounding, the residual that conjugate gradients carry along is not the system's own: they start again.
-    const bool direct = kind_ == LinearSolver::Mumps;
-    const int refinements = direct ? refinements_ : 4 * refinements_;
-    for (int refinement = 0;; ++refinement) {
-        solve_once(cones, f_rest_, g_rest_, 0.3 * enough * size, correction_x_, correction_z_);
-        dx += correction_x_;
-        dz += correction_z_;
-        find_rest(cones, f, g, dx, dz);
-        const double next = norm(f_rest_, g_rest_);
-        if (!(next < rest)) {
-            if (refinement > 0 || start == Start::Given) {
-                dx -= correction_x_;
-                dz -= correction_z_;
-                return rest / size;
-            }
-            return next / size;
-        }
-        const bool slow = next > 0.5 * rest;
-        rest = next;
-        if (rest <= enough * size || slow || refinement >= refinements) return rest / size;
-    }
-}
-
 void CondensedSystem::find_rest(const Complementarity& cones, const sdk::Vector& f, const sdk::Vector& g,
-                                const sdk::Vector& dx, const sdk::Vector& dz) {
+                                const sdk::Vector& dx, const sdk::Vector& dz, sdk::Vector& f_rest,
+                                sdk::Vector& g_rest) const {
     sdk::Vector z = dz;
     cones.reactions_from_basis(z);
-    f_rest_ = f - system_->apply_H(dx) + system_->apply_transpose(scale_.cwiseProduct(z));
-    sdk::Vector product = scale_.cwiseProduct(system_->apply_D(dx)) + apply_E(z);
+    f_rest = f - times_H(dx) + times_transposed_D(z);
+    sdk::Vector product = times_D(dx) + times_E(z);
     cones.rows_to_basis(product);
-    g_rest_ = g - product - theta_.cwiseProduct(dz);
+    g_rest = g - product - theta_.cwiseProduct(dz);
     for (Eigen::Index i = 0; i < g.size(); ++i)
-        if (cones.is_held(i)) g_rest_[i] = 0.0;
+        if (cones.is_held(i)) g_rest[i] = 0.0;
+}
+
+double CondensedSystem::weighted_norm(const sdk::Vector& f, const sdk::Vector& g) const {
+    const double square = g.cwiseQuotient((theta_.array() + 1.0).matrix().cwiseSqrt()).squaredNorm();
+    return std::sqrt(processes().sum(f.squaredNorm() + square));
 }
 
 std::string CondensedSystem::description() const {

@@ -38,25 +38,7 @@ void PartitionedGaussSeidel::factorize(const sdk::LocalProblemView& problem) {
         part_.find_places(model_);
     });
     diagonal_ = part_.diagonal(operator_);
-    find_scaling(problem);
-}
-
-// Blocks without mobility take the mean of the others, as sdk::block_scaling does for one process.
-void PartitionedGaussSeidel::find_scaling(const sdk::LocalProblemView& problem) {
-    std::array<double, 2> sums = {};
-    const auto trace = [&](std::int64_t c) {
-        const delassus_cone& cone = problem.cone(c);
-        return diagonal_.segment(cone.first_row, cone.rows).sum() / cone.rows;
-    };
-    for (std::int64_t c = 0; c < problem.raw->cone_count; ++c)
-        if (trace(c) > 0.0) {
-            sums[0] += trace(c);
-            sums[1] += 1.0;
-        }
-    part_.processes().sum(sums);
-    const double mean = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
-    for (std::int64_t c = 0; c < problem.raw->cone_count; ++c)
-        if (!(trace(c) > 0.0)) diagonal_.segment(problem.cone(c).first_row, problem.cone(c).rows).setConstant(mean);
+    fill_immobile(part_.processes(), problem.cones, diagonal_);
 }
 
 sdk::Outcome PartitionedGaussSeidel::solve(const sdk::LocalProblemView& problem, const sdk::Request& request,

@@ -26,7 +26,6 @@ public:
     [[nodiscard]] std::int64_t factorizations() const override { return factorizations_; }
 
 private:
-    void find_scaling(const sdk::LocalProblemView& problem);
     [[nodiscard]] double measured(const sdk::Vector& lambda);
 
     pgs::Ordering ordering_;

@@ -5,4 +5,4 @@
 #include "delassus/sdk/column_shares_bodies.hpp"
 #include "delassus/sdk/face_step_bodies.hpp"
 #include "delassus/sdk/scaled_problem_bodies.hpp"
-#include "delassus/sdk/scaled_run_bodies.hpp"
+#include "delassus/sdk/scaled_rows_bodies.hpp"

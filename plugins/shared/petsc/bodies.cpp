@@ -2,6 +2,7 @@
 #include "bodies.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -146,6 +147,20 @@ void Bodies::multiply_add(const sdk::LocalProblemView& problem, const sdk::Vecto
             sum += problem.D.value[e] * v[columns_.local(problem.D.column[e])];
         result[row] += sum;
     }
+}
+
+void fill_immobile(const Processes& processes, const sdk::ConeRange& cones, sdk::Vector& diagonal) {
+    const auto rows_of = [&](const delassus_cone& cone) { return diagonal.segment(cone.first_row, cone.rows); };
+    std::array<double, 2> sums = {};
+    for (const delassus_cone& cone : cones)
+        if (const double trace = rows_of(cone).sum() / cone.rows; trace > 0.0) {
+            sums[0] += trace;
+            sums[1] += 1.0;
+        }
+    processes.sum(sums);
+    const double mean = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
+    for (const delassus_cone& cone : cones)
+        if (!(rows_of(cone).sum() > 0.0)) rows_of(cone).setConstant(mean);
 }
 
 sdk::SparseRowsView LocalRows::view(const sdk::LocalMatrixView& matrix, const Exchange& columns, Eigen::Index first,

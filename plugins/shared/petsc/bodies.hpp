@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/h_inverse.hpp"
 #include "exchange.hpp"
 
@@ -54,6 +55,10 @@ private:
     int width_ = 1;                                        // of the largest block of all
     std::vector<std::int32_t> block_start_, block_index_;  // local columns, ascending in a block
 };
+
+/// Own cones without mobility get the mean trace of all others, of all processes, in the diagonal of N (own rows): what
+/// sdk::block_scaling gives them in one process. Collective.
+void fill_immobile(const Processes& processes, const sdk::ConeRange& cones, sdk::Vector& diagonal);
 
 /// Rows of a matrix with local columns; the values stay where they are.
 class LocalRows {

@@ -106,26 +106,8 @@ void PartSystem::factorize(const sdk::LocalProblemView& problem) {
                 diagonal_[i] += W.value[e] * W.value[e];
     }
     for (Eigen::Index i = 0; i < problem.m; ++i) diagonal_[i] += E_.coeff(i, i);
-    // s_c of every cone, and what blocks without mobility take instead: the mean of the others (sdk::block_scaling).
-    cone_scaling_.assign(place(problem.raw->cone_count), 0.0);
-    std::array<double, 2> sums = {};
-    for (std::int64_t c = 0; c < problem.raw->cone_count; ++c) {
-        const delassus_cone& cone = problem.cone(c);
-        double& trace = cone_scaling_[place(c)];
-        trace = diagonal_.segment(cone.first_row, cone.rows).sum() / cone.rows;
-        if (!(trace > 0.0)) continue;
-        sums[0] += trace;
-        sums[1] += 1.0;
-    }
-    processes().sum(sums);
-    for (std::int64_t c = 0; c < problem.raw->cone_count; ++c) {
-        double& s = cone_scaling_[place(c)];
-        if (!(s > 0.0)) {
-            s = sums[1] > 0.0 ? sums[0] / sums[1] : 1.0;
-            diagonal_.segment(problem.cone(c).first_row, problem.cone(c).rows).setConstant(s);
-        }
-        s = 1.0 / std::sqrt(s);
-    }
+    fill_immobile(processes(), problem.cones, diagonal_);
+    cone_scaling_ = sdk::block_scaling(problem.cones, diagonal_);
 }
 
 void PartSystem::factor_coupled(const sdk::LocalProblemView& problem) {
@@ -207,8 +189,7 @@ void PartSystem::load(const sdk::LocalProblemView& problem) {
         const double s = cone_scaling_[place(c)];
         square += s * s * r_.segment(problem.cone(c).first_row, problem.cone(c).rows).squaredNorm();
     }
-    square = processes().sum(square);
-    reference_ = square > 0.0 ? std::sqrt(square) : 1.0;
+    reference_ = sdk::reference_of(processes().sum(square));
 }
 
 void PartSystem::apply_inverse(sdk::Vector& v) const {
@@ -302,11 +283,16 @@ double PartSystem::natural(const sdk::Vector& lambda, const sdk::Vector& u) cons
     return std::sqrt(processes().sum(sum)) / reference_;
 }
 
-double PartSystem::measured(const sdk::LocalProblemView& problem, const sdk::Vector& lambda, sdk::Vector& x) const {
-    x = velocity(problem, lambda);
+sdk::Vector PartSystem::velocities(const sdk::LocalProblemView& problem, const sdk::Vector& lambda,
+                                   const sdk::Vector& x) const {
     sdk::Vector u = problem.b + apply_D(x);
     if (E_.nonZeros() > 0) u += E_ * lambda;
-    return natural(lambda, u);
+    return u;
+}
+
+double PartSystem::measured(const sdk::LocalProblemView& problem, const sdk::Vector& lambda, sdk::Vector& x) const {
+    x = velocity(problem, lambda);
+    return natural(lambda, velocities(problem, lambda, x));
 }
 
 void PartSystem::dense_rows(std::int32_t first, std::int32_t rows, std::vector<std::int32_t>& local,

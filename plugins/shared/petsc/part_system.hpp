@@ -42,6 +42,9 @@ public:
     [[nodiscard]] sdk::Vector apply_transpose(const sdk::Vector& lambda) const;
     /// x = H⁻¹(a + Dᵀλ), own columns.
     [[nodiscard]] sdk::Vector velocity(const sdk::LocalProblemView& problem, const sdk::Vector& lambda) const;
+    /// u = D x + E λ + b of own rows.
+    [[nodiscard]] sdk::Vector velocities(const sdk::LocalProblemView& problem, const sdk::Vector& lambda,
+                                         const sdk::Vector& x) const;
     /// The natural error of λ with u (without De Saxcé term).
     [[nodiscard]] double natural(const sdk::Vector& lambda, const sdk::Vector& u) const;
     /// The natural error as the host measures it; leaves x.
@@ -50,7 +53,9 @@ public:
 
     [[nodiscard]] double dot(const sdk::Vector& a, const sdk::Vector& b) const { return processes().sum(a.dot(b)); }
     [[nodiscard]] double norm(const sdk::Vector& v) const { return std::sqrt(dot(v, v)); }
-    [[nodiscard]] bool finite(const sdk::Vector& v) const { return !processes().any(!v.allFinite()); }
+    [[nodiscard]] bool everywhere(bool holds) const { return !processes().any(!holds); }
+    void next_iteration() const { processes().meter()->clock().next_iteration(); }
+    void end_iterations() const { processes().meter()->clock().end_iterations(); }
 
     /// An empty n_all × n_all matrix with the pattern of H and of all products of columns in one group of own rows,
     /// which follow one another and cover them (group_rows: their numbers).

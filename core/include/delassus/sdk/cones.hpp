@@ -157,12 +157,23 @@ public:
         : first_(reinterpret_cast<const char*>(problem.cones)),
           size_(static_cast<std::size_t>(problem.cone_count)),
           stride_(problem.cone_stride) {}
+    explicit ConeRange(const delassus_local_problem& problem)
+        : first_(reinterpret_cast<const char*>(problem.cones)),
+          size_(static_cast<std::size_t>(problem.cone_count)),
+          stride_(problem.cone_stride) {}
     /// Cones side by side, as an array of one's own.
     ConeRange(std::span<const delassus_cone> cones)
         : first_(reinterpret_cast<const char*>(cones.data())), size_(cones.size()), stride_(sizeof(delassus_cone)) {}
 
     [[nodiscard]] std::size_t size() const { return size_; }
     [[nodiscard]] bool empty() const { return size_ == 0; }
+    /// Cones first … last − 1.
+    [[nodiscard]] ConeRange part(std::size_t first, std::size_t last) const {
+        ConeRange result = *this;
+        result.first_ += static_cast<std::ptrdiff_t>(first) * stride_;
+        result.size_ = last - first;
+        return result;
+    }
     [[nodiscard]] const delassus_cone& operator[](std::size_t k) const {
         return *reinterpret_cast<const delassus_cone*>(first_ + static_cast<std::ptrdiff_t>(k) * stride_);
     }

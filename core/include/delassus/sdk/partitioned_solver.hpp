@@ -38,6 +38,7 @@ struct LocalProblemView {
           b(problem.b, problem.m),
           column_start(problem.column_start, static_cast<std::size_t>(problem.processes) + 1),
           row_start(problem.row_start, static_cast<std::size_t>(problem.processes) + 1),
+          cones(problem),
           h_block_start(problem.h_block_start, blocks(problem)),
           h_block_index(problem.h_block_index, problem.h_block_count > 0 ? static_cast<std::size_t>(problem.n) : 0),
           coulomb(problem.law == DELASSUS_LAW_COULOMB),
@@ -48,11 +49,8 @@ struct LocalProblemView {
     /// The number of the first own entry of x, and of λ, among those of all processes.
     [[nodiscard]] std::int64_t first_column() const { return column_start[static_cast<std::size_t>(raw->process)]; }
     [[nodiscard]] std::int64_t first_row() const { return row_start[static_cast<std::size_t>(raw->process)]; }
-    /// Own cone k, 0 ≤ k < raw->cone_count; its first_row counts within this process.
-    [[nodiscard]] const delassus_cone& cone(std::int64_t k) const {
-        return *reinterpret_cast<const delassus_cone*>(reinterpret_cast<const char*>(raw->cones) +
-                                                       k * raw->cone_stride);
-    }
+    /// Own cone k; its first_row counts within this process.
+    [[nodiscard]] const delassus_cone& cone(std::int64_t k) const { return cones[static_cast<std::size_t>(k)]; }
 
     Eigen::Index n, m;                                           ///< own
     LocalMatrixView H;                                           ///< n × n_all, both triangles
@@ -61,6 +59,7 @@ struct LocalProblemView {
     VectorView a;                                                ///< n
     VectorView b;                                                ///< m
     std::span<const std::int64_t> column_start, row_start;       ///< processes + 1
+    ConeRange cones;                                             ///< own
     std::span<const std::int64_t> h_block_start, h_block_index;  ///< empty unless H is DIAGONAL or BLOCKS
     bool coulomb;                                                ///< exact Coulomb law; otherwise associated
     std::uint64_t needs;                                         ///< DELASSUS_CAN_* bits

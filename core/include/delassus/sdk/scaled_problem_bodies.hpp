@@ -3,8 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "delassus/sdk/compiled_once.hpp"
 #include "delassus/sdk/scaled_problem.hpp"
@@ -14,38 +12,19 @@ namespace delassus::sdk {
 DELASSUS_SDK_FUNCTION void ScaledProblem::factorize(const ProblemView& problem, const Team& given) {
     const Team team = useful(given, problem);
     operator_.factorize(problem, cheapest_form(problem) == Form::Formed, team);
-    scale_rows(problem);
+    p_.resize(problem.m);
+    ratio_.resize(problem.m);
+    scale(problem.cones, operator_.diagonal());
+    groups_ = row_groups(problem.cones);
     build_operator(problem, team);
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::load(const ProblemView& problem) {
     r_ = operator_.free_velocity(problem);
     residual_ = NaturalResidual(problem, operator_.diagonal(), r_);
-    coulomb_ = problem.coulomb;
     r_.array() *= p_.array();
-    blocks_.clear();
-    contacts_.clear();
-    intervals_.clear();
-    lower_.setZero(problem.m);
-    upper_.setZero(problem.m);
-    for (const delassus_cone& cone : problem.cones) {
-        const ConeOperations& kind = operations_of(cone);
-        if (!kind.is_separable()) {
-            const bool friction = cone.kind == DELASSUS_CONE_FRICTION;
-            blocks_.push_back({cone, cone.first_row, cone.rows, kind.is_cone ? 1.0 : p_[cone.first_row]});
-            contacts_.push_back(
-                {friction ? friction_coefficient(cone) : 0.0, cone.first_row, friction ? cone.rows : 0});
-            continue;
-        }
-        for (std::int32_t i = 0; i < cone.rows; ++i) {
-            const auto [lo, hi] = kind.interval(cone, i);
-            lower_[cone.first_row + i] = lo / p_[cone.first_row + i];
-            upper_[cone.first_row + i] = hi / p_[cone.first_row + i];
-        }
-        for (std::int32_t i = 0; i < cone.rows; i += longest_interval)
-            intervals_.push_back({cone.first_row + i, std::min(longest_interval, cone.rows - i)});
-    }
-    divide();
+    ScaledRows::load(problem.cones, problem.coulomb, residual_.reference(), Keep::AllBlocks);
+    append_parts(0, groups_, static_cast<std::int32_t>(problem.m));
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::begin_product(const Team& team, const Vector& lambda) const {
@@ -88,62 +67,6 @@ DELASSUS_SDK_FUNCTION void ScaledProblem::gradient(const Vector& lambda, Vector&
     result += r_;
 }
 
-DELASSUS_SDK_FUNCTION void ScaledProblem::project(Vector& lambda) const {
-    for (const Part& part : parts_) project(part, lambda);
-}
-
-DELASSUS_SDK_FUNCTION void ScaledProblem::project(const Part& part, Vector& lambda) const {
-    for (std::size_t k = part.first_block; k < part.first_block + part.blocks; ++k) {
-        const Contact& contact = contacts_[k];
-        if (contact.rows == 3) {
-            FrictionCone::project_with_slope(contact.mu, 3, lambda.data() + contact.first);
-        } else {
-            project_block(blocks_[k], lambda.data() + blocks_[k].first);
-        }
-    }
-    for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k)
-        for (std::int32_t i = intervals_[k].first; i < intervals_[k].first + intervals_[k].rows; ++i)
-            lambda[i] = std::min(upper_[i], std::max(lower_[i], lambda[i]));
-}
-
-DELASSUS_SDK_FUNCTION double ScaledProblem::natural(const Vector& lambda, const Vector& velocity) const {
-    double sum = 0.0;
-    for (const Part& part : parts_) sum += natural_square(part, lambda, velocity);
-    return natural_from(sum);
-}
-
-DELASSUS_SDK_FUNCTION double ScaledProblem::natural_square(const Part& part, const Vector& lambda,
-                                                           const Vector& velocity) const {
-    double sum = 0.0, sums[3] = {};  // of three rows apart: their additions do not wait for one another
-    std::array<double, largest_block_rows> trial;
-    for (std::size_t k = part.first_block; k < part.first_block + part.blocks; ++k) {
-        const Contact& contact = contacts_[k];
-        const double* l = lambda.data() + contact.first;
-        const double* u = velocity.data() + contact.first;
-        if (contact.rows == 3 && !coulomb_) {
-            for (std::size_t i = 0; i < 3; ++i) trial[i] = l[i] - u[i];
-            FrictionCone::project_with_slope(contact.mu, 3, trial.data());
-            for (std::size_t i = 0; i < 3; ++i) sums[i] += (l[i] - trial[i]) * (l[i] - trial[i]);
-            continue;
-        }
-        const Block& block = blocks_[k];
-        double* tried = trial.data();
-        for (std::int32_t i = 0; i < block.rows; ++i) tried[i] = l[i] - u[i];
-        if (coulomb_) tried[0] -= de_saxce(block.cone, u);
-        project_block(block, tried);
-        for (std::int32_t i = 0; i < block.rows; ++i) sum += (l[i] - tried[i]) * (l[i] - tried[i]);
-    }
-    for (std::size_t k = part.first_interval; k < part.first_interval + part.intervals; ++k) {
-        const Interval& run = intervals_[k];
-        for (std::int32_t i = run.first; i < run.first + run.rows; ++i) {
-            const double w = ratio_[i];
-            const double change = std::min(lambda[i] - lower_[i], std::max(lambda[i] - upper_[i], w * w * velocity[i]));
-            sum += change * change / (w * w);
-        }
-    }
-    return sum + sums[0] + sums[1] + sums[2];
-}
-
 DELASSUS_SDK_FUNCTION double ScaledProblem::measured(const ProblemView& problem, const Vector& lambda,
                                                      Vector& velocity) const {
     velocity = operator_.velocity(problem, lambda);
@@ -151,31 +74,6 @@ DELASSUS_SDK_FUNCTION double ScaledProblem::measured(const ProblemView& problem,
     if (problem.n > 0) u.noalias() += problem.D * velocity;
     if (problem.E.nonZeros() > 0) u.noalias() += problem.E * lambda;
     return residual_.natural(lambda, u);
-}
-
-DELASSUS_SDK_FUNCTION void ScaledProblem::project_block(const Block& block, double* lambda) {
-    if (block.unit == 1.0) return sdk::project(block.cone, lambda);
-    for (std::int32_t i = 0; i < block.rows; ++i) lambda[i] *= block.unit;
-    sdk::project(block.cone, lambda);
-    for (std::int32_t i = 0; i < block.rows; ++i) lambda[i] /= block.unit;
-}
-
-DELASSUS_SDK_FUNCTION void ScaledProblem::scale_rows(const ProblemView& problem) {
-    const Vector& diagonal = operator_.diagonal();
-    const std::vector<double> block = block_scaling(problem.cones, diagonal);
-    p_.resize(problem.m);
-    ratio_.resize(problem.m);
-    groups_.clear();
-    for (std::size_t c = 0; c < problem.cones.size(); ++c) {
-        const delassus_cone& cone = problem.cones[c];
-        const bool whole = !is_separable(cone);
-        if (whole) groups_.push_back({cone.first_row, cone.rows});
-        for (std::int32_t i = cone.first_row; i < cone.first_row + cone.rows; ++i) {
-            p_[i] = whole || !(diagonal[i] > 0.0) ? block[c] : 1.0 / std::sqrt(diagonal[i]);
-            ratio_[i] = block[c] / p_[i];
-            if (!whole) groups_.push_back({i, 1});
-        }
-    }
 }
 
 // With a diagonal or block-diagonal H, Ŵ has about as many entries as D. With a sparse H a row of Ŵ reaches up the
@@ -189,36 +87,6 @@ DELASSUS_SDK_FUNCTION ScaledProblem::Form ScaledProblem::cheapest_form(const Pro
     const double formed = static_cast<double>(problem.m) * static_cast<double>(problem.m);
     if (formed <= std::min(whitened, solved)) return Form::Formed;
     return whitened <= solved ? Form::Whitened : Form::Solved;
-}
-
-// Cuts the rows into parts of at least part_rows, where no block, interval or group is cut. All three stand in the
-// order of their rows.
-DELASSUS_SDK_FUNCTION void ScaledProblem::divide() {
-    parts_.clear();
-    Part part;
-    const auto rows = static_cast<std::int32_t>(p_.size());
-    while (part.first < rows) {
-        part.first_block += part.blocks;
-        part.first_interval += part.intervals;
-        part.first_group += part.groups;
-        part.blocks = part.intervals = part.groups = 0;
-        std::int32_t end = part.first;
-        while (end < rows && end - part.first < part_rows) {
-            const std::size_t block = part.first_block + part.blocks;
-            if (block < blocks_.size() && blocks_[block].first == end) {
-                end += blocks_[block].rows;
-                ++part.blocks;
-            } else {
-                end += intervals_[part.first_interval + part.intervals].rows;
-                ++part.intervals;
-            }
-        }
-        while (part.first_group + part.groups < groups_.size() && groups_[part.first_group + part.groups].first < end)
-            ++part.groups;
-        part.rows = end - part.first;
-        parts_.push_back(part);
-        part.first = end;
-    }
 }
 
 DELASSUS_SDK_FUNCTION void ScaledProblem::build_operator(const ProblemView& problem, const Team& team) {

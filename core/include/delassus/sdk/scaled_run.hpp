@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One solve by a method that works on a ScaledProblem: starting point, stop, claim, result.
+// One solve by a method that works on a ScaledProblem, or on a part of one: starting point, stop, claim, result.
 #pragma once
 
 #include <string>
@@ -10,23 +10,45 @@
 
 namespace delassus::sdk {
 
-/// One solve by a method that works on a ScaledProblem.
-class ScaledRun {
+/// One solve by a method that works on a Scaled, which is a ScaledProblem or has its operations for the rows that one
+/// process holds. All numbers that decide are then the same in all processes.
+template <class Scaled>
+class ScaledRunOf {
 public:
+    using View = typename Scaled::View;
+
     /// scaled must be loaded with problem; all must outlive the run. stall_window: as of Monitor.
-    ScaledRun(const ProblemView& problem, const ScaledProblem& scaled, const Request& request,
-              std::int64_t stall_window)
+    ScaledRunOf(const View& problem, const Scaled& scaled, const Request& request, std::int64_t stall_window)
         : problem_(problem), scaled_(scaled), request_(request), monitor_(request, stall_window) {}
 
     /// The projected starting point: the given reactions (m, the problem's units) or zero.
-    [[nodiscard]] Vector start(const MutableVectorView& lambda);
+    [[nodiscard]] Vector start(const MutableVectorView& lambda) const {
+        Vector scaled = Vector::Zero(problem_.m);
+        if (request_.warm_start() && scaled_.everywhere(lambda.allFinite()))
+            scaled = lambda.array() / scaled_.scaling().array();
+        scaled_.project(scaled);
+        return scaled;
+    }
 
     /// Judges the iterate λ̂ with its û; true: stop now. Each call after the first counts as an iteration. A claim of
     /// convergence rests on û computed anew; where it fails, stale() tells the caller to renew its û.
-    [[nodiscard]] bool check(const Vector& lambda, const Vector& velocity);
+    [[nodiscard]] bool check(const Vector& lambda, const Vector& velocity) {
+        lambda_ = lambda.array() * scaled_.scaling().array();
+        return judge(scaled_.natural(lambda, velocity));
+    }
 
     /// The same for a caller that has put the iterate's λ = P λ̂ into unscaled() and knows its natural error.
-    [[nodiscard]] bool judge(double residual);
+    [[nodiscard]] bool judge(double residual) {
+        stale_ = false;
+        if (residual <= Monitor::aim * request_.tolerance()) {
+            residual = scaled_.measured(problem_, lambda_, x_);
+            stale_ = residual > Monitor::aim * request_.tolerance();
+        }
+        latest_ = residual;
+        if (monitor_.check(iteration_++, nullptr, lambda_, residual)) return true;
+        scaled_.next_iteration();
+        return false;
+    }
     [[nodiscard]] Vector& unscaled() { return lambda_; }
 
     /// Counts a product with N that made no new iterate; true: stop now.
@@ -44,11 +66,21 @@ public:
     [[nodiscard]] std::int64_t iteration() const { return iteration_; }
 
     /// Leaves the best iterate in x (n) and lambda (m), and says how the solve ended.
-    [[nodiscard]] Outcome finish(MutableVectorView x, MutableVectorView lambda);
+    [[nodiscard]] Outcome finish(MutableVectorView x, MutableVectorView lambda) {
+        scaled_.end_iterations();
+        const Vector& best = monitor_.best();
+        if (scaled_.everywhere(best.size() == problem_.m && best.allFinite())) {
+            lambda = best;
+        } else {
+            lambda.setZero();
+        }
+        x = scaled_.velocity(problem_, lambda);
+        return monitor_.outcome();
+    }
 
 private:
-    const ProblemView& problem_;
-    const ScaledProblem& scaled_;
+    const View& problem_;
+    const Scaled& scaled_;
     const Request& request_;
     Monitor monitor_;
     Vector lambda_, x_;
@@ -57,8 +89,6 @@ private:
     bool stale_ = false;
 };
 
-}  // namespace delassus::sdk
+using ScaledRun = ScaledRunOf<ScaledProblem>;
 
-#ifndef DELASSUS_SDK_COMPILED
-#include "delassus/sdk/scaled_run_bodies.hpp"
-#endif
+}  // namespace delassus::sdk

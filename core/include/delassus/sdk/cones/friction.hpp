@@ -38,9 +38,10 @@ struct FrictionCone {
                         .why_most = "beyond that, errors within any tolerance hide the velocity along the normal"}},
     };
 
-    static double tangent_norm(const delassus_cone& cone, const double* v) {
-        return cone.rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
+    static double tangent_norm(int rows, const double* v) {
+        return rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
     }
+    static double tangent_norm(const delassus_cone& cone, const double* v) { return tangent_norm(cone.rows, v); }
 
     /// Euclidean projection onto {‖v_t‖ ≤ slope · v_n}. With t = ‖v_t‖:
     ///   in the polar cone (slope t ≤ −v_n): 0; first, as with slope 0 and t = 0 a v_n < 0 would count as inside;
@@ -48,7 +49,7 @@ struct FrictionCone {
     ///   else the nearest point of the generator (1, slope v_t/t): v_n' = (v_n + slope t)/(1 + slope²), v_t' = slope
     ///   v_n' v_t/t.
     static void project_with_slope(double slope, int rows, double* v) {
-        const double t = rows == 3 ? std::sqrt(v[1] * v[1] + v[2] * v[2]) : std::abs(v[1]);
+        const double t = tangent_norm(rows, v);
         if (slope * t <= -v[0]) {
             std::fill_n(v, rows, 0.0);
             return;
