@@ -6,7 +6,9 @@
 #include "derivatives.hpp"
 #include "errors.hpp"
 #include "problems.hpp"
+#include "python_solvers.hpp"
 #include "scenes.hpp"
+#include "serving.hpp"
 #include "solver_classes.hpp"
 #include "solvers.hpp"
 #include "support/standard_descriptors.hpp"
@@ -22,6 +24,8 @@ PYBIND11_MODULE(_delassus, module) {
     delassus::python::bind_solvers(module);
     delassus::python::bind_derivatives(module);
     delassus::python::bind_solver_classes(module);
+    delassus::python::bind_serving(module);
+    delassus::use_python_solvers(std::make_unique<delassus::python::SolversHere>());
     delassus::python::bind_scenes(module);
     delassus::python::bind_system_runs(module);
     delassus::python::bind_views(module);

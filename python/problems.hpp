@@ -179,7 +179,10 @@ inline std::optional<bool> optimized_of(const PluginInfo& info) {
 inline py::list plugins(const Registry& registry) {
     constexpr const char* types[] = {"boolean", "integer", "real", "choice", "text"};
     py::list result;
-    for (const PluginInfo& info : registry.plugins()) {
+    auto infos = registry.plugins();
+    const auto packaged = registry.packaged();
+    infos.insert(infos.end(), packaged.begin(), packaged.end());
+    for (const PluginInfo& info : infos) {
         py::dict options, plugin;
         for (const OptionInfo& option : info.options) {
             py::dict row;
@@ -198,6 +201,8 @@ inline py::list plugins(const Registry& registry) {
         plugin["options"] = options;
         plugin["library"] = info.library.string();
         plugin["optimized"] = optimized_of(info);
+        plugin["origin"] = std::string(name_of(info.origin));
+        plugin["installed_from"] = info.installed_from;
         result.append(plugin);
     }
     return result;

@@ -19,6 +19,7 @@
 #include "delassus/registry.hpp"
 #include "delassus/solver.hpp"
 #include "problems.hpp"
+#include "solver/create_slots.hpp"
 
 namespace delassus::python {
 
@@ -31,13 +32,11 @@ struct SolverClass {
     delassus_plugin_descriptor descriptor{};
 };
 
-/// The classes so far. The border's create() has no argument that names a class, so each class has a create() of its
-/// own.
+/// The classes so far, by the numbers of their create().
 inline std::vector<SolverClass*>& solver_classes() {
     static auto* const classes = new std::vector<SolverClass*>;
     return *classes;
 }
-inline constexpr std::size_t most_solver_classes = 64;
 
 /// What Python sees of a request, and what it answers.
 class SolveRequest {
@@ -238,26 +237,14 @@ inline std::int32_t create_object(std::size_t number, const delassus_option_valu
     return status;
 }
 
-template <std::size_t number>
-std::int32_t create_slot(const delassus_option_value* values, std::int32_t count, void** solver) {
-    return create_object(number, values, count, solver);
-}
-
-using CreateSlot = std::int32_t (*)(const delassus_option_value*, std::int32_t, void**);
-template <std::size_t... numbers>
-constexpr std::array<CreateSlot, sizeof...(numbers)> create_slots(std::index_sequence<numbers...>) {
-    return {&create_slot<numbers>...};
-}
-
 /// Makes a plugin of the class. options: (key, default) in order. capabilities: names as delassus.plugins() has them.
 inline std::shared_ptr<Plugin> plugin_of(const py::object& type, const std::string& name, const std::string& version,
                                          const std::string& description, const std::string& licence,
                                          const std::vector<std::pair<std::string, py::object>>& options,
                                          const std::vector<std::string>& capabilities) {
-    static constexpr auto slots = create_slots(std::make_index_sequence<most_solver_classes>());
     auto& classes = solver_classes();
-    if (classes.size() == slots.size())
-        throw InputError(fmt::format("{} classes are registered as solvers; there can be no more", slots.size()));
+    if (classes.size() == most_created_plugins)
+        throw InputError(fmt::format("{} classes are registered as solvers; there can be no more", classes.size()));
     auto made = std::make_unique<SolverClass>();
     made->type = type;
     made->name = name;
@@ -299,7 +286,7 @@ inline std::shared_ptr<Plugin> plugin_of(const py::object& type, const std::stri
     descriptor.capabilities = capabilities_of(capabilities);
     descriptor.options = made->options.data();
     descriptor.option_count = static_cast<std::int32_t>(made->options.size());
-    descriptor.create = slots[classes.size()];
+    descriptor.create = create_slots<&create_object>[classes.size()];
     descriptor.destroy = [](void* solver) {
         const py::gil_scoped_acquire with_gil;
         delete static_cast<SolverObject*>(solver);

@@ -27,7 +27,7 @@ from ._bench import Benchmark, bench
 from ._builder import SceneBuilder
 from ._compare import Comparison, compare
 from ._derivative import Derivative
-from ._plugins import Path, folders as _folders, own_plugins as _own_plugins, registry as _registry, text as _text
+from ._plugins import Path, add as _add, folders as _folders, registry as _registry, text as _text
 from ._scenes import Scene, Simulation, Trajectory, simulate
 from ._system import DynamicalSystem, FreeSpin, State, Unilateral
 from ._view import View
@@ -247,11 +247,6 @@ def derivative(problem: Problem, result: Result) -> Derivative:
     return Derivative(problem, result)
 
 
-#: What register() takes a class to be capable of, unless it says otherwise.
-_CAPABILITIES = ("free", "nonnegative", "box", "friction", "associated", "coulomb", "h_diagonal", "h_blocks",
-                 "h_definite", "reduced", "compliance", "redundant", "warm_start")
-
-
 def _problem_of(prepared) -> Problem:
     problem = Problem.__new__(Problem)
     _delassus.Problem.__init__(problem, prepared)
@@ -283,14 +278,7 @@ def register(solver: type) -> type:
     """
     if not isinstance(solver, type) or not callable(getattr(solver, "solve", None)):
         raise InputError("register() takes a class with a method solve(self, problem, request)")
-    text = (solver.__doc__ or "").strip().split("\n")[0]
-    plugin = _delassus._plugin_of(
-        solver, getattr(solver, "name", solver.__name__.lower()), getattr(solver, "version", "0"),
-        getattr(solver, "description", text), getattr(solver, "licence", "unknown"),
-        list(getattr(solver, "options", {}).items()), list(getattr(solver, "capabilities", _CAPABILITIES)))
-    _registry()._add(plugin)
-    _own_plugins.append(plugin)
-    _registry.cache_clear()
+    _add(solver)
     return solver
 
 
@@ -301,7 +289,10 @@ def read(path: Path) -> Problem:
 
 def plugins(plugin_path: Sequence[Path] = ()) -> list:
     """The installed solvers: dicts of name, version, description, licence, capabilities, options, library, and
-    optimized: whether the compiler optimised it, None where the plugin does not say. rejected() has the others."""
+    optimized: whether the compiler optimised it, None where the plugin does not say. origin says where it was found:
+    'delassus', 'user' or 'system' (`delassus plugins install`), 'folder', 'program' (register) or 'python package' (an
+    entry point delassus.solvers), of which capabilities and options are empty: it is not loaded before it is chosen.
+    rejected() has the others."""
     return _registry(_folders(plugin_path)).plugins()
 
 

@@ -51,6 +51,8 @@ std::map<std::string, Words> options_by_command() {
                                       "plugins info",
                                       "plugins check",
                                       "plugins describe",
+                                      "plugins install",
+                                      "plugins remove",
                                       "inspect",
                                       "convert",
                                       "import",

@@ -60,7 +60,7 @@ std::string check_sidecar(const Subject& subject) {
     path.replace_extension(".json");
     if (!std::filesystem::exists(path))
         throw Skip("there is none; `delassus plugins describe FILE --sidecar` writes it");
-    expect(sidecar_text(read_sidecar(path)) == sidecar_text(subject.info()),
+    expect(descriptor_text(read_sidecar(path)) == descriptor_text(subject.info()),
            fmt::format("{} does not match the library; `delassus plugins describe FILE --sidecar` renews it",
                        path.filename().string()));
     return {};

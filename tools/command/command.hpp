@@ -28,6 +28,8 @@ void add_plan(CLI::App& program, Action& action);
 void add_compare(CLI::App& program, Action& action);
 void add_bench(CLI::App& program, Action& action);
 void add_plugins(CLI::App& program, Action& action);
+/// Those of `delassus plugins` that install and remove.
+void add_plugin_packages(CLI::App& plugins, Action& action);
 void add_convert(CLI::App& program, Action& action);
 void add_import(CLI::App& program, Action& action);
 void add_inspect(CLI::App& program, Action& action);

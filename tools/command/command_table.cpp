@@ -41,6 +41,8 @@ const std::map<std::string, Completion>& completions() {
         {"IN", files({".h5", ".hdf5"})},
         {"MODEL", files({".xml", ".mjcf", ".urdf", ".sdf", ".world"})},
         {"LIB", files({".so"})},
+        {"FILE|DIR", files({})},
+        {"PLUGIN", named("solvers")},
         {"OUT", files({})},
         {"FILE", files({})},
         {"DIR", folders},

@@ -26,6 +26,7 @@
 #include "support/nearest_name.hpp"
 #include "support/sentence.hpp"
 #include "support/standard_descriptors.hpp"
+#include "support/trace.hpp"
 
 namespace delassus::command {
 
@@ -174,6 +175,7 @@ int parse_and_run(int argc, char** argv) {
             fmt::format("running \"delassus {}\"", program.get_subcommands().front()->get_name());
         set_activity(activity.c_str());
         watch(program.get_subcommands().front()->get_name());
+        static_cast<void>(is_traced());  // begins the trace, to which processes add that this one starts
         exit_code = action.run();
     } catch (const CLI::ParseError& error) {
         exit_code = program.exit(error) == 0 ? exit_solved : exit_bad_input;

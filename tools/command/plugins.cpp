@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// delassus plugins list | info | check | describe
+// delassus plugins list | info | check | describe; plugin_packages.cpp has install and remove
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "check/conformance.hpp"
 #include "command.hpp"
@@ -11,6 +13,7 @@
 #include "measuring.hpp"
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
+#include "solver/installed_files.hpp"
 #include "support/atomic_file.hpp"
 #include "support/json.hpp"
 #include "support/text_file.hpp"
@@ -24,7 +27,7 @@ using Json = nlohmann::ordered_json;
 struct PluginsArguments {
     std::vector<std::filesystem::path> plugin_path;
     std::string plugin;
-    bool json = false, sidecar = false, schema = false, markdown = false;
+    bool json = false, sidecar = false, checksum = false, schema = false, markdown = false;
 };
 
 /// The table solver × what it can take, for the README: one row a plugin.
@@ -80,45 +83,102 @@ void print_section(const PluginInfo& plugin) {
     fmt::print("\n");
 }
 
+/// What `plugins list` shows.
+struct Listing {
+    std::vector<PluginInfo> plugins;
+    std::vector<RejectedPlugin> rejected;
+
+    explicit Listing(const Registry& registry) : rejected(registry.rejected()) {
+        for (const auto& plugin : registry.plugins()) take(plugin);
+        try {
+            for (const auto& plugin : registry.packaged()) {
+                const auto same = [&](const PluginInfo& other) { return other.name == plugin.name; };
+                if (std::none_of(plugins.begin(), plugins.end(), same)) {
+                    plugins.push_back(plugin);
+                } else {
+                    rejected.push_back({plugin.installed_from, "another plugin of this name comes first", plugin.name});
+                }
+            }
+        } catch (const PluginError& error) {
+            rejected.push_back({"entry points of Python", error.what(), {}});
+        }
+        std::sort(plugins.begin(), plugins.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    }
+
+private:
+    /// A file that changed since it was installed is found here, and where the plugin is loaded.
+    void take(const PluginInfo& plugin) {
+        try {
+            require_checksums(plugin);
+            plugins.push_back(plugin);
+        } catch (const Error& error) {
+            rejected.push_back({plugin.library, error.what(), plugin.name});
+        }
+    }
+};
+
+std::string where_from(const PluginInfo& plugin) {
+    switch (plugin.origin) {
+        case PluginOrigin::User:
+            return fmt::format("installed for this user{}", plugin.python.empty() ? "" : ", Python");
+        case PluginOrigin::System:
+            return fmt::format("installed for all{}", plugin.python.empty() ? "" : ", Python");
+        case PluginOrigin::Folder:
+            return plugin.library.parent_path().string();
+        case PluginOrigin::PythonPackage:
+            return fmt::format("Python package {}", plugin.installed_from);
+        default:
+            return {};
+    }
+}
+
+Json json_of(const Listing& listing, const Registry& registry) {
+    Json json = {{"plugins", Json::array()},
+                 {"rejected", Json::array()},
+                 {"not_built", Json::array()},
+                 {"left_out", Json::array()}};
+    for (const auto& plugin : listing.plugins) {
+        Json row = parse_ordered_json(sidecar_text(plugin));
+        row["path"] = plugin.library.string();
+        row["origin"] = name_of(plugin.origin);
+        json["plugins"].push_back(std::move(row));
+    }
+    for (const auto& row : listing.rejected)
+        json["rejected"].push_back({{"name", row.name}, {"path", row.path.string()}, {"reason", row.reason}});
+    for (const auto& row : registry.unbuilt())
+        json["not_built"].push_back({{"name", row.name}, {"reason", row.reason}});
+    for (const auto& row : registry.missing_parts())
+        json["left_out"].push_back({{"name", row.name}, {"reason", row.reason}});
+    return json;
+}
+
+void print_row(const PluginInfo& plugin) {
+    const std::string where = where_from(plugin);
+    fmt::print("{:<10} {:<8} {}{}{}\n", plugin.name, plugin.version, plugin.description,
+               where.empty() ? "" : fmt::format(" [{}]", where),
+               plugin.build == DELASSUS_BUILD_UNOPTIMIZED ? " [built without optimisation]" : "");
+}
+
 int list(const PluginsArguments& arguments) {
     const Registry registry(absolute(arguments.plugin_path));
     if (arguments.markdown) {
         print_capability_table(registry);
         return exit_solved;
     }
+    const Listing listing(registry);
     if (arguments.json) {
-        Json json = {{"plugins", Json::array()},
-                     {"rejected", Json::array()},
-                     {"not_built", Json::array()},
-                     {"left_out", Json::array()}};
-        for (const auto& plugin : registry.plugins()) {
-            Json row = parse_ordered_json(sidecar_text(plugin));
-            row["path"] = plugin.library.string();
-            json["plugins"].push_back(std::move(row));
-        }
-        for (const auto& row : registry.rejected())
-            json["rejected"].push_back({{"name", row.name}, {"path", row.path.string()}, {"reason", row.reason}});
-        for (const auto& row : registry.unbuilt())
-            json["not_built"].push_back({{"name", row.name}, {"reason", row.reason}});
-        for (const auto& row : registry.missing_parts())
-            json["left_out"].push_back({{"name", row.name}, {"reason", row.reason}});
-        fmt::print("{}\n", json_text(json, 2));
+        fmt::print("{}\n", json_text(json_of(listing, registry), 2));
         return exit_solved;
     }
-    for (const auto& plugin : registry.plugins())
-        fmt::print("{:<10} {:<8} {}{}\n", plugin.name, plugin.version, plugin.description,
-                   plugin.build == DELASSUS_BUILD_UNOPTIMIZED ? " [built without optimisation]" : "");
-    if (!registry.plugins().empty()) {
-        const PluginInfo chooser = solver_info(registry, "auto");
-        fmt::print("{:<10} {:<8} {}\n", chooser.name, chooser.version, chooser.description);
-    }
+    for (const auto& plugin : listing.plugins) print_row(plugin);
+    if (!registry.plugins().empty()) print_row(solver_info(registry, "auto"));
     if (registry.plugins().empty()) fmt::print("no plugins were found in {}\n", registry.folders().back().string());
     if (!registry.unbuilt().empty()) fmt::print("\nNot built here:\n");
     for (const auto& row : registry.unbuilt()) fmt::print("{:<10} {}\n", row.name, row.reason);
     if (!registry.missing_parts().empty()) fmt::print("\nLeft out here:\n");
     for (const auto& row : registry.missing_parts()) fmt::print("{}\n", row.reason);
-    if (!registry.rejected().empty()) fmt::print("\nRejected:\n");
-    for (const auto& row : registry.rejected()) fmt::print("{}: {}\n", row.path.string(), row.reason);
+    if (!listing.rejected.empty()) fmt::print("\nRejected:\n");
+    for (const auto& row : listing.rejected) fmt::print("{}: {}\n", row.path.string(), row.reason);
     return exit_solved;
 }
 
@@ -149,6 +209,9 @@ int info(const PluginsArguments& arguments) {
     }
     fmt::print("{} {}: {}\n", plugin.name, plugin.version, plugin.description);
     if (!plugin.library.empty()) fmt::print("library  {}\n", plugin.library.string());
+    if (!plugin.python.empty()) fmt::print("Python   {}\n", plugin.python);
+    if (const auto where = where_from(plugin); !where.empty()) fmt::print("origin   {}\n", where);
+    if (!plugin.platform.empty()) fmt::print("platform {}\n", plugin.platform);
     if (plugin.build != DELASSUS_BUILD_UNKNOWN)
         fmt::print("build    {}\n", plugin.build == DELASSUS_BUILD_OPTIMIZED ? "with optimisation" : unoptimized_build);
     fmt::print("licence  {}\ncan      {}\n", plugin.licence, fmt::join(capability_names(plugin.capabilities), " "));
@@ -159,10 +222,21 @@ int info(const PluginsArguments& arguments) {
     return exit_solved;
 }
 
+/// The library to check, by its path or its name.
+std::filesystem::path library_of(const PluginsArguments& arguments) {
+    if (is_library_path(arguments.plugin)) return arguments.plugin;
+    const Registry registry(absolute(arguments.plugin_path));
+    const PluginInfo& plugin = registry.find(arguments.plugin);
+    if (!plugin.python.empty())
+        throw InputError(
+            fmt::format("the solver {} is written in Python; the conformance suite runs over shared "
+                        "libraries",
+                        plugin.name));
+    return plugin.library;
+}
+
 int check(const PluginsArguments& arguments) {
-    const std::filesystem::path library =
-        is_library_path(arguments.plugin) ? std::filesystem::path(arguments.plugin)
-                                          : Registry(absolute(arguments.plugin_path)).find(arguments.plugin).library;
+    const std::filesystem::path library = library_of(arguments);
     const auto report = check::run_conformance(std::filesystem::absolute(library));
     if (arguments.json) {
         fmt::print("{}", check::to_json(report));
@@ -173,7 +247,8 @@ int check(const PluginsArguments& arguments) {
 }
 
 int describe(const PluginsArguments& arguments) {
-    const PluginInfo info = info_of_library(arguments.plugin);
+    PluginInfo info = info_of_library(arguments.plugin);
+    if (arguments.checksum) info.checksums[info.library.filename().string()] = checksum_of_file(info.library);
     const auto text = sidecar_text(info);
     if (arguments.sidecar) {
         const std::filesystem::path file = std::filesystem::path(info.library).replace_extension(".json");
@@ -194,7 +269,7 @@ int describe(const PluginsArguments& arguments) {
 
 void add_plugins(CLI::App& program, Action& action) {
     auto arguments = std::make_shared<PluginsArguments>();
-    auto* plugins = program.add_subcommand("plugins", "List, describe and check solver plugins");
+    auto* plugins = program.add_subcommand("plugins", "List, describe, check, install and remove solver plugins");
     plugins->require_subcommand(1);
     const auto on_call = [&action, arguments](int (*run)(const PluginsArguments&)) {
         return [&action, arguments, run] { action.run = [arguments, run] { return run(*arguments); }; };
@@ -230,7 +305,10 @@ void add_plugins(CLI::App& program, Action& action) {
         plugins->add_subcommand("describe", "Print the sidecar of a shared library, or write it beside it");
     describe_command->add_option("plugin", arguments->plugin, "Path of a shared library")->required()->type_name("LIB");
     describe_command->add_flag("--sidecar", arguments->sidecar, "Write it beside the library");
+    describe_command->add_flag("--checksum", arguments->checksum,
+                               "With the checksum of the library, for handing both on");
     describe_command->callback(on_call(describe));
+    add_plugin_packages(*plugins, action);
 }
 
 }  // namespace delassus::command

@@ -48,7 +48,19 @@ struct OptionValue {
 /// A JSON Schema of the "options" object of a configuration, from the table.
 [[nodiscard]] DELASSUS_API std::string options_schema(std::string_view solver, const std::vector<OptionInfo>& table);
 
-/// What the descriptor says, copied.
+/// Where a plugin was found.
+enum class PluginOrigin {
+    Program,        ///< the program brings it, or it was named by its path
+    Delassus,       ///< it comes with the library
+    Folder,         ///< a folder of the caller or of DELASSUS_PLUGIN_PATH
+    User,           ///< installed for one user
+    System,         ///< installed for all, beside those of the library
+    PythonPackage,  ///< an entry point of an installed package of Python, in the group delassus.solvers
+};
+/// "delassus", "user", "python package", … as `delassus plugins list --json` has it.
+[[nodiscard]] DELASSUS_API std::string_view name_of(PluginOrigin origin);
+
+/// What the descriptor says, copied, and what a manifest (the sidecar) says beyond it.
 struct PluginInfo {
     std::string name, version, description, licence;
     std::uint16_t abi_major = 0, abi_minor = 0;
@@ -57,6 +69,14 @@ struct PluginInfo {
     std::uint32_t build = DELASSUS_BUILD_UNKNOWN;  ///< DELASSUS_BUILD_*
     std::vector<OptionInfo> options;
     std::filesystem::path library;  ///< absolute path of the shared library; empty: the program's own
+
+    std::string platform;  ///< that the library was built for, "linux_x86_64"; empty where nobody says
+    /// "module:Class" of a solver that is written in Python; `library` is then the file of that module, or empty where
+    /// Python itself finds it.
+    std::string python;
+    std::map<std::string, std::string> checksums;  ///< "crc32:1a2b3c4d" of files beside the manifest, by their names
+    std::string installed_from;                    ///< the path given to the installer; "numpy 1.24" of a package
+    PluginOrigin origin = PluginOrigin::Program;
 
     /// The needs that this plugin does not meet.
     [[nodiscard]] std::uint64_t missing(std::uint64_t needs) const { return needs & ~capabilities; }
@@ -68,6 +88,8 @@ inline constexpr std::string_view unoptimized_build =
 
 /// The sidecar's text (JSON) for a plugin, and back. reading throws PluginError with a sentence.
 [[nodiscard]] DELASSUS_API std::string sidecar_text(const PluginInfo& info);
+/// What the descriptor alone says: equal texts, equal descriptors.
+[[nodiscard]] DELASSUS_API std::string descriptor_text(const PluginInfo& info);
 [[nodiscard]] DELASSUS_API PluginInfo read_sidecar(const std::filesystem::path& sidecar);
 
 }  // namespace delassus

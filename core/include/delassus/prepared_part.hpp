@@ -79,9 +79,6 @@ private:
     std::unique_ptr<Implementation> implementation_;
 };
 
-/// The phase's name in reports: "products".
-[[nodiscard]] DELASSUS_API std::string_view name_of(delassus_phase phase);
-
 /// What one process had of a partitioned problem, and what it cost it.
 struct ProcessReport {
     std::int64_t n = 0, m = 0;     ///< own columns and rows

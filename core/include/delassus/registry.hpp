@@ -22,6 +22,9 @@ public:
     /// A solver that the program itself brings. What the descriptor points at lasts as long as the process. Throws
     /// PluginError if its handshake fails.
     [[nodiscard]] DELASSUS_API static std::shared_ptr<const Plugin> of(const delassus_plugin_descriptor& descriptor);
+    /// The same of a plugin that was found: info() says where, as `found` does.
+    [[nodiscard]] DELASSUS_API static std::shared_ptr<const Plugin> of(const delassus_plugin_descriptor& descriptor,
+                                                                       const PluginInfo& found);
 
     [[nodiscard]] const PluginInfo& info() const { return info_; }
     /// A copy; fields that the plugin's version of the border does not have are zero.
@@ -58,9 +61,15 @@ struct MissingPart {
     std::string name, reason;
 };
 
+/// Where `delassus plugins install` puts what one user installs: $XDG_DATA_HOME/delassus/plugins, or
+/// ~/.local/share/delassus/plugins; empty if there is no home.
+[[nodiscard]] DELASSUS_API std::filesystem::path user_plugin_folder();
+
 /// The plugins that can be chosen by name. Folders are searched in order, the first plugin of a name wins:
-/// the folders given, then those of DELASSUS_PLUGIN_PATH (separated by colons), then the plugin folder beside
-/// libdelassus. Never the working directory. Reads sidecars only; nothing is loaded before it is chosen.
+/// the folders given, then those of DELASSUS_PLUGIN_PATH (separated by colons), then the user's, then the plugin folder
+/// beside libdelassus; in each its own files, then the folders of installed plugins. Never the working directory. Reads
+/// sidecars only; nothing is loaded before it is chosen. A name that no folder has is looked for among the entry points
+/// `delassus.solvers` of Python's packages: only then a python3 is started.
 class Registry {
 public:
     DELASSUS_API explicit Registry(std::vector<std::filesystem::path> folders = {});
@@ -75,6 +84,9 @@ public:
     [[nodiscard]] const std::vector<UnbuiltPlugin>& unbuilt() const { return unbuilt_; }
     [[nodiscard]] const std::vector<MissingPart>& missing_parts() const { return missing_parts_; }
     [[nodiscard]] const std::vector<std::filesystem::path>& folders() const { return folders_; }
+    /// Those that packages of Python bring, by their entry points. What only the solver itself knows (capabilities,
+    /// options) is empty. Throws PluginError if Python cannot be asked.
+    [[nodiscard]] DELASSUS_API std::vector<PluginInfo> packaged() const;
 
     /// Throws InputError if there is none: with the reason where a plugin of that name was rejected or not built, else
     /// with the nearest name or all names.
@@ -88,7 +100,10 @@ public:
     [[nodiscard]] DELASSUS_API std::vector<std::string> capable(std::uint64_t needs) const;
 
 private:
-    void scan(const std::filesystem::path& folder);
+    struct Found;
+    void scan(const std::filesystem::path& folder, PluginOrigin origin);
+    void read(const std::filesystem::path& folder, PluginOrigin origin);
+    [[nodiscard]] std::shared_ptr<const Plugin> find_packaged(const std::string& name) const;
 
     std::vector<std::filesystem::path> folders_;
     std::vector<PluginInfo> plugins_;
@@ -96,6 +111,7 @@ private:
     std::vector<RejectedPlugin> rejected_;
     std::vector<UnbuiltPlugin> unbuilt_;
     std::vector<MissingPart> missing_parts_;
+    std::shared_ptr<Found> found_;  // as plugins are chosen
 };
 
 }  // namespace delassus

@@ -105,6 +105,9 @@ struct SolveCost {
     std::int64_t bytes_sent = -1;  ///< by the solver to other processes while it solved; −1 where it does not say
 };
 
+/// The phase's name in reports: "products".
+[[nodiscard]] DELASSUS_API std::string_view name_of(delassus_phase phase);
+
 /// What happened. Every number in `error` was computed by the core. Where the problem is in parts, all but `cost` is
 /// the same on all processes, and seconds are those of the slowest.
 struct SolveReport {

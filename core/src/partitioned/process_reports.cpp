@@ -11,9 +11,6 @@ namespace delassus {
 
 namespace {
 
-constexpr std::array<std::string_view, DELASSUS_PHASE_COUNT> phase_names = {"products", "projections", "linear_systems",
-                                                                            "exchange", "reductions",  "waiting"};
-
 /// A double from every process, to the bit.
 std::vector<double> all_of(const Communicator& run, double value) {
     std::vector<double> values;
@@ -24,16 +21,12 @@ std::vector<double> all_of(const Communicator& run, double value) {
 
 nlohmann::ordered_json seconds_json(const SolveCost& cost) {
     nlohmann::ordered_json json = {{"setup", json_number(cost.setup)}, {"solve", json_number(cost.solve)}};
-    for (std::size_t k = 0; k < phase_names.size(); ++k)
-        json[std::string(phase_names[k])] = json_number(cost.phases[k]);
+    for (std::size_t k = 0; k < cost.phases.size(); ++k)
+        json[std::string(name_of(static_cast<delassus_phase>(k)))] = json_number(cost.phases[k]);
     return json;
 }
 
 }  // namespace
-
-std::string_view name_of(delassus_phase phase) {
-    return phase_names.at(static_cast<std::size_t>(phase));
-}
 
 std::vector<ProcessReport> process_reports(const PreparedPart& problem, const SolveCost& cost) {
     const Communicator& run = problem.communicator();

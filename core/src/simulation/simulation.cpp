@@ -25,6 +25,7 @@
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
 #include "support/frames.hpp"
+#include "support/trace.hpp"
 
 namespace delassus {
 namespace {
@@ -327,6 +328,10 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
 
 const StepRecord& Simulation::step() {
     const auto begin = Clock::now();
+    TraceSpan span("step", "step");
+    span.say("system", system_->name);
+    span.say("number", static_cast<double>(now_.step + 1));
+    span.say("t", now_.state.t);
     const auto where = [&] {
         return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
     };

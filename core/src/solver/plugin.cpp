@@ -15,6 +15,7 @@
 #include "delassus/sdk/blas_memory.hpp"
 #include "support/crash_signals.hpp"
 #include "support/module.hpp"
+#include "support/platform.hpp"
 #include "support/process_record.hpp"
 #include "support/sentence.hpp"
 
@@ -191,6 +192,7 @@ std::shared_ptr<const Plugin> Plugin::load(const std::filesystem::path& path) {
             fmt::format("the plugin {} threw an exception from {}", absolute.string(), DELASSUS_PLUGIN_SYMBOL));
     }
     plugin->info_.library = absolute;
+    plugin->info_.platform = this_platform();
     if (plugin->info_.flags & DELASSUS_FLAG_GLOBAL_SYMBOLS) keep_forever(open(absolute, true));
     if (plugin->info_.build == DELASSUS_BUILD_UNOPTIMIZED) unoptimized_names().add(plugin->info_.name);
     return plugin;
@@ -201,6 +203,10 @@ std::vector<std::string> unoptimized_plugins() {
 }
 
 std::shared_ptr<const Plugin> Plugin::of(const delassus_plugin_descriptor& descriptor) {
+    return of(descriptor, PluginInfo());
+}
+
+std::shared_ptr<const Plugin> Plugin::of(const delassus_plugin_descriptor& descriptor, const PluginInfo& found) {
     std::shared_ptr<Plugin> plugin(new Plugin);
     try {
         plugin->descriptor_ = shake_hands(&descriptor);
@@ -208,6 +214,12 @@ std::shared_ptr<const Plugin> Plugin::of(const delassus_plugin_descriptor& descr
     } catch (const Error& error) {
         throw PluginError(fmt::format("the plugin {}: {}", text_of(descriptor.name), error.what()));
     }
+    plugin->info_.library = found.library;
+    plugin->info_.platform = found.platform;
+    plugin->info_.python = found.python;
+    plugin->info_.checksums = found.checksums;
+    plugin->info_.installed_from = found.installed_from;
+    plugin->info_.origin = found.origin;
     return plugin;
 }
 

@@ -15,6 +15,7 @@
 #include "solver/solver_implementation.hpp"
 #include "support/alone.hpp"
 #include "support/sentence.hpp"
+#include "support/trace.hpp"
 
 namespace delassus {
 
@@ -188,10 +189,12 @@ private:
     }
 
     std::int32_t analyze(const Prepared& problem) {
+        const TraceSpan span("plugin", "analyze");
         return problem.whole() ? border().analyze(instance.get(), problem.whole())
                                : border().analyze_partitioned(instance.get(), problem.part());
     }
     std::int32_t factorize(const Prepared& problem) {
+        const TraceSpan span("plugin", "factorize");
         return problem.whole() ? border().factorize(instance.get(), problem.whole())
                                : border().factorize_partitioned(instance.get(), problem.part());
     }
@@ -250,7 +253,7 @@ std::optional<Errors> PluginSolver::run(const Prepared& problem, Solution& solut
     outcome.struct_size = sizeof outcome;
     outcome.residual = NAN;
     outcome.bytes_sent = -1;
-    if (problem.part()) {
+    if (problem.part() || is_traced()) {
         outcome.phase_seconds = report.cost.phases.data();
         outcome.phase_count = DELASSUS_PHASE_COUNT;
     }
@@ -265,9 +268,12 @@ std::optional<Errors> PluginSolver::run(const Prepared& problem, Solution& solut
                                        settings.time_limit,
                                        &Listener::callback,
                                        &listener};
+        TraceSpan span("plugin", "iterate");
         watch.start();
         ending = agree(run, instance.guarded([&] { return solve(problem, request, solution, outcome); }));
         watch.stop();
+        for (std::size_t k = 0; k < report.cost.phases.size(); ++k)
+            span.say(name_of(static_cast<delassus_phase>(k)), report.cost.phases[k]);
         listener.rethrow();
         if (ending.status != DELASSUS_ERROR) {
             report.iterations = outcome.iterations;

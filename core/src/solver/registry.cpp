@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Discovery of plugins by their sidecars.
+// Discovery of plugins by their sidecars, and by the entry points of Python's packages.
 #include "delassus/registry.hpp"
 
 #include <fmt/format.h>
@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <mutex>
 #include <new>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <system_error>
@@ -15,8 +17,11 @@
 
 #include "delassus/error.hpp"
 #include "solver/auto_solver.hpp"
+#include "solver/installed_files.hpp"
+#include "solver/python_solvers.hpp"
 #include "support/library_location.hpp"
 #include "support/nearest_name.hpp"
+#include "support/platform.hpp"
 #include "support/text_file.hpp"
 
 namespace delassus {
@@ -34,12 +39,51 @@ std::vector<fs::path> folders_of_environment() {
     return folders;
 }
 
+bool is_file(const fs::path& path) {
+    std::error_code absent;
+    return fs::is_regular_file(path, absent);
+}
+
 }  // namespace
 
-Registry::Registry(std::vector<fs::path> folders) : folders_(std::move(folders)) {
+/// What is found out as plugins are chosen: the solvers of Python's packages, asked for once and loaded where they are
+/// chosen, and the libraries whose checksums were compared.
+struct Registry::Found {
+    std::mutex mutex;
+    std::optional<std::vector<PluginInfo>> listed;
+    std::map<std::string, std::shared_ptr<const Plugin>> loaded;
+    std::set<fs::path> intact;
+
+    void require_intact(const PluginInfo& info) {
+        const std::lock_guard lock(mutex);
+        if (intact.contains(info.library)) return;
+        require_checksums(info);
+        intact.insert(info.library);
+    }
+};
+
+fs::path user_plugin_folder() {
+    const auto folder_of = [](const char* variable) {  // what is not absolute does not count, says XDG
+        const char* value = std::getenv(variable);
+        const fs::path folder = value ? value : "";
+        return folder.is_absolute() ? folder : fs::path();
+    };
+    if (const auto data = folder_of("XDG_DATA_HOME"); !data.empty()) return data / "delassus" / "plugins";
+    if (const auto home = folder_of("HOME"); !home.empty()) return home / ".local/share" / "delassus" / "plugins";
+    return {};
+}
+
+Registry::Registry(std::vector<fs::path> folders) : folders_(std::move(folders)), found_(std::make_shared<Found>()) {
     for (auto& folder : folders_of_environment()) folders_.push_back(std::move(folder));
+    const auto user = user_plugin_folder();
+    for (const auto& folder : folders_) scan(folder, folder == user ? PluginOrigin::User : PluginOrigin::Folder);
+    if (std::error_code absent;
+        std::find(folders_.begin(), folders_.end(), user) == folders_.end() && fs::is_directory(user, absent)) {
+        folders_.push_back(user);
+        scan(user, PluginOrigin::User);
+    }
     folders_.push_back(library_directory() / "delassus" / "plugins");
-    for (const auto& folder : folders_) scan(folder);
+    scan(folders_.back(), PluginOrigin::Delassus);
     std::sort(plugins_.begin(), plugins_.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
 
     // Written by cmake/DelassusSummary.cmake.
@@ -53,14 +97,20 @@ Registry::Registry(std::vector<fs::path> folders) : folders_(std::move(folders))
     }
 }
 
-void Registry::scan(const fs::path& folder) {
-    std::error_code error;
-    std::set<fs::path> libraries, sidecars;
+void Registry::scan(const fs::path& folder, PluginOrigin origin) {
     // A relative folder of the environment would depend on the working directory.
     if (!folder.is_absolute()) {
         rejected_.push_back({folder, "a plugin folder must be given by an absolute path", {}});
         return;
     }
+    read(folder, origin);
+    for (const auto& installed : installed_plugins(folder))
+        read(installed, origin == PluginOrigin::Delassus ? PluginOrigin::System : origin);
+}
+
+void Registry::read(const fs::path& folder, PluginOrigin origin) {
+    std::error_code error;
+    std::set<fs::path> libraries, sidecars;
     for (const auto& entry : fs::directory_iterator(folder, error)) {
         if (entry.path().extension() == ".json" && entry.path().filename() != ranking_file_name)
             sidecars.insert(entry.path());
@@ -89,11 +139,15 @@ void Registry::scan(const fs::path& folder) {
             rejected_.push_back({path, std::move(reason), info.name});
         };
         const std::string file = info.library.filename().string();
-        if (!libraries.contains(info.library)) {
+        const std::string here = this_platform();
+        info.origin = origin;
+        if (info.python.empty() ? !libraries.contains(info.library) : !is_file(info.library)) {
             reject(sidecar, fmt::format("its library {} is missing", file));
         } else if (const auto [other, first] = sidecar_of.emplace(info.library, sidecar); !first) {
             reject(sidecar,
                    fmt::format("its library {} has another sidecar, {}", file, other->second.filename().string()));
+        } else if (!info.platform.empty() && !here.empty() && info.platform != here) {
+            reject(info.library, fmt::format("built for {}; this is {}", info.platform, here));
         } else if (info.abi_major != DELASSUS_ABI_MAJOR) {
             reject(info.library, fmt::format("built for version {}.{} of the plugin interface; this is {}.{}",
                                              info.abi_major, info.abi_minor, DELASSUS_ABI_MAJOR, DELASSUS_ABI_MINOR));
@@ -131,6 +185,7 @@ const PluginInfo& Registry::find(const std::string& name) const {
         if (!row.name.empty() && (row.name == name || row.path.stem() == name))
             throw InputError(
                 fmt::format("the plugin \"{}\" was rejected: {}: {}", name, row.path.string(), row.reason));
+    if (const auto plugin = find_packaged(name)) return plugin->info();
     for (const auto& plugin : unbuilt_)
         if (plugin.name == name)
             throw InputError(fmt::format("the solver {} was not built here: {}", name, plugin.reason));
@@ -151,12 +206,51 @@ std::shared_ptr<const Plugin> Registry::load(const std::string& name_or_path) co
     for (const auto& plugin : own_)
         if (plugin->info().name == name_or_path) return plugin;
     const PluginInfo& listed = find(name_or_path);
-    auto plugin = Plugin::load(listed.library);
-    if (sidecar_text(plugin->info()) != sidecar_text(listed))
+    if (listed.origin == PluginOrigin::PythonPackage) return find_packaged(name_or_path);
+    found_->require_intact(listed);
+    auto plugin = listed.python.empty() ? Plugin::load(listed.library) : python_solvers().load(listed);
+    PluginInfo expected = listed;
+    if (!listed.python.empty()) expected.abi_minor = plugin->info().abi_minor;  // the border is the host's own
+    if (descriptor_text(plugin->info()) != descriptor_text(expected))
         throw PluginError(
-            fmt::format("the sidecar of {} does not match it; `delassus plugins describe {} --sidecar` renews it",
-                        listed.library.string(), listed.library.string()));
+            listed.python.empty()
+                ? fmt::format("the sidecar of {} does not match it; `delassus plugins describe {} --sidecar` renews it",
+                              listed.library.string(), listed.library.string())
+                : fmt::format("the manifest of {} does not match it; install it again", listed.library.string()));
     return plugin;
+}
+
+std::vector<PluginInfo> Registry::packaged() const {
+    {
+        const std::lock_guard lock(found_->mutex);
+        if (found_->listed) return *found_->listed;
+    }
+    auto listed = python_solvers().packaged();  // without the lock: Python has one of its own
+    const std::lock_guard lock(found_->mutex);
+    found_->listed = std::move(listed);
+    return *found_->listed;
+}
+
+/// Null if no package brings it. Throws PluginError if it does and cannot be loaded.
+std::shared_ptr<const Plugin> Registry::find_packaged(const std::string& name) const {
+    {
+        const std::lock_guard lock(found_->mutex);
+        if (const auto found = found_->loaded.find(name); found != found_->loaded.end()) return found->second;
+    }
+    std::vector<PluginInfo> listed;
+    try {
+        listed = packaged();
+    } catch (const PluginError&) {  // `delassus plugins list` says why
+        return nullptr;
+    }
+    const auto place = std::find_if(listed.begin(), listed.end(), [&](const auto& info) { return info.name == name; });
+    if (place == listed.end()) return nullptr;
+    auto plugin = python_solvers().load(*place);
+    if (plugin->info().name != name)
+        throw PluginError(fmt::format("the entry point \"{}\" of {} leads to a solver that is named \"{}\"", name,
+                                      place->installed_from, plugin->info().name));
+    const std::lock_guard lock(found_->mutex);
+    return found_->loaded.emplace(name, std::move(plugin)).first->second;
 }
 
 std::vector<std::string> Registry::capable(std::uint64_t needs) const {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <span>
@@ -15,6 +16,7 @@
 #include "solver/judgement.hpp"
 #include "solver/solver_implementation.hpp"
 #include "support/finite.hpp"
+#include "support/trace.hpp"
 
 namespace delassus {
 
@@ -40,6 +42,12 @@ std::string_view name_of(Status status) {
             return "false_claim";
     }
     return "error";
+}
+
+std::string_view name_of(delassus_phase phase) {
+    constexpr std::array<std::string_view, DELASSUS_PHASE_COUNT> names = {"products", "projections", "linear_systems",
+                                                                          "exchange", "reductions",  "waiting"};
+    return names.at(static_cast<std::size_t>(phase));
 }
 
 std::string quoted_name(const Prepared& problem) {
@@ -77,6 +85,7 @@ std::string Solver::refusal(const Prepared& problem, const SolveSettings& settin
 
 SolveReport Solver::solve(const Prepared& problem, Solution& solution, const SolveSettings& settings) {
     check_settings(settings);
+    TraceSpan span("solve", info().name);
     if (const std::string sentence = refusal(problem, settings); !sentence.empty()) throw Unsupported(sentence);
 
     const Communicator& run = problem.communicator();
@@ -127,6 +136,10 @@ SolveReport Solver::solve(const Prepared& problem, Solution& solution, const Sol
     const auto rounding = [&] { return problem.rounding_of_balance(solution); };
     judge(report, (problem.needs() & no_cones) == 0, std::ref(rounding));
     if (settings.record_curve && !report.curve.empty()) report.curve.back().natural = report.error.natural;
+    span.say("problem", report.problem);
+    span.say("status", name_of(report.status));
+    span.say("iterations", static_cast<double>(report.iterations));
+    span.say("natural", report.error.natural);
     return report;
 }
 

@@ -160,6 +160,31 @@ void append_to_file(const fs::path& path, std::string_view content) {
     if (failure != 0) refuse_write(path, failure);
 }
 
+namespace {
+
+/// The marks of the folder and of those in it, of all that is there.
+void write_marks(const fs::path& folder, const std::string& kind) {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+        const bool inner = fs::is_directory(entry.symlink_status());
+        if (inner) write_marks(entry.path(), kind);
+        names.push_back(entry.path().filename().string() + (inner ? "/" : ""));
+    }
+    std::sort(names.begin(), names.end());
+    write_folder_mark(folder, kind, names);
+}
+
+}  // namespace
+
+void remove_folder_atomically(const fs::path& folder, const std::string& kind) {
+    require_replaceable(folder, kind);
+    const fs::path old = temporary_name_beside(folder);
+    if (std::rename(folder.c_str(), old.c_str()) != 0)
+        throw InputError(fmt::format("{} cannot be removed: {}.", folder.string(), std::strerror(errno)));
+    std::error_code ignored;
+    fs::remove_all(old, ignored);
+}
+
 AtomicFolder::AtomicFolder(const fs::path& target, std::string kind)
     : target_(without_trailing_slash(target)), kind_(std::move(kind)) {
     require_parent(target_);
@@ -181,10 +206,7 @@ AtomicFolder::~AtomicFolder() {
 }
 
 void AtomicFolder::commit() {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(temporary_)) names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    write_folder_mark(temporary_, kind_, names);
+    write_marks(temporary_, kind_);
     std::error_code ignored;
     if (!fs::exists(target_, ignored)) {
         if (std::rename(temporary_.c_str(), target_.c_str()) == 0) {

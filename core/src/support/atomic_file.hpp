@@ -53,7 +53,11 @@ private:
     std::filesystem::path temporary_;
 };
 
-/// A folder under construction. Fill path() with files, then commit(); a folder that is not committed disappears.
+/// Removes a folder that require_replaceable() of this kind lets pass: whole, or not at all. Throws InputError.
+DELASSUS_API void remove_folder_atomically(const std::filesystem::path& folder, const std::string& kind);
+
+/// A folder under construction. Fill path() with files and folders, then commit(); a folder that is not committed
+/// disappears.
 class DELASSUS_API AtomicFolder {
 public:
     /// kind: of the folder's mark. A target that exists must satisfy require_replaceable().

@@ -212,10 +212,17 @@ void require_replaceable(const fs::path& path, std::string_view kind) {
     const auto entries = entries_of(path);
     const auto mark = read_mark(path);
     if (mark) require_kind(path, *mark, kind);
-    for (const auto& entry : entries)
-        if (!mark || std::find(mark->names.begin(), mark->names.end(), entry) == mark->names.end() ||
-            is_real_folder(path / entry))
-            refuse_foreign(path, entry);
+    const auto is_listed = [&](const std::string& name) {
+        return mark && std::find(mark->names.begin(), mark->names.end(), name) != mark->names.end();
+    };
+    for (const auto& entry : entries) {
+        if (!is_real_folder(path / entry)) {
+            if (!is_listed(entry)) refuse_foreign(path, entry);
+        } else {
+            if (!is_listed(entry + "/")) refuse_foreign(path, entry);
+            require_replaceable(path / entry, kind);
+        }
+    }
 }
 
 void write_folder_mark(const fs::path& folder, std::string_view kind, const std::vector<std::string>& names) {

@@ -22,7 +22,7 @@ inline constexpr std::string_view file_mark = "written by delassus";
 DELASSUS_API std::string marked_text(std::string_view comment, const std::string& text);
 
 /// Throws InputError if the path is there and this program did not write it, or if it is a folder that holds more than
-/// that. kind: of a folder, e.g. "problem". An empty folder may be replaced.
+/// that. kind: of a folder, e.g. "problem", and of the folders in it. An empty folder may be replaced.
 DELASSUS_API void require_replaceable(const std::filesystem::path& path, std::string_view kind);
 
 /// Writes the mark of a folder with these names in it.
