@@ -79,11 +79,10 @@ private:
     }
 
     // next = Π(y − t û(y)) with the largest t that backtracking allows: f(next) must not exceed the quadratic model
-    // f(y)
-    // + û(y)ᵀd + ‖d‖²/(2t). f is ½ λ̂ᵀN̂λ̂ + r̂ᵀλ̂ as a whole, so f(next) − f(y) − û(y)ᵀd = ½ dᵀN̂d exactly, and the test is
-    // t dᵀN̂d ≤ ‖d‖². It subtracts no values of f, so cancellation cannot stall it. A step that backtracking has set to
-    // ‖d‖²/dᵀN̂d may meet it as an equation; rounding, which differs between numbers of processes, must not cut it
-    // again. The quantities that judge next are computed on the way, while its rows are in the cache, and added up
+    // f(y) + û(y)ᵀd + ‖d‖²/(2t). f is ½ λ̂ᵀN̂λ̂ + r̂ᵀλ̂ as a whole, so f(next) − f(y) − û(y)ᵀd = ½ dᵀN̂d exactly, and the
+    // test is t dᵀN̂d ≤ ‖d‖². It subtracts no values of f, so cancellation cannot stall it. A step that backtracking has
+    // set to ‖d‖²/dᵀN̂d may meet it as an equation; rounding, which differs between numbers of processes, must not cut
+    // it again. The quantities that judge next are computed on the way, while its rows are in the cache, and added up
     // together: one reduction an iteration. True: stop. On entry next and its û are the iterate before λ̂, from which
     // the first pass extrapolates to y.
     bool gradient_step(const Scaled& scaled, Run& run, const sdk::Team& team, double momentum) {
