@@ -2,6 +2,7 @@
 """Solvers of Python that are installed: by `delassus plugins install`, and by packages with entry points."""
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -111,12 +112,12 @@ class Packages(unittest.TestCase):
         return done.stdout
 
     def solve_by_both(self, name):
-        report = json.loads(self.command("solve", PROBLEM, "--solver", name, "--tolerance", "1e-3", "--json",
+        report = json.loads(self.command("solve", PROBLEM, "--solver", name, "--tolerance", "0.1", "--json",
                                          "--law", "coulomb"))
         self.assertEqual((report["status"], report["solver"]), ("solved", name))
         iterations = self.python(f"""
             import delassus
-            result = delassus.solve(delassus.read({str(PROBLEM)!r}), {name!r}, tolerance=1e-3, law="coulomb")
+            result = delassus.solve(delassus.read({str(PROBLEM)!r}), {name!r}, tolerance=0.1, law="coulomb")
             assert result.solved, result
             print(result.iterations)
         """)
@@ -147,6 +148,21 @@ class Installed(Packages):
         self.assertEqual(list(self.plugins.iterdir()), [])
         self.refused('there is no solver "sweeps"', "solve", PROBLEM, "--solver", "sweeps")
 
+    def test_for_all(self):
+        """In an installation of its own: libdelassus and the folder of plugins beside it."""
+        library = self.scratch / "lib"
+        (library / "delassus" / "plugins").mkdir(parents=True)
+        (built,) = Path(os.environ["DELASSUS_COMMAND"]).parents[1].rglob("libdelassus.so.[0-9]*.[0-9]*.[0-9]*")
+        for name in (built.name, built.name.rsplit(".", 1)[0]):
+            shutil.copy(built, library / name)
+        self.environment["LD_LIBRARY_PATH"] = str(library)
+        out = self.command("plugins", "install", "--system", self.solver("theirs/sweeps.py"))
+        self.assertIn(f"installed sweeps 1.2 for all: {library / 'delassus' / 'plugins' / 'sweeps'}", out)
+        self.assertEqual(self.listed("sweeps")["origin"], "system")
+        self.solve_by_both("sweeps")
+        self.command("plugins", "remove", "sweeps")
+        self.assertEqual(list((library / "delassus" / "plugins").iterdir()), [])
+
     def test_a_package_with_folders_is_replaced_whole(self):
         self.solver("theirs/stranger/solvers/sweeps.py")
         self.write("theirs/stranger/solvers/__init__.py", "")
@@ -163,7 +179,7 @@ class Installed(Packages):
     def test_options_scenes_and_words_of_the_solver(self):
         self.command("plugins", "install", self.solver("theirs/sweeps.py"))
         out = self.command("solve", PROBLEM, "--solver", "sweeps", "--set", "talk=true", "--set", "omega=1.1",
-                           "--tolerance", "1e-3", "--json")
+                           "--tolerance", "0.1", "--json")
         self.assertEqual(json.loads(out)["status"], "solved")  # what the solver prints is no part of the report
         self.refused("omega is too large", "solve", PROBLEM, "--solver", "sweeps", "--set", "omega=1000")
         self.refused("omeg", "solve", PROBLEM, "--solver", "sweeps", "--set", "omeg=1")
@@ -227,7 +243,7 @@ class EntryPoints(Packages):
             self.assertIn("omega=1.0", self.command("plugins", "info", "sweeps"))
             self.solve_by_both("sweeps")
         self.refused("comes with the Python package stranger 0.3", "plugins", "remove", "sweeps")
-        self.command("compare", PROBLEM, "--solvers", "sweeps,pgs", "-o", "out", "--tolerance", "1e-3")
+        self.command("compare", PROBLEM, "--solvers", "sweeps,pgs", "-o", "out", "--tolerance", "0.1")
 
     def test_listing_imports_nothing(self):
         self.package()

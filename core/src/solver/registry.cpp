@@ -135,7 +135,7 @@ void Registry::read(const fs::path& folder, PluginOrigin origin) {
                           [](const auto& entry) { return entry.first.stem() == entry.second.library.stem(); });
     std::map<fs::path, fs::path> sidecar_of;
     for (auto& [sidecar, info] : described) {
-        const auto reject = [&, &sidecar = sidecar, &info = info](const fs::path& path, std::string reason) {
+        const auto reject = [&, &info = info](const fs::path& path, std::string reason) {
             rejected_.push_back({path, std::move(reason), info.name});
         };
         const std::string file = info.library.filename().string();
