@@ -211,6 +211,7 @@ class Installed(Packages):
         self.command("plugins", "install", self.solver("theirs/sweeps.py"))
         with open(self.plugins / "sweeps" / "sweeps.py", "a", encoding="utf-8") as file:
             file.write("open('imported', 'w')\n")
+        self.refused("sweeps.py is damaged: its checksum is", "plugins", "install", self.plugins / "sweeps")
         self.refused("sweeps.py is damaged: its checksum is", "solve", PROBLEM, "--solver", "sweeps")
         self.assertIn("is damaged", self.command("plugins", "list").split("Rejected:")[1])
         self.python(f"""
