@@ -2,6 +2,7 @@
 // delassus plugins install | remove: plugins as packages, each in a folder of its own that appears and disappears whole
 // (solver/installed_files.hpp).
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -218,6 +219,7 @@ int install(const PackageArguments& arguments) {
         return info_of_source(source);
     }();
     const fs::path place = folder / info.name;
+    if (arguments.system) umask(022);  // all are to read it, whatever root keeps to itself
     const Registry registry;
     const PluginInfo* other = other_of_name(registry, info.name, place);
     require_writable(folder);
