@@ -15,6 +15,7 @@
 #include "bench/tasks.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
+#include "process/child_process.hpp"
 #include "solver/auto_solver.hpp"
 #include "solver/python_solvers.hpp"
 #include "support/library_location.hpp"
