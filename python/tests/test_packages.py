@@ -3,10 +3,12 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import textwrap
+import time
 import unittest
 from pathlib import Path
 
@@ -209,6 +211,7 @@ class Installed(Packages):
         self.command("plugins", "install", self.solver("theirs/sweeps.py"))
         with open(self.plugins / "sweeps" / "sweeps.py", "a", encoding="utf-8") as file:
             file.write("open('imported', 'w')\n")
+        self.refused("sweeps.py is damaged: its checksum is", "plugins", "install", self.plugins / "sweeps")
         self.refused("sweeps.py is damaged: its checksum is", "solve", PROBLEM, "--solver", "sweeps")
         self.assertIn("is damaged", self.command("plugins", "list").split("Rejected:")[1])
         self.python(f"""
@@ -232,6 +235,32 @@ class Installed(Packages):
         self.assertIn("its process was ended by the signal", json.loads(done.stdout)["message"])
 
 
+    def test_limits_hold_and_the_process_ends_with_its_host(self):
+        self.command("plugins", "install", self.solver("theirs/sweeps.py"))
+        line = [os.environ["DELASSUS_COMMAND"], "solve", str(PROBLEM), "--solver", "sweeps", "--tolerance", "1e-14",
+                "--json"]
+        limited = subprocess.run([*line, "--time-limit", "0.3"], capture_output=True, text=True, env=self.environment)
+        self.assertEqual((limited.returncode, json.loads(limited.stdout)["status"]), (3, "time_limit"))
+        interrupted = subprocess.Popen(line, stdout=subprocess.PIPE, text=True, env=self.environment)
+        time.sleep(2)
+        interrupted.send_signal(signal.SIGINT)
+        self.assertEqual(json.loads(interrupted.communicate()[0])["status"], "cancelled")
+
+        text = SOLVER.format(name="Hangs", decorator="@delassus.register").replace(
+            "        free =", "        import os; open('process', 'w').write(str(os.getpid()))\n        while True: pass\n        free =")
+        self.command("plugins", "install", self.write("theirs/hangs.py", text))
+        hung = subprocess.run([os.environ["DELASSUS_COMMAND"], "solve", str(PROBLEM), "--solver", "hangs",
+                               "--time-limit", "0.3"], capture_output=True, text=True, env=self.environment,
+                              cwd=self.scratch)
+        self.assertEqual(hung.returncode, 3)
+        self.assertIn("the solver hangs did not answer", hung.stderr)
+        process = int((self.scratch / "process").read_text())
+        end = time.monotonic() + 10.0
+        while time.monotonic() < end and Path(f"/proc/{process}").exists():
+            time.sleep(0.05)
+        self.assertFalse(Path(f"/proc/{process}").exists())
+
+
 class EntryPoints(Packages):
     def test_are_listed_used_and_not_removed(self):
         for decorator in ("", "@delassus.register"):
@@ -243,6 +272,7 @@ class EntryPoints(Packages):
             self.assertIn("omega=1.0", self.command("plugins", "info", "sweeps"))
             self.solve_by_both("sweeps")
         self.refused("comes with the Python package stranger 0.3", "plugins", "remove", "sweeps")
+        self.refused('there is no solver "sweepz"; did you mean "sweeps"?', "solve", PROBLEM, "--solver", "sweepz")
         self.command("compare", PROBLEM, "--solvers", "sweeps,pgs", "-o", "out", "--tolerance", "0.1")
 
     def test_listing_imports_nothing(self):

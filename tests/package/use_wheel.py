@@ -38,11 +38,14 @@ def run(*command, code=0, logged=None, **settings):
     return done.stdout
 
 
-def mapped(logs):
-    """Every library that processes initialised, but the system's; their logs are LOGS.PID."""
+def mapped(logs, python=True):
+    """Every library that processes initialised, but the system's; their logs are LOGS.PID. python: those of Python count,
+    which the command asks for solvers of packages."""
     found = set()
     for log in logs.parent.glob(logs.name + ".*"):
-        found |= set(re.findall(r"calling init: (.+)", log.read_text(errors="replace")))
+        text = log.read_text(errors="replace")
+        if python or not re.search(r"initialize program: .*python", text):
+            found |= set(re.findall(r"calling init: (.+)", text))
     return {path for path in found if not OF_THE_SYSTEM.match(path)}
 
 
@@ -78,7 +81,7 @@ def use_command():
         if (PREFIX / f"lib/delassus/delassus_import_{name}.so").exists():
             Path(name).write_text(text)
             delassus("import", name, "-o", f"{name}.yaml")
-    check(mapped(logs.resolve()))
+    check(mapped(logs.resolve(), python=False))
 
 
 SESSION = """

@@ -15,7 +15,9 @@
 #include "bench/tasks.hpp"
 #include "delassus/error.hpp"
 #include "delassus/version.hpp"
+#include "process/child_process.hpp"
 #include "solver/auto_solver.hpp"
+#include "solver/python_solvers.hpp"
 #include "support/library_location.hpp"
 #include "support/text_file.hpp"
 
@@ -249,7 +251,13 @@ std::string code_hash(const Registry& registry, const fs::path& command) {
             if (entry.is_regular_file() && entry.path().filename().string().find("delassus") != std::string::npos &&
                 entry.path().filename().string().find(".so") != std::string::npos)
                 files.insert(entry.path());
-    for (const auto& plugin : registry.plugins()) files.insert(plugin.library);
+    for (const auto& plugin : registry.plugins()) {
+        files.insert(plugin.library);
+        // Of a solver in several files the manifest has a checksum of each.
+        if (const auto manifest = import_folder(plugin) / (plugin.name + ".json");
+            !plugin.python.empty() && fs::exists(manifest))
+            files.insert(manifest);
+    }
     for (const auto& folder : registry.folders())
         for (const char* list : {"ranking.json", "references.txt"})
             if (fs::exists(folder / list)) files.insert(folder / list);
@@ -260,10 +268,15 @@ std::string code_hash(const Registry& registry, const fs::path& command) {
 
 RunCounts run_suite(const RunPlan& given, const Registry& registry, const RunListener& listener) {
     RunPlan plan = given;
-    const std::string code = code_hash(registry, plan.worker.command);
-    for (const auto& solver : plan.suite.solvers)
-        if (is_library_path(solver.name) && !fs::is_regular_file(solver.name))
-            throw InputError(fmt::format("there is no plugin {}", solver.name));
+    std::string code = code_hash(registry, plan.worker.command);
+    for (const auto& solver : plan.suite.solvers) {
+        if (is_library_path(solver.name)) {
+            if (!fs::is_regular_file(solver.name)) throw InputError(fmt::format("there is no plugin {}", solver.name));
+        } else if (const PluginInfo info = solver_info(registry, solver.name);
+                   info.origin == PluginOrigin::PythonPackage) {
+            code = key_of({code, info.installed_from, info.python});
+        }
+    }
     if (plan.suite.memory_limit > 0.0) plan.worker.resident_limit = bytes_of_mebibytes(plan.suite.memory_limit);
 
     const std::vector<bool> shares = sharing_solvers(registry, plan.suite);

@@ -2,6 +2,7 @@
 // delassus plugins install | remove: plugins as packages, each in a folder of its own that appears and disappears whole
 // (solver/installed_files.hpp).
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -62,14 +63,20 @@ Source module_of(const fs::path& path) {
 Source source_of_manifest(const fs::path& manifest) {
     const PluginInfo info = read_sidecar(manifest);
     if (info.python.empty()) return {info.library, manifest, false};
+    require_checksums(info);
     return module_of(info.library.filename() == package_file ? info.library.parent_path() : info.library);
 }
 
-/// The library with its manifest, if there is one: that of its own name, or the only one beside it.
-Source source_of_library(const fs::path& library, const std::vector<fs::path>& manifests = {}) {
-    const fs::path own = fs::path(library).replace_extension(".json");
-    if (fs::exists(own)) return {library, own, false};
-    return {library, manifests.size() == 1 ? manifests.front() : fs::path(), false};
+/// The library with its manifest, if there is one beside it.
+Source source_of_library(const fs::path& library) {
+    const fs::path manifest = fs::path(library).replace_extension(".json");
+    return {library, fs::exists(manifest) ? manifest : fs::path(), false};
+}
+
+/// Other programs have files of this kind, too.
+bool is_manifest(const fs::path& file) {
+    return file.extension() == ".json" && fs::is_regular_file(file) &&
+           read_file(file, most_bytes_of_text).find("\"delassus-plugin\"") != std::string::npos;
 }
 
 Source source_in_folder(const fs::path& folder) {
@@ -83,7 +90,7 @@ Source source_in_folder(const fs::path& folder) {
     for (const auto& entry : fs::directory_iterator(folder)) {
         const fs::path& path = entry.path();
         if (path.extension() == ".so") libraries.push_back(path);
-        if (path.extension() == ".json") manifests.push_back(path);
+        if (is_manifest(path)) manifests.push_back(path);
         if (path.extension() == ".py" || is_package(path)) modules.push_back(path);
     }
     auto& found = !libraries.empty() ? libraries : !manifests.empty() ? manifests : modules;
@@ -94,7 +101,7 @@ Source source_in_folder(const fs::path& folder) {
     if (found.size() > 1)
         throw InputError(fmt::format("{} holds several plugins, {} and {} among them: name one of them",
                                      folder.string(), found[0].filename().string(), found[1].filename().string()));
-    if (!libraries.empty()) return source_of_library(found.front(), manifests);
+    if (!libraries.empty()) return source_of_library(found.front());
     return manifests.empty() ? module_of(found.front()) : source_of_manifest(found.front());
 }
 
@@ -212,6 +219,7 @@ int install(const PackageArguments& arguments) {
         return info_of_source(source);
     }();
     const fs::path place = folder / info.name;
+    if (arguments.system) umask(022);  // all are to read it, whatever root keeps to itself
     const Registry registry;
     const PluginInfo* other = other_of_name(registry, info.name, place);
     require_writable(folder);

@@ -80,6 +80,12 @@ std::string python_program() {
     return chosen && *chosen ? chosen : "python3";
 }
 
+/// There is no such program.
+class NoPython : public PluginError {
+public:
+    using PluginError::PluginError;
+};
+
 /// A python3 that runs a text, with a socket as its standard input; what it prints goes to standard error.
 class Interpreter {
 public:
@@ -135,7 +141,10 @@ public:
 
 private:
     [[noreturn]] static void refuse(int error_number) {
-        throw PluginError(fmt::format("{} cannot be started: {}", python_program(), std::strerror(error_number)));
+        const std::string sentence =
+            fmt::format("{} cannot be started: {}", python_program(), std::strerror(error_number));
+        if (error_number == ENOENT) throw NoPython(sentence);
+        throw PluginError(sentence);
     }
     void wait_for_end() {
         while (process_ > 0 && waitpid(process_, &status_, 0) < 0 && errno == EINTR) {
@@ -353,11 +362,17 @@ class PythonProcesses final : public PythonSolvers {
 public:
     std::vector<PluginInfo> packaged() override {
         const ForeignCall call("python3", "while it listed its packages", ForeignCall::patience);
-        Interpreter interpreter(program_of_list, {});
-        const auto answer = interpreter.receive();
+        std::optional<Interpreter> interpreter;
+        try {
+            interpreter.emplace(program_of_list, std::vector<std::string>());
+        } catch (const NoPython&) {
+            if (!std::getenv("DELASSUS_PYTHON")) return {};  // a machine without Python has no packages of it
+            throw;
+        }
+        const auto answer = interpreter->receive();
         if (!answer)
             throw PluginError(fmt::format("{} cannot list the solvers of its packages: {}", python_program(),
-                                          interpreter.end_of_process()));
+                                          interpreter->end_of_process()));
         std::vector<PluginInfo> rows;
         try {
             for (const auto& row : parse_ordered_json(answer->text())) {

@@ -195,6 +195,8 @@ const PluginInfo& Registry::find(const std::string& name) const {
             unsearched += fmt::format("; the folder {} was not searched: {}", row.path.string(), row.reason);
     std::vector<std::string_view> names;
     for (const auto& plugin : plugins_) names.push_back(plugin.name);
+    if (const std::lock_guard lock(found_->mutex); found_->listed)  // which then stays as it is
+        for (const auto& plugin : *found_->listed) names.push_back(plugin.name);
     if (names.empty())
         throw InputError(fmt::format("there is no solver \"{}\": no plugin was found in {}{}", name,
                                      folders_.back().string(), unsearched));
