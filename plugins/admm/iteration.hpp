@@ -57,8 +57,7 @@ public:
     /// Leaves the best iterate in x (n) and lambda (m), where the start is. system must be loaded.
     [[nodiscard]] sdk::Outcome solve(System& system, const sdk::Request& request, sdk::MutableVectorView x,
                                      sdk::MutableVectorView lambda) {
-        // Not the penalty that the last solve ended with: a run that goes on from a checkpoint has to take the same
-        // path.
+        // Not the penalty that the last solve ended with: a run that goes on from a checkpoint takes the same path.
         system.set_penalty(initial_penalty_);
         Run run{system, request, sdk::Monitor(request, stall_iterations_)};
         if (!check(run, start(run, x, lambda))) iterate(run);
@@ -110,8 +109,7 @@ private:
             system.resolve(w_, mu_, u_);
             if (judge(run)) return;
 
-            // ‖μ − λ‖ is the combined residual of Goldstein et al. (2014); under a convex law a plain step never grows
-            // it.
+            // ‖μ − λ‖ is the combined residual of Goldstein et al. (2014): under a convex law no plain step grows it.
             step_ = over_relaxation_ * (mu_ - lambda_);
             const double length = system.norm(step_);
             if (extrapolated && !(length <= accepted)) {

@@ -62,8 +62,8 @@ private:
             if (gradient_step(scaled, run, team, momentum)) return;
             if (run.judge(natural_)) return;
 
-            // Restart where the gradient mapping (y − λ⁺)/t points against the motion (O'Donoghue and Candès 2015, eq.
-            // 13).
+            // Restart where the gradient mapping (y − λ⁺)/t points against the motion (O'Donoghue and Candès 2015,
+            // eq. 13).
             const bool restart = restart_ && uphill_ < 0.0;
             const double next_theta = restart ? 1.0 : 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * theta * theta));
             momentum = restart ? 0.0 : (theta - 1.0) / next_theta;

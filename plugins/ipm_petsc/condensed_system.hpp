@@ -48,8 +48,7 @@ struct CondensedSettings {
     std::int64_t most_inner = 0, correctors = 0;
 };
 
-/// What plugins/ipm/equations.hpp is in one process, for the associated law and a definite H. Operations are
-/// collective.
+/// What plugins/ipm/equations.hpp is in one process, for the associated law and a definite H. Collective.
 class CondensedSystem : public PartSystem {
 public:
     using View = sdk::LocalProblemView;
