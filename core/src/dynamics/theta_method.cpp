@@ -378,8 +378,11 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         return guess_.allFinite();
     };
     if (contacts_.any()) {
-        const bool known = !changes_[0].empty() || !contacts_.may_bounce();
-        smooth_ = known ? guess_ : without_contacts(begin, h, solver, report);
+        if (changes_[0].empty() && contacts_.may_bounce()) {
+            smooth_ = without_contacts(begin, h, solver, report);
+        } else {
+            smooth_ = guess_;
+        }
         contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
     }
     linearize_at_guess();
