@@ -24,7 +24,8 @@ void pile(benchmark::State& state, delassus::Shape shape, std::int32_t count) {
         shape.body = i;
         setup.shapes.push_back(shape);
         delassus::Pose& pose = rest[static_cast<std::size_t>(i)];
-        pose.position = {2.01 * (i % side), 2.01 * (i / side % side), 1.0 + 2.01 * (i / side / side)};
+        const std::int32_t row = i / side, layer = row / side;
+        pose.position = {2.01 * (i % side), 2.01 * (row % side), 1.0 + 2.01 * layer};
         if (shape.kind == delassus::ShapeKind::Sphere) continue;
         for (double& part : pose.orientation) part = normal(engine);  // the detector makes unit quaternions of them
     }
