@@ -106,7 +106,7 @@ public:
 
     [[nodiscard]] std::span<const Block> blocks() const { return {blocks_.data(), block_count_}; }
     [[nodiscard]] const std::vector<Row>& rows() const { return rows_; }
-    [[nodiscard]] std::vector<Row>& rows() { return rows_; }
+    [[nodiscard]] std::vector<Row>& rows() { return rows_; }  ///< their number stays
     /// The entries of D_A by compressed rows; columns ascend within a row.
     [[nodiscard]] std::span<const std::int32_t> column() const { return {column_.data(), used_}; }
     [[nodiscard]] std::span<const double> value() const { return {value_.data(), used_}; }

@@ -37,8 +37,13 @@ void face_axes(const Placed& first, const Placed& second, const Vector3d& to_sec
     };
     const auto bound = [&](std::size_t f) { return distance_of(f, first.normals[f].dot(second.vertices[witness])); };
     std::size_t promising = 0;
-    for (std::size_t f = 1; f < faces.size(); ++f)
-        if (bound(f) > bound(promising)) promising = f;
+    double most = bound(promising);
+    for (std::size_t f = 1; f < faces.size(); ++f) {
+        const double promised = bound(f);
+        if (promised <= most) continue;
+        most = promised;
+        promising = f;
+    }
     double least = 0.0;
     witness = least_vertex(second, first.normals[promising], least);
     const double reached = distance_of(promising, least) - 3.0 * preference;

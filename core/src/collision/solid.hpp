@@ -24,12 +24,11 @@ constexpr std::int32_t kPrismSides = 18;
 
 struct Solid {
     ShapeKind kind = ShapeKind::Sphere;
-    double radius = 0.0;           ///< of the sweeping sphere, m
-    double cylinder_radius = 0.0;  ///< of the core of a cylinder, else 0, m
-    double half_length = 0.0;      ///< of the core of a cylinder or capsule, m
-    Vector3d half =
-        Vector3d::Zero();  ///< of the box about the shape's origin that holds the core of a box or a hull, m
-    Polytope core;         ///< exact but for a cylinder, whose prism here only starts a search; empty for a plane
+    double radius = 0.0;               ///< of the sweeping sphere, m
+    double cylinder_radius = 0.0;      ///< of the core of a cylinder, else 0, m
+    double half_length = 0.0;          ///< of the core of a cylinder or capsule, m
+    Vector3d half = Vector3d::Zero();  ///< of the box about the origin that holds the core of a box or a hull, m
+    Polytope core;  ///< exact but for a cylinder, whose prism here only starts a search; empty for a plane
     std::shared_ptr<const Terrain> terrain;  ///< of a terrain and a height field, which have no core
     double reach = 0.0;                      ///< radius of a ball about the shape's origin that holds core and sweep, m
 };

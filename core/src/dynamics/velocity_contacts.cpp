@@ -186,7 +186,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
 // which the surface of the other one goes on, since at a seam of flush shapes the contact passes from one to the next.
 void VelocityContacts::require_same_side(const State& begin, double h) const {
     constexpr double least_cosine = 0.5, flush_cosine = 1.0 - 1e-6;
-    constexpr double flush_share = 1e-2;  // of the way to the middle
+    constexpr double flush_share = 1e-2;               // of the way to the middle
     const double shallow = 1e3 * resolution_.least();  // too little for a body to get to the other side
     const auto& contacts = before_.contacts();
     const auto& later = rows_.contacts();
@@ -333,8 +333,10 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.left = settings_.once && block.restitution > 0.0 && opening > settings_.recovery_speed &&
                        (1.0 - theta_) * h_ * opening > std::abs(contact.gap);
         contact.pushed = contact.pushed && !contact.left;
-        if (before) contact.nearly_as_before = nearly_equal(row, before->row, block.cone.rows);
-        contact.turns = contact.nearly_as_before && (contact.pushed || !contact.along_normal);
+        const bool may_turn = contact.pushed || !contact.along_normal;
+        if (before && (may_turn || settings_.once))
+            contact.nearly_as_before = nearly_equal(row, before->row, block.cone.rows);
+        contact.turns = may_turn && contact.nearly_as_before;
         const auto entry = static_cast<std::size_t>(rows_.row_start()[row]);
         const auto entries = static_cast<std::size_t>(rows_.row_start()[row + 1]) - entry;
         contact.resolution =
