@@ -78,6 +78,23 @@ TEST(Run, JsonIsTheReport) {
     EXPECT_GT(report.at("systems")[1].at("effort").at("iterations"), 0);
 }
 
+TEST(Run, CheckSaysHowWrongTheRunIs) {
+    const ScratchFolder scratch;
+    const auto folder = scratch / "run";
+    const std::string arguments = "run " + scene("bouncing_ball") + " --end 0.05 --check";
+    const auto result = run_command(arguments + " -o " + folder.string());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.out.find("main: with half the step bodies end"), std::string::npos) << result.out;
+    const Json check = json_of(folder / "report.json").at("systems")[0].at("check");
+    // Before it lands the ball is ½ g h t too low, as implicit Euler is.
+    const double off = 0.5 * 9.81 * 0.0005 * 0.05;
+    EXPECT_NEAR(check.at("error").get<double>() * check.at("extent").get<double>(), off, 0.01 * off);
+    EXPECT_TRUE(check.at("apart_from").is_number() || check.at("apart_from").is_null());
+    const auto resumed = run_command(arguments + " --resume " + folder.string());
+    EXPECT_EQ(resumed.exit_code, 2);
+    EXPECT_NE(resumed.err.find("leave out --resume"), std::string::npos) << resumed.err;
+}
+
 TEST(Run, ResumedRunEndsInTheSameFiles) {
     const ScratchFolder scratch;
     const auto whole = scratch / "whole", parts = scratch / "parts";

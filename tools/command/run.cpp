@@ -21,6 +21,7 @@
 #include "process/supervision.hpp"
 #include "process/terminal.hpp"
 #include "scene_arguments.hpp"
+#include "simulation/run_check.hpp"
 #include "simulation/run_loop.hpp"
 #include "simulation/shared_reactions.hpp"
 #include "support/text_file.hpp"
@@ -35,7 +36,7 @@ struct RunArguments {
     SceneArguments scene;
     std::filesystem::path output, resume;
     RunOutput files;
-    bool json = false;
+    bool json = false, check = false;
 
     [[nodiscard]] bool has_folder() const { return !output.empty() || !resume.empty(); }
 };
@@ -104,13 +105,15 @@ void checkpoint(std::vector<Simulation>& simulations, RunFolder* folder) {
 }
 
 /// Steps until the end, an interrupt or a failure.
+/// tracks: of each system, or none.
 RunResult advance(const Communicator& run, std::vector<Simulation>& simulations, RunFolder* folder,
-                  const RunArguments& arguments, std::int64_t every) {
+                  const RunArguments& arguments, std::int64_t every, std::vector<Track>& tracks) {
     Progress progress(simulations, run.rank() == 0);
     const auto stepped = [&](std::size_t system) {
         Simulation& simulation = simulations[system];
         if (arguments.has_folder() && simulation.record().step % every == 0) simulation.gather_contacts();
         if (folder != nullptr) folder->add_step(system);
+        if (!tracks.empty()) tracks[system].add(simulation);
         if (on_any(run, folder != nullptr && folder->checkpoint_is_due())) checkpoint(simulations, folder);
         progress.show();
     };
@@ -180,6 +183,47 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
     if (status != RunStatus::Finished) fmt::print("{}\n", status_word(status));
 }
 
+/// The run again with half of what may be wrong in each step.
+std::vector<RunCheck> run_again(const RunArguments& arguments, const Registry& registry,
+                                const std::vector<Simulation>& simulations, const std::vector<Track>& tracks) {
+    Scene scene = read(arguments.scene);
+    std::vector<Simulation> refined;
+    refined.reserve(scene.systems.size());
+    for (auto& system : scene.systems) {
+        halve_errors(system);
+        refined.emplace_back(system, registry).solver().interrupt_by(interrupted);
+    }
+    return check_runs(simulations, tracks, refined, interrupted);
+}
+
+void print_check(const std::string& system, const RunCheck& check) {
+    if (!check.failure.empty()) {
+        fmt::print("{}: with half the step it fails: {}\n", system, check.failure);
+        return;
+    }
+    if (check.farthest.empty()) {
+        fmt::print(
+            "{}: with half the step bodies end where they did, to rounding; on the way up to {:.1e} of the extent of "
+            "what "
+            "moves ({:.3g} m) away\n",
+            system, check.on_the_way, check.extent);
+        return;
+    }
+    fmt::print(
+        "{}: with half the step bodies end up to {:.2g} m and {:.2g} rad away ({}), on the way {:.1e} of the "
+        "extent\n  of what moves ({:.3g} m); error at the end about {:.1e} of it, or rad\n",
+        system, check.position, check.rotation, check.farthest, check.on_the_way, check.extent, check.error);
+    if (check.apart_from)
+        fmt::print("  farther apart than the accuracy of {:.1e} from t = {:.4g} s on\n", check.accuracy,
+                   *check.apart_from);
+    if (check.error < RunCheck::unknown) {
+        fmt::print("  a tenth of the error would take about {:.2g} s, ten times the error {:.2g} s\n",
+                   check.seconds_for(10.0), check.seconds_for(0.1));
+    } else {
+        fmt::print("  the motion is not known at the end: it is chaotic, or the steps are far too long\n");
+    }
+}
+
 void check(const RunArguments& arguments) {
     const RunOutput& files = arguments.files;
     if (files.every.value_or(1) < 1) throw InputError("--every must be at least 1");
@@ -187,6 +231,8 @@ void check(const RunArguments& arguments) {
     if (files.dump.value_or(0) < 0) throw InputError("--dump-problems must be at least 0");
     if (!arguments.resume.empty() && !arguments.output.empty() && arguments.output != arguments.resume)
         throw InputError("--resume goes on in its own folder; leave out -o");
+    if (arguments.check && !arguments.resume.empty())
+        throw InputError("--check compares a run from its start on; leave out --resume");
     if (files.dump.value_or(0) > 0 && !arguments.has_folder())
         throw InputError("--dump-problems writes into the folder of -o; give one");
     if (files.contact_forces && !arguments.has_folder())
@@ -235,20 +281,27 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
     const bool shared = std::any_of(simulations.begin(), simulations.end(),
                                     [](const Simulation& simulation) { return simulation.shared(); });
     if (shared && arguments.files.dump.value_or(0) > 0) refuse_whole_problems();
+    if (shared && arguments.check) throw InputError("--check needs all bodies in one process; start one");
     std::int64_t every = 1;
     const auto folder = open_folder(run, arguments, scene, shared, simulations, every);
 
     install_interrupt_handler();
     for (auto& simulation : simulations) simulation.solver().interrupt_by(interrupted);
     StdoutGuard guard;
-    const RunResult result = advance(run, simulations, folder.get(), arguments, every);
+    std::vector<Track> tracks;
+    if (arguments.check)
+        for (const auto& simulation : simulations) tracks.emplace_back(simulation);
+    const RunResult result = advance(run, simulations, folder.get(), arguments, every, tracks);
+    std::vector<RunCheck> checks;
+    const bool complete = result.status == RunStatus::Finished || result.status == RunStatus::Unsolved;
+    if (arguments.check && complete) checks = run_again(arguments, registry, simulations, tracks);
     if (const auto bytes = guard.release(); bytes > 0 && first)
         fmt::print(stderr, "delassus: a solver wrote {} bytes to standard output; they were dropped\n", bytes);
 
     SharesOfSystems shares;
     for (const auto& simulation : simulations) shares.push_back(simulation.shares());
     const std::string report =
-        run_report_json(arguments.scene.file.filename().string(), scene, simulations, result, shares);
+        run_report_json(arguments.scene.file.filename().string(), scene, simulations, result, shares, checks);
     if (arguments.has_folder()) checkpoint(simulations, folder.get());
     if (folder) folder->write_report(report);
     if (!first) return exit_code_of(result.status);
@@ -256,6 +309,7 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
         fmt::print("{}", report);
     } else {
         print_summary(simulations, shares, result.status);
+        for (std::size_t i = 0; i < checks.size(); ++i) print_check(simulations[i].system().name, checks[i]);
     }
     for (const auto& simulation : simulations)
         for (const auto& warning : simulation.warnings()) fmt::print(stderr, "delassus: {}\n", warning);
@@ -296,6 +350,8 @@ void add_run(CLI::App& program, Action& action) {
         ->add_option("--resume", arguments->resume,
                      "Go on with the run in this folder, with its --every, --pictures and --dump-problems unless given")
         ->type_name("DIR");
+    command->add_flag("--check", arguments->check,
+                      "Run again with half the step, or half the tolerance, and say how far apart the bodies end");
     command->add_flag("--json", arguments->json, "Print the report as JSON");
     command
         ->add_flag_callback(

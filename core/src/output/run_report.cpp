@@ -33,6 +33,20 @@ void add_totals(const SimulationTotals& totals, Json& system) {
     }
 }
 
+Json check_json(const RunCheck& check) {
+    if (!check.failure.empty()) return {{"failure", check.failure}};
+    return {{"position", json_number(check.position)},
+            {"rotation", json_number(check.rotation)},
+            {"farthest", check.farthest},
+            {"extent", check.extent},
+            {"error", json_number(check.error)},
+            {"on_the_way", json_number(check.on_the_way)},
+            {"apart_from", check.apart_from ? Json(*check.apart_from) : Json(nullptr)},
+            {"seconds", check.second_seconds},
+            {"seconds_for_a_tenth", check.seconds_for(10.0)},
+            {"seconds_for_ten_times", check.seconds_for(0.1)}};
+}
+
 }  // namespace
 
 std::string_view status_word(RunStatus status) {
@@ -53,7 +67,8 @@ std::string_view status_word(RunStatus status) {
 }
 
 std::string run_report_json(const std::string& scene, const Scene& read, std::vector<Simulation>& simulations,
-                            const RunResult& result, const SharesOfSystems& shares) {
+                            const RunResult& result, const SharesOfSystems& shares,
+                            const std::vector<RunCheck>& checks) {
     Json json = {{"scene", scene},
                  {"title", read.title},
                  {"status", status_word(result.status)},
@@ -112,6 +127,7 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
                                      {"bytes_sent", share.bytes_sent},
                                      {"peak_memory", share.peak_memory}});
         }
+        if (number < checks.size()) one["check"] = check_json(checks[number]);
         one["bodies"] = std::move(bodies);
         json["systems"].push_back(std::move(one));
     }

@@ -7,6 +7,7 @@
 
 #include "delassus/export.hpp"
 #include "delassus/simulation.hpp"
+#include "simulation/run_check.hpp"
 #include "simulation/run_loop.hpp"
 
 namespace delassus {
@@ -17,9 +18,9 @@ DELASSUS_API std::string_view status_word(RunStatus status);
 /// Simulation::shares() of each system; nothing where no process asked.
 using SharesOfSystems = std::vector<std::vector<Simulation::Share>>;
 
-/// The report as JSON text (docs/running.md).
+/// The report as JSON text (docs/running.md). checks: of each system, or nothing.
 DELASSUS_API std::string run_report_json(const std::string& scene, const Scene& read,
                                          std::vector<Simulation>& simulations, const RunResult& result,
-                                         const SharesOfSystems& shares = {});
+                                         const SharesOfSystems& shares = {}, const std::vector<RunCheck>& checks = {});
 
 }  // namespace delassus
