@@ -83,6 +83,7 @@ public:
         resolution_.forget();
         left_.clear();
     }
+    void forces_jumped() override { error_.forget(); }
 
     // h; the errors of the last steps' velocities and the errors that solves left; the multipliers.
     StepMemory memory() const override {

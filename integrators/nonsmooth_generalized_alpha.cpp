@@ -52,6 +52,7 @@ public:
         contacts_.restart();
         for (Vector& load : loads_) load.setZero(n_);
     }
+    void forces_jumped() override { smooth_.restart(); }
 
     // How long the memory of the smooth part is, this memory, the loads, and the impulses of unilateral blocks.
     std::vector<double> save() const override {

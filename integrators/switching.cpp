@@ -75,6 +75,11 @@ public:
         longest_ = std::numeric_limits<double>::infinity();
         seen_known_ = false;
     }
+    void forces_jumped() override {
+        flight_->forces_jumped();
+        contact_.forces_jumped();
+        control_.reset();
+    }
 
     // The longest step of contact; the step of the control, and what it keeps; how many numbers the flight keeps, and
     // these; how many blocks pushed, and their keys; what the contact method keeps.

@@ -115,6 +115,34 @@ inline std::vector<double> twists_of(const Simulation& simulation) {
     return result;
 }
 
+/// Numbers of the joints that joint_coordinate() takes.
+inline std::vector<std::int32_t> joints_with_coordinate(const MultibodySystem& system) {
+    std::vector<std::int32_t> result;
+    for (std::int32_t joint = 0; joint < system.joint_count(); ++joint)
+        if (const JointKind kind = system.joint(joint).kind;
+            kind == JointKind::Revolute || kind == JointKind::Cylindrical || kind == JointKind::Prismatic)
+            result.push_back(joint);
+    return result;
+}
+
+inline std::vector<std::string> joint_names_of(const Simulation& simulation) {
+    const MultibodySystem& system = *simulation.system().system;
+    std::vector<std::string> names;
+    for (const std::int32_t joint : joints_with_coordinate(system)) names.push_back(system.joint(joint).name);
+    return names;
+}
+
+/// Of these joints: coordinate and rate; joints × 2.
+inline std::vector<double> joint_coordinates_of(const Simulation& simulation) {
+    const MultibodySystem& system = *simulation.system().system;
+    std::vector<double> result;
+    for (const std::int32_t joint : joints_with_coordinate(system)) {
+        const auto [coordinate, rate] = system.joint_coordinate(simulation.state(), joint);
+        result.insert(result.end(), {coordinate, rate});
+    }
+    return result;
+}
+
 inline py::dict contacts_of(SharedSimulation& self) {
     const std::vector<ContactRecord> contacts =
         self.look([](const Simulation& simulation) { return simulation.contacts(); });
@@ -248,6 +276,31 @@ inline void bind_scenes(py::module_& module) {
              "The contacts of the last step, found where it began: a dict of arrays with a row each. 'bodies' × 2 "
              "(numbers in bodies(), −1 the world), 'point' × 3 (m), 'normal' × 3 (unit, from the first to the second), "
              "'gap' (m), 'force' × 3 (mean on the second body, world frame, N).")
+        .def(
+            "inputs",
+            [](SharedSimulation& self) {
+                return self.look([](const Simulation& s) {
+                    std::vector<std::pair<std::string, double>> values;
+                    for (const std::string& name : s.system().inputs.names()) values.emplace_back(name, s.input(name));
+                    return values;
+                });
+            },
+            "Names and values of the scene's inputs.")
+        .def(
+            "set_input",
+            [](SharedSimulation& self, const std::string& name, double value) {
+                self.look([&](Simulation& s) {
+                    s.set_input(name, value);
+                    return 0;
+                });
+            },
+            "name"_a, "value"_a, "The input of this name has this value from now on.")
+        .def(
+            "joint_names", [](SharedSimulation& self) { return self.look(joint_names_of); },
+            "Of the joints with one coordinate, in the order of joint_coordinates().")
+        .def(
+            "joint_coordinates", [](SharedSimulation& self) { return rows_of(self.look(joint_coordinates_of), 2); },
+            "Joints × 2: coordinate (rad or m, 0 where the bodies are given) and rate.")
         .def(
             "warnings",
             [](SharedSimulation& self) { return self.look([](const Simulation& s) { return s.warnings(); }); },

@@ -11,7 +11,7 @@ from ._files import write_whole
 from ._yaml import key_of, yaml_of
 
 Shape = Dict[str, Any]
-Motion = Any  #: a number, or {'linear': …}, {'sine': …}, {'polynomial': …}, {'ramp': …}, {'table': …}
+Motion = Any  #: a number, or {'linear': …}, {'sine': …}, {'polynomial': …}, {'ramp': …}, {'table': …}, {'input': …}
 
 
 class SceneBuilder(Mapping):

@@ -167,6 +167,42 @@ class Simulation:
         return self._run.twists if self._asked is None else np.zeros((0, 6))
 
     @property
+    def joints(self) -> list:
+        """Names of the revolute, cylindrical and prismatic joints of a scene, in the order of joint_positions."""
+        return self._run.joint_names() if self._asked is None else []
+
+    @property
+    def joint_positions(self) -> np.ndarray:
+        """(J,): the coordinates of these joints, 0 where the bodies are given: m, or rad, with whole turns where
+        something acts on the angle."""
+        return self._joint_coordinates()[:, 0]
+
+    @property
+    def joint_velocities(self) -> np.ndarray:
+        """(J,): the rates of these coordinates, m/s or rad/s."""
+        return self._joint_coordinates()[:, 1]
+
+    def _joint_coordinates(self) -> np.ndarray:
+        return self._run.joint_coordinates() if self._asked is None else np.zeros((0, 2))
+
+    @property
+    def inputs(self) -> dict:
+        """The inputs of a scene (docs/scenes.md, motions) by name, as they are now."""
+        return dict(self._run.inputs()) if self._asked is None else {}
+
+    def set_inputs(self, values: Mapping[str, float]) -> None:
+        """Give these inputs new values, which hold from now on. Raises InputError that names the nearest input where one
+        of them is not there, or a value is not finite; none is changed then."""
+        known = self.inputs
+        for name, value in values.items():
+            if name in known and not np.isfinite(value):
+                raise InputError(f"the input {name!r} is {value}; it must be finite")
+            if name not in known and self._asked is not None:
+                raise InputError(f"there is no input {name!r}: a DynamicalSystem has none")
+        for name in sorted(values, key=lambda one: one in known):  # one that is not there is refused first
+            self._run.set_input(name, float(values[name]))
+
+    @property
     def record(self) -> StepRecord:
         """The StepRecord of the last step; of the start before the first."""
         return self._run.record

@@ -34,7 +34,7 @@ class Documents(unittest.TestCase):
         return printed.getvalue()
 
     def test_python_page(self):
-        self.assertTrue(self.run_blocks("docs/python.md", 9).startswith("solved"))
+        self.assertTrue(self.run_blocks("docs/python.md", 10).startswith("solved"))
         # The page's solver where a projection may divide by zero: contacts that open straight up, that open sideways, that
         # touch without a load, and that press without a tangential load.
         for a, solution in (((1, 0, 0), (0, 0, 0)), ((1, 0.1, -0.2), (0, 0, 0)), ((0, 0, 0), (0, 0, 0)),

@@ -129,6 +129,27 @@ class Steps(unittest.TestCase):
         rest = delassus.simulate(simulation)
         np.testing.assert_array_equal(rest.positions, whole.positions[7:])
 
+    def test_inputs_act_from_when_they_are_set(self):
+        scene = {"step": 0.01, "end": 1, "gravity": [0, 0, 0],
+                 "bodies": [{"name": "cart", "mass": 2, "inertia": {"xx": 1, "yy": 1, "zz": 1}}],
+                 "joints": [{"name": "rail", "kind": "prismatic", "second": "cart", "point": [0, 0, 0], "axis": [1, 0, 0]}],
+                 "loads": [{"name": "push", "body": "cart", "force": [{"input": {"name": "push", "start": 4}}, 0, 0]}]}
+        simulation = delassus.Simulation(scene)
+        self.assertEqual((simulation.joints, simulation.inputs), (["rail"], {"push": 4.0}))
+        for _ in range(50):
+            simulation.step()
+        np.testing.assert_allclose(simulation.joint_velocities, [1.0], atol=1e-9)
+        simulation.set_inputs({"push": -8})
+        for _ in range(50):
+            simulation.step()
+        np.testing.assert_allclose(simulation.joint_velocities, [-1.0], atol=1e-9)
+        np.testing.assert_allclose(simulation.joint_positions, [0.25 + 0.5 - 0.5], atol=1e-6)
+        with self.assertRaisesRegex(delassus.InputError, 'no input "pull"'):
+            simulation.set_inputs({"push": 1, "pull": 1})
+        with self.assertRaisesRegex(delassus.InputError, "must be finite"):
+            simulation.set_inputs({"push": np.nan})
+        self.assertEqual(simulation.inputs, {"push": -8.0})
+
     def test_a_step_that_fails_leaves_what_was(self):
         pendulum = {"step": 0.01, "end": 1.0, "limits": {"drift": 1e-9}, "integrator": "euler_implicit_linearized",
                     "bodies": [{"name": "bob", "mass": 1.0, "position": [1, 0, 0],

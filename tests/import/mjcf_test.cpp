@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "delassus/error.hpp"
+#include "delassus/simulation.hpp"
 #include "import/imported.hpp"
 
 #ifdef DELASSUS_HAS_MJCF
@@ -42,6 +43,50 @@ struct Made {
 
 std::string mjcf(const std::string& world, const std::string& before = "", const std::string& after = "") {
     return "<mujoco>" + before + "<worldbody>" + world + "</worldbody>" + after + "</mujoco>";
+}
+
+// The same controls, constant from a keyframe and as inputs that are set: the same motion. Those of the third keyframe
+// lie beyond the ranges.
+TEST(ImportMjcfToday, ControlsBecomeInputs) {
+    const std::string model =
+        mjcf("<body name='a'><joint name='j' damping='0.1' ref='20'/>" + bob +
+                 "<geom type='sphere' size='0.05' pos='0.3 0 0'/>" +
+                 "<body name='b' pos='0.5 0 0'><joint name='s' type='slide' axis='1 1 0'/>" + bob +
+                 "<body name='c' pos='0 0 0.4'><joint name='k' axis='0 1 0'/>" + bob + "</body></body></body>",
+             "<option gravity='0 0 0' timestep='0.002'/>",
+             "<actuator><motor name='push' joint='s' gear='2' ctrlrange='-3 3' forcerange='-4 2'/>"
+             "<position name='servo' joint='j' kp='30' kv='4' ctrlrange='-1 1'/>"
+             "<velocity name='spin' joint='k' kv='0.5'/>"
+             "<general name='offset' joint='k' gainprm='3' biastype='affine' biasprm='0.2 0 0'/></actuator>"
+             "<keyframe><key name='rest' ctrl='0.1 0.2 0.3 0.4'/><key name='driven' ctrl='1.5 -0.5 2 -1'/>"
+             "<key name='beyond' ctrl='2.7 4 -2 1'/></keyframe>");
+    const auto run = [&](const char* key, bool inputs, const std::vector<double>& controls) {
+        ImportSettings settings;
+        settings.keyframe = key;
+        settings.inputs = inputs;
+        settings.end = 0.3;
+        const Made made(model, settings);
+        Scene scene = read_scene([&] {
+            std::ofstream(made.folder / "scene.yaml") << made.text.yaml;
+            return made.folder / "scene.yaml";
+        }());
+        const Registry registry;
+        Simulation simulation(scene.systems.at(0), registry);
+        const std::vector<std::string> names = {"push", "servo", "spin", "offset"};
+        EXPECT_EQ(scene.systems[0].inputs.names().size(), inputs ? 4u : 0u) << made.text.yaml;
+        for (std::size_t k = 0; k < controls.size(); ++k) simulation.set_input(names[k], controls[k]);
+        while (!simulation.finished()) simulation.step();
+        return simulation.state();
+    };
+    const auto expect_equal = [](const State& a, const State& b) {
+        ASSERT_EQ(a.v.size(), b.v.size());
+        for (std::size_t k = 0; k < a.v.size(); ++k) EXPECT_NEAR(a.v[k], b.v[k], 1e-5) << k;
+    };
+    const State driven = run("driven", false, {}), beyond = run("beyond", false, {});
+    EXPECT_GT(std::abs(driven.v[0]) + std::abs(driven.v[1]), 0.01);
+    expect_equal(run("driven", true, {}), driven);
+    expect_equal(run("rest", true, {1.5, -0.5, 2.0, -1.0}), driven);
+    expect_equal(run("rest", true, {2.7, 4.0, -2.0, 1.0}), beyond);
 }
 
 TEST(ImportMjcfToday, TakesAttributesThatOlderReadersRefuse) {

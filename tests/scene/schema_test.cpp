@@ -101,6 +101,7 @@ std::map<std::string, std::string> scenes_of_parts() {
     scenes["body_motion"] = "step: 1\nend: 1\nbodies: [{motion: {@}}]";
     scenes["rotation"] = "step: 1\nend: 1\nbodies: [{motion: {rotation: {@}}}]";
     scenes["table"] = ball + "loads: [{force: [{table: {@}}, 0, 0]}]";
+    scenes["input"] = ball + "loads: [{force: [{input: {@}}, 0, 0]}]";
     scenes["ramp"] = ball + "loads: [{force: [{ramp: {@}}, 0, 0]}]";
     scenes["bushing"] = ball + "bushings: [{@}]";
     return scenes;

@@ -161,6 +161,8 @@ void add_import(CLI::App& program, Action& action) {
         ->add_option("--keyframe", arguments->settings.keyframe,
                      "Keyframe of an MJCF model, by name or number, at which the scene starts")
         ->type_name("NAME");
+    command->add_flag("--inputs", arguments->settings.inputs,
+                      "Controls of MJCF actuators become inputs of the scene, which a program sets while it runs");
     command->add_flag("--floating", arguments->settings.floating,
                       "The root link of a URDF model moves freely; without it the world holds it");
     command->add_flag("--fixed-base", arguments->settings.fixed_base,

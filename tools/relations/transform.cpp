@@ -101,6 +101,10 @@ void scale_motion(Json& motion, double value, double time) {
         } else if (form == "ramp") {
             for (const char* key : {"from", "to"}) scale(parts, key, value);
             for (const char* key : {"start", "duration"}) scale(parts, key, time);
+        } else if (form == "input") {
+            if (parts.is_string()) parts = {{"name", parts}};
+            parts["scale"] = value * parts.value("scale", 1.0);
+            scale(parts, "offset", value);
         } else if (form == "table") {
             scale(parts, "values", value);
             scale(parts, "times", time);

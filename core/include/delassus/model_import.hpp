@@ -19,8 +19,10 @@ struct NotCarriedOver {
 };
 
 struct ImportSettings {
-    double end = 10.0;      ///< of the scene, s, > 0
-    std::string keyframe;   ///< of an MJCF model, where the scene starts; empty: the model's own start
+    double end = 10.0;     ///< of the scene, s, > 0
+    std::string keyframe;  ///< of an MJCF model, where the scene starts; empty: the model's own start
+    /// Controls of MJCF actuators become inputs of the scene (delassus/inputs.hpp), by the names of the actuators.
+    bool inputs = false;
     bool floating = false;  ///< the root link of a URDF model moves freely; else the world holds it
     /// The world holds the first body of each mechanism that floats. Refused where none does.
     bool fixed_base = false;

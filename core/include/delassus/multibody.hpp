@@ -505,6 +505,10 @@ public:
     [[nodiscard]] const BodyParameters& body(BodyIndex index) const;
     [[nodiscard]] std::int32_t joint_count() const;
     [[nodiscard]] const JointParameters& joint(std::int32_t index) const;
+    /// The coordinate of a revolute or cylindrical joint (its angle, rad; whole turns counted where something acts on
+    /// it, else in (−π, π]) or of a prismatic one (m), 0 where the bodies are given, and its rate. After finish().
+    /// Throws InputError of other kinds.
+    [[nodiscard]] std::array<double, 2> joint_coordinate(const State& state, std::int32_t joint) const;
     [[nodiscard]] BodyIndex find_body(const std::string& name) const;  ///< world_body if there is none
     [[nodiscard]] Pose pose(const State& state, BodyIndex index) const;
     /// Velocity of the mass centre (world frame) and angular velocity (body frame).

@@ -14,6 +14,7 @@
 
 #include "delassus/adaptive_stepping.hpp"
 #include "delassus/export.hpp"
+#include "delassus/inputs.hpp"
 #include "delassus/multibody.hpp"
 #include "delassus/solver_config.hpp"
 
@@ -74,6 +75,7 @@ enum class Coordinates {
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
     std::unique_ptr<MultibodySystem> system;
+    Inputs inputs;  ///< of its loads, motors and actuators
 
     Coordinates coordinates = Coordinates::Maximal;
     bool coordinates_chosen = false;  ///< the scene names none

@@ -99,6 +99,7 @@ struct SimulationState {
         rows_left_out;             ///< of the bilateral constraints (MultibodySystem::kept_rows()); ascending
     std::vector<double> ahead;     ///< where the method is ahead of `state`, and how it came there; empty: it is not
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
+    std::vector<double> inputs;    ///< Inputs::save() of the scene's system
     std::vector<std::int32_t> overlapping;  ///< pairs of bodies that come to overlap however short the steps, a then b
     SimulationTotals totals;
 };
@@ -169,6 +170,11 @@ public:
     /// The contacts in report(), in their order.
     [[nodiscard]] DELASSUS_API std::vector<ContactRecord> contacts() const;
     [[nodiscard]] StepSolver& solver() { return *solver_; }
+
+    /// The system's input of this name is `value` from now on. Throws InputError as Inputs::set() does.
+    DELASSUS_API void set_input(std::string_view name, double value);
+    /// Its value now. Throws InputError as Inputs::value() does.
+    [[nodiscard]] DELASSUS_API double input(std::string_view name) const;
 
     /// What a user should know about a run that has not failed so far, one sentence each.
     [[nodiscard]] DELASSUS_API std::vector<std::string> warnings() const;
@@ -248,6 +254,8 @@ private:
     /// Forgets what is ahead of the state shown if the system was changed since.
     void settle_turns(State& state) const;
     void notice_changes();
+    /// What acts on the bodies has jumped.
+    void begin_anew();
 
     SceneSystem* system_;
     std::vector<SteppingMethod> methods_;  // the scene's, and those that may take its place

@@ -87,6 +87,8 @@ public:
 
     /// Forgets what was kept from step to step: call it when the state was changed from outside.
     virtual void restart() = 0;
+    /// The same where nothing but forces has changed, with a jump: guesses of reactions may stay. Default: restart().
+    virtual void forces_jumped() { restart(); }
 
     /// Order of convergence for smooth systems, with the options chosen.
     [[nodiscard]] virtual int order() const = 0;

@@ -51,6 +51,11 @@ void ThetaMethod::restart() {
     last_h_ = 0.0;
 }
 
+void ThetaMethod::forces_jumped() {
+    for (auto& change : changes_) change.clear();
+    error_.forget();
+}
+
 // h; the changes of the last steps, their errors and what the last solve left; the multipliers.
 StepMemory ThetaMethod::memory() const {
     StepMemory memory;

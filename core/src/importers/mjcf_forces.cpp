@@ -175,6 +175,20 @@ void MjcfReader::read_actuators() {
     }
 }
 
+namespace {
+
+/// The range ← what of it lies between two values in either order.
+void cut_off(model_import::ModelInput& input, double one, double other) {
+    std::array<double, 2> range = input.range.value_or(
+        std::array{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
+    range = {std::max(range[0], std::min(one, other)), std::min(range[1], std::max(one, other))};
+    range[1] = std::max(range[0], range[1]);
+    input.range = range;
+    input.start = std::clamp(input.start, range[0], range[1]);
+}
+
+}  // namespace
+
 // With the length L = gear q of the transmission, the force is gain u + bias, both affine in L and L̇, and acts on the
 // coordinate by the gear. At a constant control u it is the servo
 //
@@ -210,7 +224,18 @@ void MjcfReader::read_actuator(const mjcf::Actuator& actuator, double control, c
             b[i] += control * actuator.gain_parameters[i];
         if (actuator.bias == "affine") b[i] += actuator.bias_parameters[i];
     }
-    const double gear = actuator.gear[0];
+    const double gear = actuator.gear[0], control_gain = actuator.gain_parameters[0];
+    std::optional<model_import::ModelInput> input;
+    if (inputs_ && gear != 0.0 && control_gain != 0.0) {
+        if (actuator.gain == "affine" && (actuator.gain_parameters[1] != 0.0 || actuator.gain_parameters[2] != 0.0)) {
+            model_.lose(what, "its stiffness follows its control, which stays as it is");
+        } else {
+            input.emplace();
+            input->name = name;
+            input->start = control;
+            if (actuator.is_control_limited && spec_.option.clamp_control) input->range = actuator.control_range;
+        }
+    }
     const std::int32_t number = joint_[static_cast<std::size_t>(actuator.joint)];
     const double reference = joint.reference;
     // What the actuator gives, and what all of a joint may give together (actuatorfrcrange, here of each by itself).
@@ -223,7 +248,7 @@ void MjcfReader::read_actuator(const mjcf::Actuator& actuator, double control, c
         high = std::min(high, std::max(ends[0], ends[1]));
         limited = true;
     }
-    if (gear == 0.0 || (b[0] == 0.0 && b[1] == 0.0 && b[2] == 0.0)) {
+    if (gear == 0.0 || (!input && b[0] == 0.0 && b[1] == 0.0 && b[2] == 0.0)) {
         const JointParameters& own = model_.joints[static_cast<std::size_t>(number)].parameters;
         return model_.lose(what, fmt::format("a motor of the joint \"{}\" whose force is its control times {:.6g}; the "
                                              "control is 0",
@@ -231,7 +256,13 @@ void MjcfReader::read_actuator(const mjcf::Actuator& actuator, double control, c
     }
     if (b[1] == 0.0 && b[2] == 0.0) {
         const double force = limited ? std::clamp(b[0], low, std::max(low, high)) : b[0];
-        model_.drives.push_back({name, number, gear * force});
+        if (input) {
+            const double constant = b[0] - control_gain * control;
+            input->scale = gear * control_gain;
+            input->offset = gear * constant;
+            if (limited) cut_off(*input, (low - constant) / control_gain, (high - constant) / control_gain);
+        }
+        model_.drives.push_back({name, number, gear * force, input});
         return;
     }
     model_import::ModelActuator servo;
@@ -240,10 +271,12 @@ void MjcfReader::read_actuator(const mjcf::Actuator& actuator, double control, c
     servo.kp = -gear * gear * b[1];
     servo.kd = -gear * gear * b[2];
     if (servo.kp < 0.0 || servo.kd < 0.0) return model_.lose(what, "it pushes away from its goal, or along the speed");
-    if (servo.kp > 0.0) {
-        servo.position = gear * b[0] / servo.kp - reference;
-    } else {
-        servo.speed = gear * b[0] / servo.kd;
+    const double gain = gear / (servo.kp > 0.0 ? servo.kp : servo.kd), shift = servo.kp > 0.0 ? reference : 0.0;
+    (servo.kp > 0.0 ? servo.position : servo.speed) = gain * b[0] - shift;
+    if (input) {
+        input->scale = gain * control_gain;
+        input->offset = gain * (b[0] - control_gain * control) - shift;
+        servo.input = input;
     }
     if (limited) {
         servo.limit = abs(gear) * std::max(abs(low), abs(high));

@@ -7,5 +7,5 @@ extern "C" DELASSUS_API void delassus_import_mjcf_read(const std::filesystem::pa
                                                        const delassus::ImportSettings& settings,
                                                        delassus::model_import::Model& model) {
     delassus::importers::mjcf::Spec spec = delassus::importers::mjcf::read_spec(file, model);
-    delassus::importers::MjcfReader(spec, settings.keyframe, model).read();
+    delassus::importers::MjcfReader(spec, settings, model).read();
 }

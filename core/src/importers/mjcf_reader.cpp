@@ -23,7 +23,8 @@ void give(std::vector<Item>& items, const char* kind) {
 
 }  // namespace
 
-MjcfReader::MjcfReader(mjcf::Spec& spec, const std::string& keyframe, Model& model) : spec_(spec), model_(model) {
+MjcfReader::MjcfReader(mjcf::Spec& spec, const ImportSettings& settings, Model& model)
+    : spec_(spec), model_(model), inputs_(settings.inputs) {
     give_names();
     for (const mjcf::Body& body : spec.bodies) {
         for (const mjcf::Joint& joint : body.joints) joints_.push_back(&joint);
@@ -33,7 +34,7 @@ MjcfReader::MjcfReader(mjcf::Spec& spec, const std::string& keyframe, Model& mod
     joint_.assign(joints_.size(), -1);
     class_.assign(geoms_.size(), -1);
     is_shape_.assign(geoms_.size(), 0);
-    find_keyframe(keyframe);
+    find_keyframe(settings.keyframe);
 }
 
 // Its own name, or its kind with its number.

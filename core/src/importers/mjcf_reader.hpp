@@ -22,7 +22,7 @@ using model_import::ModelShape;
 class MjcfReader {
 public:
     /// keyframe: empty, or a name, or a number. All outlive the reader.
-    MjcfReader(mjcf::Spec& spec, const std::string& keyframe, Model& model);
+    MjcfReader(mjcf::Spec& spec, const ImportSettings& settings, Model& model);
     void read();
 
 private:
@@ -76,6 +76,7 @@ private:
     mjcf::Spec& spec_;
     Model& model_;
     const mjcf::Key* key_ = nullptr;
+    bool inputs_;
     std::vector<mjcf::Placed> placed_;
     std::vector<const mjcf::Joint*> joints_;
     std::vector<const mjcf::Geom*> geoms_;

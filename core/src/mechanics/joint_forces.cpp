@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Springs, dampers and dry friction in the coordinates of joints, and the whole turns of angles.
+#include <fmt/format.h>
+
 #include <cmath>
 
+#include "delassus/error.hpp"
 #include "mechanics/checks.hpp"
 #include "mechanics/multibody_implementation.hpp"
 
@@ -92,6 +95,21 @@ std::int32_t MultibodySystem::angle_position(std::int32_t index) const {
     static_cast<void>(joint(index));
     const auto& angle = self.joints[static_cast<std::size_t>(index)].turn.angle;
     return angle && angle->counted >= 0 ? self.first_angle + angle->counted : -1;
+}
+
+std::array<double, 2> MultibodySystem::joint_coordinate(const State& state, std::int32_t index) const {
+    const auto& self = *implementation_;
+    self.must_be_finished();
+    const JointKind kind = joint(index).kind;
+    if (kind != JointKind::Revolute && kind != JointKind::Cylindrical && kind != JointKind::Prismatic)
+        throw InputError(
+            fmt::format("the joint \"{}\" has no single coordinate: it is neither revolute, cylindrical nor "
+                        "prismatic",
+                        joint(index).name));
+    self.place(state);
+    const auto& one = self.joints[static_cast<std::size_t>(index)];
+    const mechanics::Row& row = kind == JointKind::Prismatic ? one.slide : one.turn;
+    return {row.value(self.at, 0.0), self.rate_of(row) + row.rate(self.at, 0.0)};
 }
 
 // Where a motion is prescribed, its time is not known here, and the sum stands as it is.

@@ -67,19 +67,28 @@ struct ModelJoint {
     bool closes_loop = false;    ///< bodies that it fixes to each other stay two
 };
 
+/// A number that a program sets while the scene runs, in place of the model's control u: offset + scale · u.
+struct ModelInput {
+    std::string name;
+    double scale = 1.0, offset = 0.0, start = 0.0;
+    std::optional<std::array<double, 2>> range;
+};
+
 /// kp (position − c) + kd (speed − ċ) at the coordinate of a joint.
 struct ModelActuator {
     std::string name;
     std::int32_t joint = -1;
     std::optional<double> position, speed;
     double kp = 0.0, kd = 0.0, limit = std::numeric_limits<double>::infinity();
+    std::optional<ModelInput> input;  ///< in place of the constant position, or of the speed where kp = 0
 };
 
-/// A constant force or torque along the coordinate of a revolute or prismatic joint.
+/// A force or torque along the coordinate of a revolute or prismatic joint.
 struct ModelDrive {
     std::string name;
     std::int32_t joint = -1;
     double force = 0.0;
+    std::optional<ModelInput> input;  ///< in place of the constant force
 };
 
 /// Holds the coordinate of a joint.

@@ -347,8 +347,8 @@ private:
         if (!model_.actuators.empty()) put(out_, "actuators:\n");
         for (const ModelActuator& one : model_.actuators) {
             put(out_, "  - {{name: {}, joint: {}", quoted(one.name), quoted(joint(one.joint).name));
-            if (one.position) put(out_, ", position: {}", number(*one.position));
-            if (one.speed) put(out_, ", speed: {}", number(*one.speed));
+            if (one.position) put(out_, ", position: {}", motion(*one.position, one.input, 1.0));
+            if (one.speed) put(out_, ", speed: {}", motion(*one.speed, one.input, 1.0));
             if (one.kp > 0.0) put(out_, ", kp: {}", number(one.kp));
             if (one.kd > 0.0) put(out_, ", kd: {}", number(one.kd));
             if (std::isfinite(one.limit)) put(out_, ", limit: {}", number(one.limit));
@@ -358,23 +358,36 @@ private:
         put(out_, "loads:\n");
         for (const ModelDrive& drive : model_.drives) {
             const JointParameters& own = joint(drive.joint);
-            put_drive(own, own.second, drive.force, drive.name);
-            put_drive(own, own.first, -drive.force, drive.name + " (reaction)");
+            put_drive(own, own.second, drive, 1.0, drive.name);
+            put_drive(own, own.first, drive, -1.0, drive.name + " (reaction)");
         }
     }
 
     // The axis stays where it is in both bodies, and what a slide is pushed with lies on one line.
-    void put_drive(const JointParameters& own, std::int32_t body, double force, const std::string& name) {
+    void put_drive(const JointParameters& own, std::int32_t body, const ModelDrive& drive, double sign,
+                   const std::string& name) {
         if (body < 0 || model_.bodies[static_cast<std::size_t>(body)].fixed) return;
         const Vector3d axis = model_.bodies[static_cast<std::size_t>(body)].orientation.conjugate() *
                               Eigen::Map<const Vector3d>(own.axis.data()).normalized();
-        put(out_, "  - {{name: {}, body: {}, follower: true, ", quoted(name), body_name(body));
-        if (own.kind == JointKind::Prismatic) {
-            put(out_, "force: {}, point: {}}}\n", list(force * axis),
-                list(Eigen::Map<const Vector3d>(own.point.data())));
-        } else {
-            put(out_, "torque: {}}}\n", list(force * axis));
-        }
+        const auto along = [&](int i) { return motion(drive.force * sign * axis[i], drive.input, sign * axis[i]); };
+        put(out_, "  - {{name: {}, body: {}, follower: true, {}: [{}, {}, {}]", quoted(name), body_name(body),
+            own.kind == JointKind::Prismatic ? "force" : "torque", along(0), along(1), along(2));
+        if (own.kind == JointKind::Prismatic)
+            put(out_, ", point: {}", list(Eigen::Map<const Vector3d>(own.point.data())));
+        put(out_, "}}\n");
+    }
+
+    /// What is constant without an input, or a factor times the input.
+    static std::string motion(double constant, const std::optional<ModelInput>& input, double factor) {
+        if (!input) return number(constant);
+        if (factor == 0.0) return "0";
+        std::string text = fmt::format("{{input: {{name: {}", quoted(input->name));
+        if (const double scale = factor * input->scale; scale != 1.0) text += ", scale: " + number(scale);
+        if (input->offset != 0.0) text += ", offset: " + number(factor * input->offset);
+        if (input->start != 0.0) text += ", start: " + number(input->start);
+        if (input->range)
+            text += fmt::format(", range: [{}, {}]", number((*input->range)[0]), number((*input->range)[1]));
+        return text + "}}";
     }
 
     const Model& model_;

@@ -265,7 +265,7 @@ BodyMotion SystemReader::read_body_motion(const YAML::Node& node, const Copy& co
     read_map(source_, node, "\"motion\"",
              {{"translation",
                [&](const YAML::Node& n) {
-                   result.translation = three_motions(n, "translation");
+                   result.translation = three_motions(n, "translation", nullptr);
                    translation = true;
                }},
               {"rotation", [&](const YAML::Node& n) {
@@ -275,7 +275,7 @@ BodyMotion SystemReader::read_body_motion(const YAML::Node& node, const Copy& co
                        {{"axis", [&](const YAML::Node& v) { result.axis = vector3(source_, v, "axis"); }},
                         {"angle",
                          [&](const YAML::Node& v) {
-                             result.angle = motion(source_, v, "angle");
+                             result.angle = motion(source_, v, "angle", nullptr);
                              angle = true;
                          }},
                         {"point", [&](const YAML::Node& v) { result.point = point_in(source_, v, "point", copy); }}});

@@ -142,7 +142,8 @@ void SystemReader::read_joint(const YAML::Node& item, const Copy& copy) {
 
 void SystemReader::read_motor(const YAML::Node& item, const Copy& copy) {
     MotorParameters motor;
-    bool has_motion = false, has_joint = false;
+    YAML::Node motion_place{YAML::NodeType::Undefined};
+    bool has_joint = false;
     read_map(source_, item, "a motor",
              {{"name", [&](const YAML::Node& n) { motor.name = name_in(source_, n, "name", copy); }},
               {"joint",
@@ -153,16 +154,13 @@ void SystemReader::read_motor(const YAML::Node& item, const Copy& copy) {
                        source_.refuse(n, "\"joint\" names a joint between fixed bodies, which no motor can move");
                }},
               {"speed", [&](const YAML::Node& n) { motor.speed = truth(source_, n, "speed"); }},
-              {"motion",
-               [&](const YAML::Node& n) {
-                   motor.motion = motion(source_, n, "motion");
-                   has_motion = true;
-               }},
+              {"motion", [&](const YAML::Node& n) { motion_place.reset(n); }},
               {"force_limit",
                [&](const YAML::Node& n) { motor.force_limit = nonnegative_number(source_, n, "force_limit"); }},
               {"repeat", [](const YAML::Node&) {}}});
     if (!has_joint) source_.refuse(item, "a motor lacks the key \"joint\"");
-    if (!has_motion) source_.refuse(item, "a motor lacks the key \"motion\"");
+    if (!motion_place.IsDefined()) source_.refuse(item, "a motor lacks the key \"motion\"");
+    motor.motion = motion(source_, motion_place, "motion", motor.speed ? &result_.inputs : nullptr);
     take_name(item, others_, "motor", motor.name, 0);
     at(item, [&] { result_.system->add_motor(motor); });
     result_.motors.push_back(motor);
@@ -180,8 +178,9 @@ void SystemReader::read_actuator(const YAML::Node& item, const Copy& copy) {
                    if (actuator.joint < 0)
                        source_.refuse(n, "\"joint\" names a joint between fixed bodies, which no actuator can move");
                }},
-              {"position", [&](const YAML::Node& n) { actuator.position = motion(source_, n, "position"); }},
-              {"speed", [&](const YAML::Node& n) { actuator.speed = motion(source_, n, "speed"); }},
+              {"position",
+               [&](const YAML::Node& n) { actuator.position = motion(source_, n, "position", &result_.inputs); }},
+              {"speed", [&](const YAML::Node& n) { actuator.speed = motion(source_, n, "speed", &result_.inputs); }},
               {"kp", [&](const YAML::Node& n) { actuator.kp = nonnegative_number(source_, n, "kp"); }},
               {"kd", [&](const YAML::Node& n) { actuator.kd = nonnegative_number(source_, n, "kd"); }},
               {"limit", [&](const YAML::Node& n) { actuator.force_limit = nonnegative_number(source_, n, "limit"); }},
@@ -271,10 +270,11 @@ void SystemReader::read_bushing(const YAML::Node& item, const Copy& copy) {
     result_.bushings.push_back(bushing);
 }
 
-std::array<Motion, 3> SystemReader::three_motions(const YAML::Node& node, std::string_view key) {
+std::array<Motion, 3> SystemReader::three_motions(const YAML::Node& node, std::string_view key, Inputs* inputs) {
     const auto list = elements(source_, node, key);
     if (list.size() != 3) source_.refuse(node, fmt::format("\"{}\" must be a list of 3 numbers or motions", key));
-    return {motion(source_, list[0], key), motion(source_, list[1], key), motion(source_, list[2], key)};
+    return {motion(source_, list[0], key, inputs), motion(source_, list[1], key, inputs),
+            motion(source_, list[2], key, inputs)};
 }
 
 void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
@@ -293,14 +293,14 @@ void SystemReader::read_load(const YAML::Node& item, const Copy& copy) {
                    load.body = body_named(n, "body", copy);
                    body = true;
                }},
-              {"force", [&](const YAML::Node& n) { load.force = three_motions(n, "force"); }},
+              {"force", [&](const YAML::Node& n) { load.force = three_motions(n, "force", &result_.inputs); }},
               {"node", [&](const YAML::Node& n) { node.reset(n); }},
               {"elastic", [&](const YAML::Node& n) { sides.elastic.reset(n); }},
               {"face", [&](const YAML::Node& n) { sides.face.reset(n); }},
               {"box", [&](const YAML::Node& n) { sides.box.reset(n); }},
               {"torque",
                [&](const YAML::Node& n) {
-                   load.torque = three_motions(n, "torque");
+                   load.torque = three_motions(n, "torque", &result_.inputs);
                    note("torque");
                }},
               {"point",

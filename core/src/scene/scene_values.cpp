@@ -143,9 +143,32 @@ Motion ramp(const Source& source, const YAML::Node& node) {
     return made(source, node, [&] { return Motion::ramp(from, end, start, time, static_cast<int>(smoothness)); });
 }
 
+// A name, or {name, scale, offset, start, range}.
+Motion input(const Source& source, const YAML::Node& node, std::string_view key, Inputs* inputs) {
+    if (!inputs)
+        source.refuse(node,
+                      fmt::format("\"{}\" cannot be an input, which jumps: give a motor with \"speed: true\" or an "
+                                  "actuator one",
+                                  key));
+    std::string name;
+    InputUse use;
+    if (node.IsScalar()) {
+        name = scalar(source, node, "input");
+    } else {
+        read_map(source, node, "\"input\"",
+                 {{"name", [&](const YAML::Node& n) { name = scalar(source, n, "name"); }},
+                  {"scale", [&](const YAML::Node& n) { use.scale = finite_number(source, n, "scale"); }},
+                  {"offset", [&](const YAML::Node& n) { use.offset = finite_number(source, n, "offset"); }},
+                  {"start", [&](const YAML::Node& n) { use.start = finite_number(source, n, "start"); }},
+                  {"range", [&](const YAML::Node& n) { use.range = numbers<2>(source, n, "range"); }}});
+    }
+    if (name.empty()) source.refuse(node, "\"input\" lacks a name");
+    return made(source, node, [&] { return inputs->motion(name, use); });
+}
+
 }  // namespace
 
-Motion motion(const Source& source, const YAML::Node& node, std::string_view key) {
+Motion motion(const Source& source, const YAML::Node& node, std::string_view key, Inputs* inputs) {
     if (node.IsScalar()) return Motion::constant(finite_number(source, node, key));
     std::optional<Motion> result;
     const auto set = [&](const YAML::Node& n, Motion one) {
@@ -157,6 +180,7 @@ Motion motion(const Source& source, const YAML::Node& node, std::string_view key
         {{"table", [&](const YAML::Node& n) { set(n, table(source, n)); }},
          {"polynomial", [&](const YAML::Node& n) { set(n, polynomial(source, n)); }},
          {"ramp", [&](const YAML::Node& n) { set(n, ramp(source, n)); }},
+         {"input", [&](const YAML::Node& n) { set(n, input(source, n, key, inputs)); }},
          {"constant", [&](const YAML::Node& n) { set(n, Motion::constant(finite_number(source, n, "constant"))); }},
          {"linear",
           [&](const YAML::Node& n) {
@@ -180,7 +204,8 @@ Motion motion(const Source& source, const YAML::Node& node, std::string_view key
           }}});
     if (!result)
         source.refuse(
-            node, fmt::format("\"{}\" is empty; it must be constant, linear, sine, table, polynomial or ramp", key));
+            node,
+            fmt::format("\"{}\" is empty; it must be constant, linear, sine, table, polynomial, ramp or input", key));
     return *result;
 }
 

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "config/yaml_reader.hpp"
-#include "delassus/multibody.hpp"
+#include "delassus/inputs.hpp"
 
 namespace delassus::scene {
 
@@ -21,8 +21,9 @@ Vector3 vector3(const Source& source, const YAML::Node& node, std::string_view k
 /// [w, x, y, z] or {axis: [x, y, z], angle: degrees}; the result has length one.
 Quaternion orientation(const Source& source, const YAML::Node& node);
 
-/// A number, or a map with one of the keys constant, linear, sine, table, polynomial and ramp (docs/scenes.md).
-Motion motion(const Source& source, const YAML::Node& node, std::string_view key);
+/// A number, or a map with one of the keys constant, linear, sine, table, polynomial, ramp and input (docs/scenes.md).
+/// inputs: to which an input is added; null: there can be none.
+Motion motion(const Source& source, const YAML::Node& node, std::string_view key, Inputs* inputs);
 
 /// The elements of a list; refuses anything else.
 std::vector<YAML::Node> elements(const Source& source, const YAML::Node& node, std::string_view key);

@@ -105,7 +105,7 @@ private:
     std::int32_t joint_named(const YAML::Node& node, std::string_view key, const Copy& copy);
     BodyMotion read_body_motion(const YAML::Node& node, const Copy& copy);
     /// A list of three motions.
-    std::array<Motion, 3> three_motions(const YAML::Node& node, std::string_view key);
+    std::array<Motion, 3> three_motions(const YAML::Node& node, std::string_view key, Inputs* inputs);
     /// Whether forces can move the body.
     [[nodiscard]] bool moves(BodyIndex body) const;
     /// Why what acts between these two bodies, neither of which forces can move, has no effect.

@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 10;
+constexpr int version = 11;
 constexpr std::size_t digits = 16;
 
 /// How a checkpoint of this text ends.
@@ -139,6 +139,7 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"rows_left_out", simulation.rows_left_out},
                                    {"sleeping", bits(simulation.sleeping)},
                                    {"overlapping", simulation.overlapping},
+                                   {"inputs", bits(simulation.inputs)},
                                    {"totals", json_of(simulation.totals)},
                                    {"frame_times", bits(system.frame_times)},
                                    {"picture_times", bits(system.picture_times)},
@@ -171,6 +172,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             system.simulation.sleeping = numbers(one.at("sleeping"));
             one.at("rows_left_out").get_to(system.simulation.rows_left_out);
             one.at("overlapping").get_to(system.simulation.overlapping);
+            system.simulation.inputs = numbers(one.at("inputs"));
             system.simulation.totals = totals_of(one.at("totals"));
             system.frame_times = numbers(one.at("frame_times"));
             system.picture_times = numbers(one.at("picture_times"));

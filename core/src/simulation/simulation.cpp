@@ -118,6 +118,8 @@ std::string describe(const Assembly& change) {
 
 Simulation::Simulation(SceneSystem& system, const Registry& registry)
     : system_(&system), solver_(std::make_unique<StepSolver>(registry, system.solver)) {
+    now_.inputs = system.inputs.at_start();
+    system.inputs.load(now_.inputs);
     if (!system.leave_out) solver_->leave_nothing_out();
     choose_method_to_share(system, registry);
     methods_ = methods_of(system);
@@ -245,11 +247,29 @@ void Simulation::settle_turns(State& state) const {
     system_->system->settle_turns(state);
 }
 
+void Simulation::begin_anew() {
+    if (ahead_) ahead_->begin(now_.state);
+    timestepper_->forces_jumped();
+}
+
 void Simulation::notice_changes() {
-    if (!ahead_ || revision_ == system_->system->revision()) return;
+    system_->inputs.load(now_.inputs);
+    if (revision_ == system_->system->revision()) return;
     revision_ = system_->system->revision();
-    ahead_->begin(now_.state);
-    timestepper_->restart();
+    begin_anew();
+}
+
+// Another simulation of the system may have set its inputs since.
+void Simulation::set_input(std::string_view name, double value) {
+    system_->inputs.load(now_.inputs);
+    system_->inputs.set(name, value, now_.state.t);
+    now_.inputs = system_->inputs.save();
+    begin_anew();
+}
+
+double Simulation::input(std::string_view name) const {
+    system_->inputs.load(now_.inputs);
+    return system_->inputs.value(name);
 }
 
 void Simulation::renew_rows_ahead() {
@@ -682,6 +702,7 @@ void Simulation::load(SimulationState state) {
     if (ahead_ && !state.ahead.empty()) ahead_->load(state.ahead);
     if (sleeping_) sleeping_->load(state.sleeping);
     if (overlaps_) overlaps_->set_given_up(state.overlapping);
+    system_->inputs.load(state.inputs);
     now_ = std::move(state);
     now_.memory.clear();
     now_.rows_left_out.clear();

@@ -39,6 +39,7 @@ std::optional<std::size_t> best_after(const std::vector<Record>& records, std::i
 RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnResult(const Turn&)>& take) {
     constexpr int patience = 3;
     constexpr double better = 0.9;
+    constexpr double rounding = 1e-14;  // errors are relative: one below it changes by chance
     std::vector<Record> records(members.size());
     std::int64_t turns = 0;
     double work = 0.0;
@@ -64,8 +65,8 @@ RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnRe
             own.error = result.error;
             own.turn = ++turns;
             if (own.error < better * own.lowest) {
+                bettered = bettered || own.lowest > rounding;
                 own.lowest = own.error;
-                bettered = true;
             }
         }
         if (!worked) break;

@@ -56,7 +56,7 @@ struct TurnResult {
 /// How the rounds ended.
 enum class RoundsEnd {
     Done,
-    Stale,  ///< no member bettered its own error by a tenth in three rounds, or none had a turn
+    Stale,  ///< no member bettered its own error, above rounding, by a tenth in three rounds, or none had a turn
 };
 
 /// Runs the rounds. take: runs a turn. A member that ended by itself begins next at the best iterate that another
