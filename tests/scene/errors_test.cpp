@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"EmptyMotion",
              head + bodies +
                  "joints:\n  - {name: j, kind: revolute, second: ball}\nmotors:\n  - {name: m, joint: j, motion: {}}\n",
-             "s.yaml, line 8: \"motion\" is empty; it must be constant, linear, sine, table, polynomial or ramp"},
+             "s.yaml, line 8: \"motion\" is empty; it must be constant, linear, sine, table, polynomial, ramp or input"},
         Case{"NegativeJointFriction",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, friction: -1}\n",
              "s.yaml, line 6: \"friction\" is -1; it must not be negative"},

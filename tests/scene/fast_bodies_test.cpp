@@ -27,6 +27,31 @@ Scene ball_above_plate(double z, const std::string& stepping) {
         "plate");
 }
 
+// The first ball pushes the second into the third, and so on, all in one step, in whose beginning only the first two
+// meet. Without restitution they go on together; no step is divided for that.
+TEST(FastBodies, BallsThatArePushedIntoOthersWithinAStepMeetThem) {
+    for (const char* method : {"auto", "euler_implicit_linearized", "moreau_jean"}) {
+        SCOPED_TRACE(method);
+        std::string bodies;
+        for (int i = 0; i < 5; ++i)
+            bodies += fmt::format(
+                "- {{name: ball{}, mass: 1, position: [{:.17g}, 0, 0], velocity: [{}, 0, 0], shapes: "
+                "[{{sphere: {{radius: 0.1}}, material: m}}]}}\n",
+                i, 0.212 * i, i == 0 ? 20 : 0);
+        Running run(
+            parse_scene(fmt::format("step: 0.01\nend: 0.1\nintegrator: {{name: {}}}\ngravity: [0, 0, 0]\nmaterials: "
+                                    "{{m: {{friction: 0.3}}}}\nbodies:\n{}",
+                                    method, bodies),
+                        "test.yaml"));
+        run.finish();
+        for (int i = 0; i < 5; ++i) EXPECT_NEAR(run.velocities(fmt::format("ball{}", i))[0][0], 4.0, 1e-6) << i;
+        const auto& totals = run.simulation.totals();
+        EXPECT_LT(totals.worst_penetration, 1e-6);
+        EXPECT_EQ(totals.divided_steps, 0);
+        EXPECT_EQ(totals.deep_steps, 0);
+    }
+}
+
 // A step takes the ball 152 mm far, and ball and plate are 113 mm thick together: by the phase of the impact in the
 // step it used to stop, to sink in by centimetres, or to fly on below.
 TEST(FastBodies, ABallStopsOnAThinPlateAtAnyPhase) {

@@ -128,9 +128,23 @@ TEST(Rounds, EndWhereNobodyHasATurn) {
     EXPECT_EQ(turns, 1) << "nobody has left a start since";
 }
 
+// Below rounding an error falls by chance, and may do so for ever.
+TEST(Rounds, ABettermentBelowRoundingIsNone) {
+    int rounds = 0;
+    double error = 1e-13;
+    const std::vector<Member> members = {{.iterations = 3}};
+    const auto end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
+        rounds = turn.round + 1;
+        error *= 0.5;
+        return {turn.round == 100 ? TurnEnd::Done : TurnEnd::Exhausted, error};
+    });
+    EXPECT_EQ(end, RoundsEnd::Stale);
+    EXPECT_EQ(rounds, 4 + 3);  // the fourth goes below 1e-14
+}
+
 TEST(Rounds, TheWorkOfARoundDoesNotOverflow) {
     std::int64_t last = 0;
-    double error = 1.0;
+    double error = 1e100;
     const std::vector<Member> members = {{.iterations = 3}};
     static_cast<void>(run_rounds(members, [&](const Turn& turn) -> TurnResult {
         EXPECT_GE(turn.iterations, last);

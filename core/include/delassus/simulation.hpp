@@ -276,6 +276,7 @@ private:
     std::unique_ptr<EnergyGuard> guard_;
     std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or processes share bodies
     std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or processes share them
+    bool restitutes_ = false;                 // a material does
     std::string deep_;                        // of this step: what came to overlap whatever its parts; or empty
     std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies
     std::vector<double> gathered_;            // the memory of the method for all bodies, after step gathered_at_

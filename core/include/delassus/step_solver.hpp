@@ -44,6 +44,9 @@ struct StepRequest {
     /// the configuration gives no tolerance, each part of the problem is solved to a share of it; where it gives one to
     /// `auto`, to the smaller of the two (docs/tolerance.md).
     std::span<const double> method_error = {};
+    /// The problem corrects what other solves or the method left of gaps and constraints, and method_error is empty: a
+    /// small share of that may stay (docs/tolerance.md).
+    bool corrects = false;
     /// What earlier solves left in method_error, n, for each velocity in the norm of the masses of its island; it is
     /// not taken for the method's own.
     std::span<const double> error_of_solves = {};
@@ -117,6 +120,10 @@ public:
     DELASSUS_API StepAnswer solve(const Problem& problem, Solution& solution, const StepRequest& request = {});
     /// The same without a copy. What is left in the problem are arrays of an earlier step, to build the next one in.
     DELASSUS_API StepAnswer solve(Problem&& problem, Solution& solution, const StepRequest& request = {});
+
+    /// From now on to this share of the tolerances that follow from the errors of methods; 1 unless set. For a step
+    /// whose answer shows at its end that it was too loose.
+    DELASSUS_API void solve_to(double share);
 
     /// Before a trial of a step: misses so far are of what is kept, or of what was thrown away.
     DELASSUS_API void forget_misses();

@@ -26,6 +26,7 @@ bool is_rounding(const Errors& error) {
 
 /// The tolerance that follows from the error of the method, where it is known.
 std::optional<double> goal_for(const Prepared& problem, const IslandRequest& request, const IslandTraits& traits) {
+    if (request.corrects) return least_goal(traits, static_cast<double>(problem.all_rows()));
     if (!request.method_error) return {};
     const std::span<const double> errors = *request.method_error;
     const Communicator& run = problem.communicator();
@@ -59,7 +60,7 @@ void IslandSolver::solve(const Prepared& problem, Solution& solution, const Isla
     SolverEffort& spent = result.effort;
     SolveSettings settings = request.settings;
     const IslandTraits traits = traits_of(problem);
-    set_step_tolerance(config_, traits, goal_for(problem, request, traits), settings);
+    set_step_tolerance(config_, traits, goal_for(problem, request, traits), request.share, settings);
     if (share < suspicious) {
         const double least = std::min(rounding_of_motion / share, 1.0);
         settings.tolerance = std::max(settings.tolerance, least);

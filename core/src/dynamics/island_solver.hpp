@@ -27,6 +27,8 @@ struct IslandRequest {
     /// The error that the method itself makes in the own velocities, n; none: it is not known.
     std::optional<std::span<const double>> method_error = {};
     double error_of_solves = 0.0;  ///< of that, at most, what earlier solves left, in the norm of the masses
+    bool corrects = false;         ///< StepRequest::corrects
+    double share = 1.0;            ///< of the tolerance that follows from it, ≤ 1 (StepSolver::solve_to())
     /// The island may be several, which other ways of solving see each apart.
     bool gathered = false;
 };

@@ -108,7 +108,7 @@ void PositionProjection::make_compliant() {
 void PositionProjection::solve(StepSolver& solver, StepReport& report) {
     solution_.x.assign(static_cast<std::size_t>(n_), 0.0);
     solution_.lambda.assign(problem_.b.size(), 0.0);
-    report.take(solver.solve(problem_, solution_, {.warm_start = true}));
+    report.take(solver.solve(problem_, solution_, {.warm_start = true, .corrects = true}));
     ++report.newton_iterations;
 }
 

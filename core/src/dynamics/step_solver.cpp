@@ -75,6 +75,8 @@ struct StepSolver::Implementation {
         return kind.parts[number];
     }
 
+    double share_of_tolerance = 1.0;  // solve_to()
+
     bool solve(Problem& problem, Solution& solution, const StepRequest& request);
     bool solve_whole(KeptKind& kind, Problem& problem, Solution& solution, const StepRequest& request);
     /// Solves the parts in `list` that do not rest, from self.start into the parts' solutions.
@@ -172,6 +174,7 @@ StepAnswer StepSolver::solve(Problem&& problem, Solution& solution, const StepRe
 bool StepSolver::Implementation::solve(Problem& problem, Solution& solution, const StepRequest& given) {
     StepRequest request = given;
     if (!follows_method(request)) request.method_error = request.error_of_solves = {};
+    request.corrects = request.corrects && !config.sweeps && !config.tolerance;
     if (shared) {
         IslandResult result;
         shared->solve(problem, solution, request, settings, result);
@@ -307,7 +310,11 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     }
     SolveSettings own = settings;
     own.team = threads;
-    IslandRequest island{.settings = own, .warm_start = request.warm_start, .leaves_out = leaves_out};
+    IslandRequest island{.settings = own,
+                         .warm_start = request.warm_start,
+                         .leaves_out = leaves_out,
+                         .corrects = request.corrects,
+                         .share = share_of_tolerance};
     if (!request.method_error.empty()) {
         kept.method_error.assign(request.method_error.begin(), request.method_error.end());
         island.error_of_solves = largest(request.error_of_solves, columns);
@@ -390,6 +397,9 @@ const SolverEffort& StepSolver::effort() const {
 }
 void StepSolver::reset_effort() {
     implementation_->effort = {};
+}
+void StepSolver::solve_to(double share) {
+    implementation_->share_of_tolerance = share;
 }
 void StepSolver::forget_misses() {
     implementation_->effort.worst_miss = 0.0;

@@ -45,6 +45,17 @@ inline double loosest_goal(const IslandTraits& part) {
     return ((part.needs & DELASSUS_CAN_FREE) != 0 ? 1e-4 : 1e-2) / part.amplification;
 }
 
+/// (rows/300)³, at most 1: few rows are solved exactly for next to nothing.
+inline double share_of_many(double rows) {
+    constexpr double many = 300.0;
+    return std::pow(std::min(1.0, rows / many), 3);
+}
+
+/// Below which no goal is, where a hundredth of the upper bound is exact enough.
+inline double least_goal(const IslandTraits& part, double rows) {
+    return 1e-8 + 1e-2 * share_of_many(rows) * loosest_goal(part);
+}
+
 /// What a goal follows from.
 struct ErrorOfMethod {
     double in_masses;       ///< √(Σ H_ii e_i²), e being the method's own error in the velocities
@@ -56,21 +67,20 @@ struct ErrorOfMethod {
 
 /// Rows far from the method's own error need not be solved below it.
 inline double goal_of(const ErrorOfMethod& error, const IslandTraits& part) {
-    constexpr double share = 0.5, share_in_rows = 0.75, many = 300.0;
-    // Few rows are solved exactly for next to nothing.
-    const double share_of_many = std::pow(std::min(1.0, error.rows / many), 3);
-    const double least = error.gathered ? 1e-8 + 1e-2 * share_of_many * loosest_goal(part) : 1e-8;
+    constexpr double share = 0.5, share_in_rows = 0.75;
+    const double least = error.gathered ? least_goal(part, error.rows) : 1e-8;
     const double unit = error.reference * part.amplification;
     const double by_masses = share * error.in_masses / unit;
     if (!(by_masses > least)) return least;  // as at rest, and where nothing can be measured
     const double in_rows = share_in_rows * error.in_rows / unit;
-    return std::clamp(std::min(by_masses, in_rows), least, std::max(least, loosest_goal(part) * share_of_many));
+    return std::clamp(std::min(by_masses, in_rows), least,
+                      std::max(least, loosest_goal(part) * share_of_many(error.rows)));
 }
 
 /// Sets the tolerance of an island. A tolerance that the configuration names is kept at least. goal: of goal_of(),
-/// where tolerances follow from the error of the method.
+/// where tolerances follow from the error of the method. share: of it and of the upper bound.
 inline void set_step_tolerance(const SolverConfig& config, const IslandTraits& part, std::optional<double> goal,
-                               SolveSettings& of) {
+                               double share, SolveSettings& of) {
     if (!goal) {
         // Contacts may have no answer to a default tolerance that anybody finds: no work loosens it, but there is
         // last_resort().
@@ -79,8 +89,8 @@ inline void set_step_tolerance(const SolverConfig& config, const IslandTraits& p
         return;
     }
     if (config.tolerance && *goal >= *config.tolerance) return;
-    of.tolerance = *goal;
-    of.loosest = config.tolerance.value_or(loosest_goal(part));
+    of.tolerance = std::max(share * *goal, std::min(*goal, rounding_limit_of_steps));
+    of.loosest = config.tolerance.value_or(std::max(of.tolerance, share * loosest_goal(part)));
 }
 
 /// What is used where nothing better is found: nobody asked for the tolerance, and so it ends no run.

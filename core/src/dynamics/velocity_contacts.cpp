@@ -187,7 +187,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
 void VelocityContacts::require_same_side(const State& begin, double h) const {
     constexpr double least_cosine = 0.5, flush_cosine = 1.0 - 1e-6;
     constexpr double flush_share = 1e-2;               // of the way to the middle
-    const double shallow = 1e3 * resolution_.least();  // too little for a body to get to the other side
+    const double shallow = 1e6 * resolution_.least();  // too little for a body to get to the other side
     const auto& contacts = before_.contacts();
     const auto& later = rows_.contacts();
     const std::size_t first = before_.blocks().size() - contacts.size();

@@ -102,6 +102,8 @@ struct MultibodySystem::Implementation {
         std::vector<ContactPoint> contacts;
     } detected;
 
+    std::vector<std::vector<Pose>> expected;  // of the detector's bodies, as expect_end() had them
+
     void must_be_finished() const;
     void must_not_be_finished() const;
     void check_body(BodyIndex body, const std::string& name) const;
@@ -271,6 +273,8 @@ struct MultibodySystem::Implementation {
     void place_shapes(const State& state);
     /// displacements ← of a step of length h (s).
     void predict_displacements(double h, const State& state);
+    /// contacts ← also those on the ways to what is expected, of pairs of shapes that have none.
+    void add_expected(std::vector<ContactPoint>& contacts, const sdk::Team& team) const;
     /// Whether `detected` is of these poses and displacements.
     [[nodiscard]] bool is_detected() const;
     [[nodiscard]] std::vector<std::int32_t> solids() const;

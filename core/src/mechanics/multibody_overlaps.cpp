@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How deep bodies of a multibody system lie in one another.
+// How deep bodies of a multibody system lie in one another, and contacts on the way to where they came to do so.
 #include <algorithm>
 #include <map>
 
@@ -17,6 +17,56 @@ bool MultibodySystem::Implementation::is_detected() const {
     return std::equal(poses.begin(), poses.end(), detected.poses.begin(), detected.poses.end(), same_pose) &&
            std::equal(displacements.begin(), displacements.end(), detected.displacements.begin(),
                       detected.displacements.end(), same_displacement);
+}
+
+namespace {
+
+using mechanics::Quaterniond;
+
+Quaterniond orientation(const Pose& pose) {
+    return {pose.orientation[0], pose.orientation[1], pose.orientation[2], pose.orientation[3]};
+}
+
+/// From one pose to another: the shorter turn.
+BodyDisplacement displacement(const Pose& from, const Pose& to) {
+    return {mechanics::array(mechanics::vector(to.position) - mechanics::vector(from.position)),
+            mechanics::array(mechanics::logarithm(orientation(to) * orientation(from).conjugate()))};
+}
+
+std::pair<std::int32_t, std::int32_t> shapes_of(const ContactPoint& contact) {
+    return {contact.shape_a, contact.shape_b};
+}
+
+}  // namespace
+
+void MultibodySystem::expect_end(const State& end) {
+    auto& self = *implementation_;
+    self.must_be_finished();
+    if (!self.detector) return;
+    self.place(end);
+    self.place_shapes(end);
+    self.expected.push_back(self.poses);
+}
+
+void MultibodySystem::expect_nothing() {
+    implementation_->expected.clear();
+}
+
+void MultibodySystem::Implementation::add_expected(std::vector<ContactPoint>& contacts, const sdk::Team& team) const {
+    std::vector<BodyDisplacement> ways(poses.size());
+    std::vector<ContactPoint> met;
+    const auto by_shapes = [](const ContactPoint& a, const ContactPoint& b) { return shapes_of(a) < shapes_of(b); };
+    for (const auto& end : expected) {
+        for (std::size_t k = 0; k < poses.size(); ++k) ways[k] = displacement(poses[k], end[k]);
+        detector->detect(poses, envelope, met, team, ways);
+        const std::size_t known = contacts.size();
+        for (const ContactPoint& contact : met)
+            if (!std::binary_search(contacts.begin(), contacts.begin() + static_cast<std::ptrdiff_t>(known), contact,
+                                    by_shapes))
+                contacts.push_back(contact);
+        std::inplace_merge(contacts.begin(), contacts.begin() + static_cast<std::ptrdiff_t>(known), contacts.end(),
+                           by_shapes);
+    }
 }
 
 void MultibodySystem::collect_overlaps(const State& state, double h, const sdk::Team& team,

@@ -89,6 +89,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
         } else {
             self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
         }
+        if (!self.expected.empty()) self.add_expected(rows.contacts(), rows.team);
         if (!self.prescribed.empty())
             std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {
                 return self.point_of(self.owner_of(contact.shape_a), {}).column < 0 &&

@@ -11,6 +11,7 @@
 #include "simulation/overlap_watch.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
+#include "simulation/step_retries.hpp"
 
 namespace delassus {
 
@@ -18,7 +19,10 @@ bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const s
     const sdk::Team team = solver_->team();
     if (overlaps_) overlaps_->begin(bodies_at(state, next_bodies_), report.h, team);
     const double begin = state.t, end = begin + report.h;
+    // Where bodies come to overlap in the whole step, what solves leave of gaps is to shrink with its parts.
+    bool deep = false;
     const auto take = [&](State& moved, double h, StepReport& part) {
+        if (deep) solver_->solve_to(h / report.h);
         if (energy_ && moved.t == begin) energy_->begin_trial();
         solver_->forget_misses();
         take_step(moved, h, part);
@@ -28,15 +32,37 @@ bool Simulation::advance_fixed(State& state, AdaptiveStepReport& report, const s
         if (energy_ && moved.t > end - 0.5 * h)
             energy_->require_within(system_->system->energy(bodies_at(moved, next_bodies_)), h);
     };
+    const auto take_whole = [&] {
+        StepRetries retries(*system_->system, *solver_, !restitutes_);
+        while (true) {
+            try {
+                take(state, report.h, report.step);
+                return;
+            } catch (const StepTooDeep& failure) {
+                retries.prepare(failure, report.step.contacts, bodies_at(state, next_bodies_));
+            } catch (const StepTooLong&) {
+                retries.give_up();
+                throw;
+            }
+            state = now_.state;
+            timestepper_->restart();
+            timestepper_->load(memory);
+        }
+    };
     try {
-        take(state, report.h, report.step);
+        take_whole();
     } catch (const StepTooLong& failure) {
+        deep = dynamic_cast<const StepTooDeep*>(&failure) != nullptr;
+        const struct AsBefore {
+            StepSolver& solver;
+            ~AsBefore() { solver.solve_to(1.0); }
+        } as_before{*solver_};
         try {
             record_.parts =
                 step_in_parts(*timestepper_, take, now_.state, memory, report.h, state, report.step, failure);
-        } catch (const StepTooDeep& deep) {
-            overlaps_->give_up(deep.bodies());
-            if (deep_.empty()) deep_ = deep.what();
+        } catch (const StepTooDeep& last) {
+            overlaps_->give_up(last.bodies());
+            if (deep_.empty()) deep_ = last.what();
             return false;
         } catch (const StepFailure&) {
             if (!dynamic_cast<const EnergyWatch::Gain*>(&failure)) throw;

@@ -63,7 +63,7 @@ void OverlapWatch::require_within(const State& state, double h, const sdk::Team&
         fmt::format("bodies {} and {} come to overlap by {:.2g} m in the step until t = {:.9g} s, {:.2g} "
                     "times what its accuracy allows",
                     quoted_name(system_, worst->a), quoted_name(system_, worst->b), grown, state.t, beyond),
-        worst->a, worst->b);
+        worst->a, worst->b, grown);
 }
 
 std::vector<BodyIndex> OverlapWatch::given_up() const {

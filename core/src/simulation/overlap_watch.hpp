@@ -16,11 +16,16 @@ namespace delassus {
 /// A step that leaves bodies deeper in one another than they were, by more than its accuracy allows.
 class DELASSUS_API StepTooDeep : public StepTooLong {
 public:
-    StepTooDeep(const std::string& sentence, BodyIndex a, BodyIndex b) : StepTooLong(sentence), bodies_(a, b) {}
+    StepTooDeep(const std::string& sentence, BodyIndex a, BodyIndex b, double depth)
+        : StepTooLong(sentence), bodies_(a, b), depth_(depth) {}
+    /// The pair that is deepest beside what it may be, the lesser number first.
     [[nodiscard]] std::pair<BodyIndex, BodyIndex> bodies() const { return bodies_; }
+    /// By what its overlap has grown, m.
+    [[nodiscard]] double depth() const { return depth_; }
 
 private:
     std::pair<BodyIndex, BodyIndex> bodies_;
+    double depth_;
 };
 
 /// A step has rows for the contacts that it knows. What bodies meet otherwise, as where they turn or land within it,

@@ -173,6 +173,9 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (!shared_ && system.system->size_of_shapes() > 0.0)
         overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy, bodies_at(now_.state, next_bodies_),
                                                    system.step);
+    const auto restitutes = [](const auto& one) { return one.contact.restitution > 0.0; };
+    restitutes_ = std::any_of(system.materials.begin(), system.materials.end(), restitutes) ||
+                  std::any_of(system.material_pairs.begin(), system.material_pairs.end(), restitutes);
     measure(state(), now_.step);
     now_.totals.start_energy = now_.totals.lowest = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
