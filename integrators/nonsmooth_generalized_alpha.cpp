@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dynamics/implicit_method.hpp"
+#include "dynamics/position_projection.hpp"
 #include "dynamics/velocity_contacts.hpp"
 
 namespace delassus {

@@ -249,7 +249,7 @@ std::vector<Copy> repeat(const Source& source, const YAML::Node& node) {
 }
 
 std::string name_in(const Source& source, const YAML::Node& node, std::string_view key, const Copy& copy) {
-    const std::string text = scalar(source, node, key);
+    std::string text = scalar(source, node, key);
     if (!copy.repeated) return text;
     std::string result;
     for (std::size_t at = 0; at < text.size();) {

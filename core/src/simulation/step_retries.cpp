@@ -13,11 +13,11 @@ StepRetries::~StepRetries() {
 
 void StepRetries::prepare(const StepTooDeep& failure, std::span<const ContactPoint> contacts, const State& end) {
     if (!first_) first_ = failure;
-    if (!expect(failure, contacts, end) && !solve_closer(failure)) throw *first_;
+    if (!expect(failure, contacts, end) && !solve_closer(failure)) throw StepTooDeep(*first_);
 }
 
 void StepRetries::give_up() const {
-    if (first_) throw *first_;
+    if (first_) throw StepTooDeep(*first_);
 }
 
 bool StepRetries::expect(const StepTooDeep& failure, std::span<const ContactPoint> contacts, const State& end) {
