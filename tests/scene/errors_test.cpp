@@ -100,10 +100,11 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 6: joint \"j\" joins a body to itself: \"first\" and \"second\" must differ"},
         Case{"MissingJoint", head + bodies + "motors:\n  - {name: m, joint: hinge, motion: 1}\n",
              "s.yaml, line 6: \"joint\" is \"hinge\", but there is no such joint; there are none"},
-        Case{"EmptyMotion",
-             head + bodies +
-                 "joints:\n  - {name: j, kind: revolute, second: ball}\nmotors:\n  - {name: m, joint: j, motion: {}}\n",
-             "s.yaml, line 8: \"motion\" is empty; it must be constant, linear, sine, table, polynomial, ramp or input"},
+        Case{
+            "EmptyMotion",
+            head + bodies +
+                "joints:\n  - {name: j, kind: revolute, second: ball}\nmotors:\n  - {name: m, joint: j, motion: {}}\n",
+            "s.yaml, line 8: \"motion\" is empty; it must be constant, linear, sine, table, polynomial, ramp or input"},
         Case{"NegativeJointFriction",
              head + bodies + "joints:\n  - {name: j, kind: revolute, second: ball, friction: -1}\n",
              "s.yaml, line 6: \"friction\" is -1; it must not be negative"},

@@ -17,8 +17,8 @@ namespace delassus {
 /// How a motion follows an input u: offset + scale · u.
 struct InputUse {
     double scale = 1.0, offset = 0.0;
-    std::optional<double> start;                 ///< u until it is set; none: 0
-    std::optional<std::array<double, 2>> range;  ///< where u is cut off; none: nowhere
+    std::optional<double> start{};                 ///< u until it is set; none: 0
+    std::optional<std::array<double, 2>> range{};  ///< where u is cut off; none: nowhere
 };
 
 /// Inputs by name. Each is constant from one setting to the next. Copies share the inputs.

@@ -251,10 +251,10 @@ private:
     bool renew_rows(State& state, std::int64_t steps);
     /// The same where the method has come to.
     void renew_rows_ahead();
-    /// Forgets what is ahead of the state shown if the system was changed since.
     void settle_turns(State& state) const;
+    /// Begins anew if the system was changed since.
     void notice_changes();
-    /// What acts on the bodies has jumped.
+    /// Forgets what is ahead of the state shown, and forces of before: what acts on the bodies has jumped.
     void begin_anew();
 
     SceneSystem* system_;
