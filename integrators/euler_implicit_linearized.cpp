@@ -398,7 +398,9 @@ private:
             if (reaction != 0.0) ++report.active_blocks;
             if (!along_normal || !(reaction > 0.0)) continue;
             const double speed = std::max(std::abs(approach), gap / h);
-            if ((approach < 0.0 || !pushed_before) && speed > report.impact_speed) {
+            const double e = rows_.blocks()[k].restitution;
+            const bool comes_back = e > 0.0 && -approach > e * restitution_speed_;
+            if ((comes_back || !pushed_before) && speed > report.impact_speed) {
                 report.impact_speed = speed;
                 report.impact_time = approach < 0.0 ? h : gap / speed;
             }

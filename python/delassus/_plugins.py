@@ -127,8 +127,8 @@ def packaged() -> list:
                 known = package.metadata
                 rows.setdefault(point.name, {
                     "name": point.name, "python": point.value, "version": package.version,
-                    "description": known["Summary"] or "", "package": f"{known['Name']} {package.version}",
-                    "licence": (known["License-Expression"] or known["License"] or "unknown").split("\n")[0]})
+                    "description": known.get("Summary") or "", "package": f"{known['Name']} {package.version}",
+                    "licence": (known.get("License-Expression") or known.get("License") or "unknown").split("\n")[0]})
     return sorted(rows.values(), key=lambda row: row["name"])
 
 

@@ -120,6 +120,20 @@ TEST_P(References, AreMetByRadauIIA) {
     EXPECT_LE(error, factor * tolerance);
 }
 
+// Sizes of the mechanisms are 1 m or less, or their errors are small.
+TEST_P(References, AreMetByAccuracy) {
+    if (GetParam().name == "forty_four_bars") GTEST_SKIP() << "takes ten seconds";
+    const double factor = GetParam().name == "spatial_slider_crank" ? 40.0 : 10.0;
+    const double step = std::min(0.01, 0.01 * GetParam().end);
+    for (const double accuracy : {1e-1, 1e-3, 1e-5}) {
+        const double error = off(GetParam(), {{"integrator", "auto"},
+                                              {"coordinates", "auto"},
+                                              {"step", std::to_string(step)},
+                                              {"accuracy", std::to_string(accuracy)}});
+        EXPECT_LE(error, factor * accuracy * std::max(GetParam().end, 1.0)) << accuracy;
+    }
+}
+
 TEST_P(References, AreMetByScenesThatNameNothing) {
     const double step = std::min(0.01, 0.01 * GetParam().end);
     const double error =

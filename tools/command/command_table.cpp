@@ -57,6 +57,7 @@ const std::map<std::string, Completion>& completions() {
         {"METRES", nothing},
         {"MINUTES", nothing},
         {"M_OR_RAD", nothing},
+        {"SHARE", nothing},
         {"MIB", nothing},
         {"N", nothing},
         {"1", nothing},

@@ -19,6 +19,8 @@ void add_scene_arguments(CLI::App& command, SceneArguments& arguments) {
     command.add_option("--step", arguments.step, "Step of every system in place of the file's")->type_name("SECONDS");
     command.add_option("--tolerance", arguments.tolerance, "Tolerance of every system, from which the steps follow")
         ->type_name("M_OR_RAD");
+    command.add_option("--accuracy", arguments.accuracy, "Accuracy of every system, for which steps are divided")
+        ->type_name("SHARE");
     command.add_option("--end", arguments.end, "End of every system in place of the file's")->type_name("SECONDS");
     add_plugin_path(command, arguments.plugin_path);
 }
@@ -31,6 +33,7 @@ Scene read(const SceneArguments& arguments) {
     overrides.integrator = arguments.integrator;
     overrides.step = arguments.step;
     overrides.tolerance = arguments.tolerance;
+    overrides.accuracy = arguments.accuracy;
     overrides.end = arguments.end;
     return read_scene(arguments.file, overrides);
 }

@@ -16,7 +16,7 @@ struct SceneArguments {
     std::filesystem::path file;
     std::string solver, law, integrator;
     std::vector<std::string> settings;
-    std::optional<double> step, tolerance, end;
+    std::optional<double> step, tolerance, accuracy, end;
     std::vector<std::filesystem::path> plugin_path;
 };
 

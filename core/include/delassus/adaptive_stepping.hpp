@@ -14,12 +14,15 @@ namespace delassus {
 
 /// What a step's size may be, and the error that chooses it (docs/integrators.md, "Steps by tolerance").
 struct StepControl {
-    double absolute = 1e-4;     ///< in units of positions, as a rule m and rad; > 0
+    double absolute = 1e-4;     ///< in units of positions, as a rule m and rad, or a share of `sizes`; > 0
     double relative = 0.0;      ///< of the way that a coordinate goes in a unit of time; ≥ 0
     double initial = 1e-4;      ///< first step to try, as a rule s; > 0
     double smallest = 1e-7;     ///< > 0. A smooth step below it fails; impacts closer together are not told apart
     double largest = 0.1;       ///< ≥ initial
     bool finds_impacts = true;  ///< false: contacts and stops are somebody else's, as if the system had none
+    /// Of each velocity's coordinate, in its unit, > 0: what `absolute` is a share of. Empty: 1 each.
+    std::vector<double> sizes{};
+    double slow = 0.0;  ///< what closes at this speed at most is no impact; 0: at `absolute`
 };
 
 /// What a step with a chosen size did.
@@ -63,21 +66,32 @@ private:
         StepReport whole, first, second;
         std::vector<double> memory;  ///< of the stepper at the end
         double error = 0.0;          ///< over the tolerance
+        double slow = 0.0;           ///< what closes at this speed at most is no impact
         bool touches = false;        ///< a contact, stop or limited motor acts in it
+        /// How long after its end, at the speeds there, the first open contact closes; negative: since when one is
+        /// closed that no step of it knew, as it was too far to be found where the last one began.
+        double closes_in = std::numeric_limits<double>::infinity();
+
+        [[nodiscard]] bool missed() const { return closes_in < 0.0; }
     };
     [[nodiscard]] Trial take(const State& begin, double h, StepSolver& solver);
     /// When the first impact comes, after the beginning of a trial of size h; infinity if none does.
     [[nodiscard]] double impact_in(const Trial& trial, double h);
-    /// How long after a trial's end, at its speeds, the first open contact closes; negative: since when one is closed.
-    [[nodiscard]] double time_to_closing(const Trial& trial);
+    /// Contacts at the ends of a trial of size h: which closes next, and by which it errs.
+    void look_at_contacts(Trial& trial, double h);
     /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
     [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
-    [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h) const;
+    [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h,
+                                  bool touches) const;
     [[nodiscard]] double error_of(const State& begin, const State& end, const EmbeddedError& error, double h) const;
     void extrapolate(const State& whole, State& halves) const;
     /// A step from the state in which a contact closes.
     [[nodiscard]] AdaptiveStepReport take_impact(State& state, double h, double end, StepSolver& solver);
     [[nodiscard]] double impact_step() const;
+    [[nodiscard]] double moment() const;
+    [[nodiscard]] double size(std::size_t velocity) const {
+        return control_.sizes.empty() ? 1.0 : control_.sizes[velocity];
+    }
     [[nodiscard]] double power() const;
     /// The factor for the step after one of size h with the estimate `error`, over the tolerance.
     [[nodiscard]] double growth(double error, double h, bool shrunk) const;
@@ -92,7 +106,8 @@ private:
     StepControl control_;
     std::string advice_;
     bool extrapolates_, embedded_;
-    bool unilateral_;  // contacts and stops count
+    bool unilateral_;    // contacts and stops count
+    double resolution_;  // of gaps, as a share of sizes
     double common_ = std::numeric_limits<double>::infinity();
     double next_;
     double last_error_ = 1.0;
@@ -100,7 +115,7 @@ private:
     // Of the step that is being taken:
     std::vector<double> memory_;
     AdaptiveStepReport report_;
-    UnilateralRows rows_;
+    UnilateralRows begin_rows_, rows_;
     std::vector<std::uint64_t> pushed_;
 };
 

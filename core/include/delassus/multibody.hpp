@@ -518,6 +518,8 @@ public:
     /// m, since finish(): how near shapes must be for a contact, and their median size; 0 where none can touch.
     [[nodiscard]] double envelope() const;
     [[nodiscard]] double size_of_shapes() const;
+    /// m: the largest extent of a body's shapes, of planes and terrains apart; 0 if it has no others.
+    [[nodiscard]] double extent_of_shapes(BodyIndex body) const;
     /// Bodies that overlap at a state, by pairs, ascending; h (s): of the step that begins there. What it finds is kept
     /// for collect_unilateral() of the same state and step. Not those of nodes. team: threads that may share the work.
     void collect_overlaps(const State& state, double h, const sdk::Team& team, std::vector<BodyOverlap>& overlaps);

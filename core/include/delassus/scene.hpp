@@ -81,12 +81,13 @@ struct SceneSystem {
     bool coordinates_chosen = false;  ///< the scene names none
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
-    std::string method_reason;                   ///< why the integrator is this one; empty: the scene names it
-    SolverConfig solver;                         ///< an empty name: `auto`
-    double step = 0.0;                           ///< s, > 0; with `control` the first that is tried
-    double accuracy = 1e-3;                      ///< of positions, as a share of the extent of what moves
-    std::optional<StepControl> control;          ///< steps follow from a tolerance; none: all are `step` long
-    std::optional<SleepingRule> sleeping;        ///< none: every body is awake
+    std::string method_reason;             ///< why the integrator is this one; empty: the scene names it
+    SolverConfig solver;                   ///< an empty name: `auto`
+    double step = 0.0;                     ///< s, > 0; with `control` the first that is tried
+    double accuracy = 1e-3;                ///< of positions a second, as a share of the extent of what moves, and rad
+    bool steps_by_accuracy = false;        ///< `step` is then how often results are shown
+    std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
+    std::optional<SleepingRule> sleeping;  ///< none: every body is awake
     std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given
     RunLimits limits;                            ///< what a run must not exceed
     double end = 0.0;                            ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
@@ -131,6 +132,7 @@ struct SceneOverrides {
     std::optional<Law> law;           ///< of friction, for every system
     std::optional<double> step, end;  ///< s, for every system; a step takes the place of a tolerance
     std::optional<double> tolerance;  ///< for every system, in place of a fixed step
+    std::optional<double> accuracy;   ///< for every system, in place of a tolerance
     std::optional<bool> leave_out;    ///< for every system
 };
 

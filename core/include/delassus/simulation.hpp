@@ -79,6 +79,7 @@ struct SimulationTotals {
     double seconds = 0.0, solver_seconds = 0.0;
     std::int64_t unsolved_steps = 0;  ///< steps with a solve that missed its tolerance
     std::string first_unsolved;       ///< when and why the first did
+    std::int64_t inexact_steps = 0;   ///< with a part that errs by more than the accuracy asks, however short it is
     /// Steps in which bodies came to overlap by more than the accuracy allows, and shorter ones did not help; when and
     /// which the first time.
     std::int64_t deep_steps = 0;

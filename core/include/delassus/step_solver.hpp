@@ -125,6 +125,10 @@ public:
     /// whose answer shows at its end that it was too loose.
     DELASSUS_API void solve_to(double share);
 
+    /// From now on errors of methods count as at most these (n, > 0, in units of velocities), by which steps are solved
+    /// the closer; empty: as they are.
+    DELASSUS_API void bound_errors(std::vector<double> bounds);
+
     /// Before a trial of a step: misses so far are of what is kept, or of what was thrown away.
     DELASSUS_API void forget_misses();
     /// After it: throws StepTooLong if a solve since forget_misses() or reset_effort() missed its tolerance by orders,

@@ -46,6 +46,28 @@ constexpr double share_of_step = 0.01;
 constexpr double strict = 10.0;
 /// Remaining times within this fraction of a step are whole steps that rounding spoiled.
 constexpr double rounding_of_step = 1e-9;
+/// Of the tolerance: an impact in a step that errs less need not be looked for.
+constexpr double faint_impact = 0.1;
+/// Of a speed that a contact should not have: what the step errs by, and its halves do not see.
+constexpr double share_of_wrong_speed = 0.25;
+/// Of the longest step: whose error may be made at an edge.
+constexpr double share_of_event = 0.01;
+/// Of the longest step: rates over it are those of an instant, and their rounding is small.
+constexpr double moment_of_step = 1e-5;
+/// Of sizes: what gaps are resolved to, by which positions of two ways to take a step may differ where bodies touch.
+constexpr double rounding_of_gaps = 1e-9;
+/// Of the fastest speed: slower ones may be what solves leave, or rounding of the rates of bodies with a motion.
+constexpr double rounding_of_speed = 1e-6;
+
+/// act(block, gap, speed at v) for the normal rows.
+template <class Act>
+void for_each_normal(const UnilateralRows& rows, const std::vector<double>& v, Act act) {
+    std::size_t row = 0;
+    for (const auto& block : rows.blocks()) {
+        if (block.along_normal()) act(block, rows.rows()[row].gap, rows.speed(row, v.data()));
+        row += static_cast<std::size_t>(block.cone.rows);
+    }
+}
 
 }  // namespace
 
@@ -58,6 +80,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
       extrapolates_(stepper.damps_at_once() && system.m() == 0),
       embedded_(stepper.has_embedded_error()),
       unilateral_(control.finds_impacts && system.has_unilateral()),
+      resolution_(unilateral_ ? rounding_of_gaps : 0.0),
       next_(control.initial) {
     const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
     if (!positive(control.absolute) || !(control.relative >= 0.0) || !std::isfinite(control.relative))
@@ -67,15 +90,22 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
         throw InputError(
             fmt::format("steps must be positive and finite with smallest ≤ initial ≤ largest, not {}, {} and {}",
                         control.smallest, control.initial, control.largest));
+    if (!control.sizes.empty() && control.sizes.size() != static_cast<std::size_t>(system.n()))
+        throw InputError(fmt::format("{} sizes are given for {} velocities", control.sizes.size(), system.n()));
+    if (!std::all_of(control.sizes.begin(), control.sizes.end(), positive))
+        throw InputError("sizes of coordinates must be positive and finite");
     if (system.m() > 0 && stepper.reaction_growth() > 1.0 - 1e-6)
         throw Unsupported(
-            "with joints a \"tolerance\" needs a method in which errors of the reactions decay: in this one they "
+            "with joints a \"tolerance\" or an \"accuracy\" needs a method in which errors of the reactions decay: in "
+            "this one they "
             "oscillate for ever, and no step would be short enough; take hht, generalized_alpha or euler_implicit, or "
             "give a fixed \"step\"");
-    stepper.choose_steps(control.absolute);
+    if (!(control.slow > 0.0)) control_.slow = control.absolute;
+    stepper.choose_steps(std::min(control.absolute, control_.slow));
 }
 
-double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h) const {
+double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h,
+                                  bool touches) const {
     const double share = std::pow(2.0, stepper_.order()) - 1.0;
     std::vector<double> delta(halves.v.size());
     system_.difference(whole.q.data(), halves.q.data(), delta.data());
@@ -83,8 +113,9 @@ double AdaptiveStepping::error_of(const State& begin, const State& whole, const 
     for (std::size_t i = 0; i < delta.size(); ++i) {
         const double error = std::max(std::abs(delta[i]), h * std::abs(halves.v[i] - whole.v[i])) / share;
         const double speed = std::max(std::abs(begin.v[i]), std::abs(halves.v[i]));
-        const double allowed = control_.absolute + control_.relative * speed;
-        const double ratio = error / (extrapolates_ ? allowed : allowed * h);
+        const double allowed = control_.absolute * size(i) + control_.relative * speed;
+        const double of_step = extrapolates_ ? allowed : allowed * h;
+        const double ratio = std::max(error - (touches ? resolution_ * size(i) : 0.0), 0.0) / of_step;
         worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
     }
     return worst;
@@ -95,7 +126,8 @@ double AdaptiveStepping::error_of(const State& begin, const State& end, const Em
     double worst = 0.0;
     for (std::size_t i = 0; i < error.positions.size(); ++i) {
         const double speed = std::max(std::abs(begin.v[i]), std::abs(end.v[i]));
-        const double allowed = share_of_step * std::pow(control_.absolute + control_.relative * speed, exponent);
+        const double share = control_.absolute + control_.relative * speed / size(i);
+        const double allowed = share_of_step * size(i) * std::pow(share, exponent);
         const double ratio = std::max(std::abs(error.positions[i]), h * std::abs(error.velocities[i])) / allowed;
         worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
     }
@@ -141,8 +173,9 @@ AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, Ste
     count(trial.second);
     solver.require_usable();
     trial.memory = stepper_.save();
-    trial.error = error_of(begin, whole, trial.end, h);
     trial.touches = trial.whole.active_blocks + trial.first.active_blocks + trial.second.active_blocks > 0;
+    trial.error = error_of(begin, whole, trial.end, h, trial.touches);
+    if (unilateral_) look_at_contacts(trial, h);
     if (extrapolates_ && !trial.touches) extrapolate(whole, trial.end);
     return trial;
 }
@@ -157,40 +190,65 @@ void AdaptiveStepping::count(const StepReport& report) {
 // step it is late by up to h. So steps are cut where a contact or stop closes, faster than the tolerance a unit of
 // time; a step of size `smallest` follows, in which the impact happens. What bounces ever sooner, as a ball that comes
 // to rest, has impacts closer than `smallest`, and these steps double while nothing else lies between them: time goes
-// on. Contacts that close slowly, or pushed already, are part of the smooth motion.
+// on. Contacts that close slowly, or pushed already, are part of the smooth motion. So is an impact by which the step
+// does not err, since its method takes it at its own time or it does not matter.
+//
+// ---- Edges ----
+//
+// A method takes rows in the middle of a step. Where a body goes over an edge in the last quarter of a step, the
+// contact holds it until the end in the whole step and in both halves; in the first quarter, it lets go at once in all
+// of them. Their difference is 0, and the step is off by a quarter of its length. So the speeds of contacts are looked
+// at by the rows of both ends: what pushed must not open at the end, and what touched at the beginning and never pushed
+// must not be gone through. Where there is no edge these speeds are O(h²) for what pushes, and the second comes once,
+// where bodies part.
 
 double AdaptiveStepping::impact_step() const {
     constexpr double patience = 8.0;
     return std::min(control_.smallest * std::pow(2.0, std::max(0.0, impacts_ - patience)), control_.largest);
 }
 
-double AdaptiveStepping::time_to_closing(const Trial& trial) {
-    const State& state = trial.end;
-    double soonest = std::numeric_limits<double>::infinity();
+double AdaptiveStepping::moment() const {
+    return std::max(control_.smallest, moment_of_step * control_.largest);
+}
+
+void AdaptiveStepping::look_at_contacts(Trial& trial, double h) {
+    const std::vector<double>& v = trial.end.v;
+    double fastest = 0.0;
+    for (std::size_t i = 0; i < v.size(); ++i) fastest = std::max(fastest, std::abs(v[i]) / size(i));
+    trial.slow = control_.slow * std::max(1.0, rounding_of_speed * fastest / control_.absolute);
     pushed_.clear();
     for (const auto& [key, force] : trial.second.reactions)
         if (force[0] > 0.0) pushed_.push_back(key);
     std::sort(pushed_.begin(), pushed_.end());
-    system_.collect_unilateral(state, control_.smallest, rows_);
-    std::size_t row = 0;
-    for (const auto& block : rows_.blocks()) {
-        if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) {
-            const double speed = -rows_.speed(row, state.v.data());
-            if (speed > control_.absolute) soonest = std::min(soonest, rows_.rows()[row].gap / speed);
+    const auto pushed = [this](const UnilateralRows::Block& block) {
+        return std::binary_search(pushed_.begin(), pushed_.end(), block.key);
+    };
+    const double once = std::min(h / (share_of_event * control_.largest), 1.0);
+    const auto note = [&](double speed) {
+        const double beyond = speed - resolution_ * control_.slow / (control_.absolute * h);
+        trial.error = std::max(trial.error, once * share_of_wrong_speed * beyond / trial.slow);
+    };
+    system_.collect_unilateral(trial.end, moment(), rows_);
+    const bool steady = trial.second.impact_speed == 0.0;
+    for_each_normal(rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
+        if (pushed(block)) {
+            if (steady) note(speed);
+        } else if (-speed > trial.slow) {
+            trial.closes_in = std::min(trial.closes_in, -gap / speed);
         }
-        row += static_cast<std::size_t>(block.cone.rows);
-    }
-    return soonest;
+    });
+    if (!steady || trial.first.impact_speed > 0.0) return;
+    for_each_normal(begin_rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
+        if (std::abs(gap) <= system_.gap_resolution() && !pushed(block)) note(-speed);
+    });
 }
 
 double AdaptiveStepping::impact_in(const Trial& trial, double h) {
     if (!unilateral_) return std::numeric_limits<double>::infinity();
-    if (trial.first.impact_speed > control_.absolute) return trial.first.impact_time;
-    if (trial.second.impact_speed > control_.absolute) return 0.5 * h + trial.second.impact_time;
-    if (trial.whole.impact_speed > control_.absolute) return trial.whole.impact_time;
-    // A contact that no step knew: it was too far to be found where the last step began.
-    const double after = time_to_closing(trial);
-    return after < 0.0 ? std::max(h + after, 0.0) : std::numeric_limits<double>::infinity();
+    if (trial.first.impact_speed > trial.slow) return trial.first.impact_time;
+    if (trial.second.impact_speed > trial.slow) return 0.5 * h + trial.second.impact_time;
+    if (trial.whole.impact_speed > trial.slow) return trial.whole.impact_time;
+    return trial.missed() ? std::max(h + trial.closes_in, 0.0) : std::numeric_limits<double>::infinity();
 }
 
 // Trials from the open side: at speeds that stay, an open end says when the contact closes, and speeds change little in
@@ -213,7 +271,7 @@ AdaptiveStepping::Trial AdaptiveStepping::until_impact(const State& begin, doubl
         }
         open = guess;
         best = std::move(trial);
-        const double rest = time_to_closing(best);
+        const double rest = best.closes_in;
         if (rest <= close) break;
         guess = open + rest - 0.5 * close;
     }
@@ -250,6 +308,7 @@ AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double h, double 
 AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& solver) {
     memory_ = stepper_.save();
     report_ = {};
+    if (unilateral_) system_.collect_unilateral(state, moment(), begin_rows_);
     bool shrunk = false;
     double proposed = std::clamp(next_, control_.smallest, control_.largest);
     std::string failure = advice_;
@@ -268,13 +327,12 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         try {
             trial = take(state, h, solver);
             const double impact = impact_in(trial, h);
-            if (impact > impact_step() && std::isfinite(impact)) {
+            if (std::isfinite(impact) && (trial.error > faint_impact || trial.missed())) {
+                if (impact <= impact_step()) return take_impact(state, impact_step(), end, solver);
                 trial = until_impact(state, impact, h, solver);
                 // What comes before the impact or what would remain is no step by itself.
                 if (h < control_.smallest || remaining - h < control_.smallest)
                     return take_impact(state, h + impact_step(), end, solver);
-            } else if (impact <= impact_step()) {
-                return take_impact(state, impact_step(), end, solver);
             }
         } catch (const StepFailure& error) {
             if (smallest) throw;

@@ -75,7 +75,8 @@ struct StepSolver::Implementation {
         return kind.parts[number];
     }
 
-    double share_of_tolerance = 1.0;  // solve_to()
+    double share_of_tolerance = 1.0;   // solve_to()
+    std::vector<double> error_bounds;  // bound_errors()
 
     bool solve(Problem& problem, Solution& solution, const StepRequest& request);
     bool solve_whole(KeptKind& kind, Problem& problem, Solution& solution, const StepRequest& request);
@@ -316,12 +317,14 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
                          .corrects = request.corrects,
                          .share = share_of_tolerance};
     if (!request.method_error.empty()) {
-        kept.method_error.assign(request.method_error.begin(), request.method_error.end());
         island.error_of_solves = largest(request.error_of_solves, columns);
-        if (!columns.empty()) {
-            kept.method_error.clear();
-            for (const std::int32_t column : columns)
-                kept.method_error.push_back(request.method_error[static_cast<std::size_t>(column)]);
+        kept.method_error.clear();
+        const std::size_t count = columns.empty() ? request.method_error.size() : columns.size();
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t column = columns.empty() ? i : static_cast<std::size_t>(columns[i]);
+            const double error = request.method_error[column],
+                         bound = error_bounds.empty() ? HUGE_VAL : error_bounds[column];
+            kept.method_error.push_back(std::clamp(error, -bound, bound));
         }
         island.method_error = kept.method_error;
     }
@@ -398,6 +401,10 @@ const SolverEffort& StepSolver::effort() const {
 void StepSolver::reset_effort() {
     implementation_->effort = {};
 }
+void StepSolver::bound_errors(std::vector<double> bounds) {
+    implementation_->error_bounds = std::move(bounds);
+}
+
 void StepSolver::solve_to(double share) {
     implementation_->share_of_tolerance = share;
 }

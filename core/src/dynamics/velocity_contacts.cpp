@@ -535,7 +535,9 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         }
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
         if (settings_.once && speed <= 0.25 * contact.change) continue;
-        if ((contact.approach < 0.0 || !contact.pushed) && speed > report.impact_speed) {
+        const double e = rows_.blocks()[k].restitution;
+        const bool comes_back = e > 0.0 && -contact.approach > e * settings_.restitution_speed;
+        if ((comes_back || !contact.pushed) && speed > report.impact_speed) {
             report.impact_speed = speed;
             report.impact_time = contact.approach < 0.0 ? h_ : gap / speed;
         }

@@ -189,6 +189,14 @@ double MultibodySystem::size_of_shapes() const {
     return implementation_->size;
 }
 
+double MultibodySystem::extent_of_shapes(BodyIndex body) const {
+    double largest = 0.0;
+    for (const Shape& shape : shapes())
+        if (const double extent = largest_extent(shape); shape.body == body && std::isfinite(extent))
+            largest = std::max(largest, extent);
+    return largest;
+}
+
 double MultibodySystem::free_fall() const {
     return vector(implementation_->gravity).norm();
 }

@@ -176,7 +176,9 @@ bool mostly_without_joints(const SceneSystem& system) {
 /// How fast forces are, for a method that takes h ω up to these limits; empty: it takes them.
 std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
     // A tolerance chooses its steps; these are as long as its users take them.
-    const double step = system.control ? std::min(system.control->largest, 0.01) : system.step;
+    const double step = system.control             ? std::min(system.control->largest, 0.01)
+                        : system.steps_by_accuracy ? std::min(system.step, 0.01)
+                                                   : system.step;
     Rates rates(*system.system);
     if (rates.fastest().within(most, step)) return {};
     if (system.system->m() > 0) rates.hold_joints();
@@ -203,11 +205,12 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         choose_in_touch(system, in_joints ? "bodies may touch, most of these have no joints" : "bodies may touch");
         return;
     }
+    const bool chosen_steps = system.control || system.steps_by_accuracy;
     if (!in_joints || (system.control && !touching)) {
         system.method_reason = "joints have stops, dry friction or forces with limits";
         return;
     }
-    const bool switches = touching && !system.control, flies = switches && !always_acts(system);
+    const bool switches = touching && !chosen_steps, flies = switches && !always_acts(system);
     const std::string stiff =
         why_stiff(system, flies ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
                                 : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2});
@@ -256,7 +259,7 @@ void choose_method(SceneSystem& system) {
     if (in_joints) system.coordinates = Coordinates::Joint;
     system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";
     system.method_reason = "nothing can touch, and " + (stiff.empty() ? "no force is stiff" : stiff);
-    if (!system.control)
+    if (!system.control && !system.steps_by_accuracy)
         system.integrator_options.insert_or_assign("error_limit",
                                                    stiff.empty() ? error_limit_of_explicit : error_limit);
 }

@@ -89,12 +89,16 @@ void put_values(const SceneOverrides& overrides, Source& source, YAML::Node map)
         source.comes_from(node, fmt::format("--{} {}", key, *value));
         map[key] = node;
     };
+    if (overrides.accuracy && overrides.tolerance)
+        throw InputError("--accuracy and --tolerance exclude each other: steps follow from one of them");
     if (overrides.step && overrides.tolerance)
         throw InputError("--step is for fixed steps, --tolerance for steps that follow from it; give one of them");
-    if (overrides.step) map.remove("tolerance");
+    if (overrides.step || overrides.accuracy) map.remove("tolerance");
+    if (overrides.tolerance) map.remove("accuracy");
     if (overrides.tolerance && map["step"].IsDefined() && map["step"].IsScalar()) map.remove("step");
     put("step", overrides.step);
     put("tolerance", overrides.tolerance);
+    put("accuracy", overrides.accuracy);
     put("end", overrides.end);
     if (overrides.leave_out) map["leave_out"] = *overrides.leave_out;
 }

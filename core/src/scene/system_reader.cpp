@@ -22,7 +22,11 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"gravity", [this](const YAML::Node& n) { gravity_ = vector3(source_, n, "gravity"); }},
         {"step", [this](const YAML::Node& n) { read_step(n); }},
         {"tolerance", [this](const YAML::Node& n) { read_tolerance(n); }},
-        {"accuracy", [this](const YAML::Node& n) { result_.accuracy = positive_number(source_, n, "accuracy"); }},
+        {"accuracy",
+         [this](const YAML::Node& n) {
+             result_.accuracy = positive_number(source_, n, "accuracy");
+             result_.steps_by_accuracy = true;
+         }},
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"sleeping", [this](const YAML::Node& n) { read_sleeping(n); }},
         {"start", [this](const YAML::Node& n) { read_start(n); }},
@@ -195,6 +199,8 @@ void SystemReader::build_step(const YAML::Node& place) {
         result_.step = *step_;
         return;
     }
+    if (result_.steps_by_accuracy)
+        source_.refuse(place, "an \"accuracy\" and a \"tolerance\" exclude each other: steps follow from one of them");
     if (step_)
         source_.refuse(step_node_,
                        "a fixed \"step\" and a \"tolerance\" exclude each other; bounds of the step are given as "

@@ -85,7 +85,10 @@ void Simulation::advance(State& state, AdaptiveStepReport& report, const std::ve
     if (ahead_) {
         advance_ahead(state, step.end, report.step);
     } else if (control_) {
-        record_.parts = step_within_error(*control_, state, step.end, *solver_, report.step).taken;
+        const Parts parts = step_within_error(*control_, state, step.end, *solver_, report.step);
+        record_.parts = parts.taken;
+        report.rejected = parts.rejected;
+        report.error = parts.error;
     } else {
         if (energy_) energy_->begin(now_.totals, state.t, report.h);
         while (!advance_fixed(state, report, memory)) {
@@ -128,7 +131,7 @@ void Simulation::show_ahead(State& state, double end, StepReport& report) {
         ahead_->read(end, state);
         std::vector<double> off(static_cast<std::size_t>(dynamics().m()));
         dynamics().constraint(state, off.data());
-        const double limit = timestepper_->error_limit();
+        const double limit = std::min(timestepper_->error_limit(), system_->accuracy);
         if (std::any_of(off.begin(), off.end(), [limit](double C) { return !(std::abs(C) <= limit); })) throw;
     }
 }

@@ -17,6 +17,7 @@ Parts step_within_error(AdaptiveStepping& control, State& state, double end, Ste
         part.step.follow(report);
         std::swap(report, part.step);
         parts.rejected += part.rejected;
+        parts.error = std::max(parts.error, part.error);
     }
     return parts;
 }

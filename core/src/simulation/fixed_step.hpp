@@ -56,6 +56,7 @@ inline constexpr std::int64_t most_parts = 64;
 struct Parts {
     std::int64_t taken = 0;
     std::int32_t rejected = 0;  ///< trials that were thrown away
+    double error = 0.0;         ///< the largest of AdaptiveStepReport::error
 };
 
 /// Parts until the time `end`, as long as their errors allow. report ← that of all of them.

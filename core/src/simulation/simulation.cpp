@@ -19,6 +19,7 @@
 #include "simulation/method_change.hpp"
 #include "simulation/overlap_watch.hpp"
 #include "simulation/shared_run.hpp"
+#include "simulation/sizes_of_motion.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
 #include "simulation/touching.hpp"
@@ -104,6 +105,11 @@ void choose_method_to_share(SceneSystem& system, const Registry& registry) {
     if (system.coordinates_chosen) system.coordinates = Coordinates::Maximal;
 }
 
+/// Of a step: in which an impact happens by itself. What lands flat lands on all its corners in it, though rounding
+/// tilts it.
+constexpr double shortest_impact = 1e-4;
+/// Of an accuracy: what solves may err by.
+constexpr double share_of_solves = 0.1;
 /// Of the energy that can have moved: a change that a plot would show.
 constexpr double visible_share = 0.05;
 
@@ -148,8 +154,10 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
             if (in_joints)
                 throw Unsupported("bodies cannot sleep in joint coordinates; remove \"sleeping\" or \"coordinates\"");
             require_sleeping(system);
-            if (system.control)
-                throw InputError("bodies may sleep with a fixed step only; give a \"step\" instead of a \"tolerance\"");
+            if (system.control || system.steps_by_accuracy)
+                throw InputError(
+                    fmt::format("bodies may sleep with a fixed step only; {}",
+                                system.control ? "give a \"step\" instead of a \"tolerance\"" : "remove \"accuracy\""));
             sleeping_ = std::make_unique<Sleeping>(*system.system, *system.sleeping);
             solver_->let_rest(sleeping_.get());
         }
@@ -205,6 +213,7 @@ void Simulation::share(const Registry& registry) {
     if (system_->coordinates == Coordinates::Joint) refuse("in joint coordinates", "remove \"coordinates\", or ");
     if (system_->sleeping) refuse("in which bodies sleep", "remove \"sleeping\", or ");
     if (system_->control) refuse("with steps chosen by a tolerance", "give a fixed \"step\", or ");
+    if (system_->steps_by_accuracy) refuse("with steps that follow from an accuracy", "remove \"accuracy\", or ");
     if (!system_->leave_out) refuse("of which nothing is left out", "");
     shared_ = std::make_unique<SharedRun>(*system_, communicator_of_run(), registry, *solver_);
 }
@@ -222,9 +231,23 @@ void Simulation::make_method() {
     }
     if (system_->control) {
         control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
-    } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
+        return;
+    }
+    const double named = timestepper_->error_limit();
+    const bool by_accuracy = system_->steps_by_accuracy && !std::isfinite(named);
+    if (by_accuracy || std::isfinite(named)) {
+        StepControl control = control_within(by_accuracy ? system_->accuracy : named, system_->step);
+        if (by_accuracy) {
+            SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
+            control.sizes = std::move(sizes.of_velocities);
+            control.slow = control.absolute * sizes.least;
+            if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
+            std::vector<double> bounds = control.sizes;
+            for (double& bound : bounds) bound *= share_of_solves * control.absolute;
+            solver_->bound_errors(std::move(bounds));
+        }
         control_ = std::make_unique<AdaptiveStepping>(
-            dynamics(), *timestepper_, control_within(limit, system_->step),
+            dynamics(), *timestepper_, control,
             fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
                         "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
                         method().integrator));
@@ -458,6 +481,7 @@ const StepRecord& Simulation::step() {
     totals.repeated_solves += effort.repeated;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
+    if (system_->steps_by_accuracy && taken.error > 1.0) ++totals.inexact_steps;
     if (!deep_.empty()) {
         ++totals.deep_steps;
         if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
@@ -589,6 +613,11 @@ std::vector<std::string> Simulation::warnings() const {
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
     if (overlaps_ && !overlaps_->at_start().empty())
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
+    if (const auto& totals = now_.totals; totals.inexact_steps > 0)
+        sentences.push_back(fmt::format(
+            "system \"{}\": {} of {} steps are less exact than accuracy: {:.3g} asks, however short their parts: what "
+            "touches there comes and goes by rounding",
+            system_->name, totals.inexact_steps, now_.step, system_->accuracy));
     if (const auto& totals = now_.totals; totals.deep_steps > 0)
         sentences.push_back(
             fmt::format("{} of {} steps leave bodies in one another by more than \"accuracy\" allows, and shorter "

@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 35> total_columns = {{
+inline constexpr std::array<TotalColumn, 36> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -125,6 +125,8 @@ inline constexpr std::array<TotalColumn, 35> total_columns = {{
     {"divided_steps", "1", "fixed steps that the method could not take in one", &SimulationTotals::divided_steps,
      "/divided_steps"},
     {"most_parts", "1", "that one of them was divided into", &SimulationTotals::most_parts, "/most_parts"},
+    {"inexact_steps", "1", "steps with a part that errs by more than the accuracy asks, however short it is",
+     &SimulationTotals::inexact_steps, "/inexact_steps"},
     {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",
      &SimulationTotals::deep_steps, "/deep_steps"},
     {"first_deep", "", "when and which the first time", &SimulationTotals::first_deep, "/first_deep"},

@@ -65,8 +65,8 @@ for package in importlib.metadata.distributions():
             known = package.metadata
             rows.setdefault(point.name, {
                 "name": point.name, "python": point.value, "version": package.version,
-                "description": known["Summary"] or "", "package": f"{known['Name']} {package.version}",
-                "licence": (known["License-Expression"] or known["License"] or "unknown").split("\n")[0]})
+                "description": known.get("Summary") or "", "package": f"{known['Name']} {package.version}",
+                "licence": (known.get("License-Expression") or known.get("License") or "unknown").split("\n")[0]})
 text = b"L" + json.dumps(sorted(rows.values(), key=lambda row: row["name"])).encode()
 sys.stdout.flush()
 os.write(0, struct.pack("=Q", len(text)))
