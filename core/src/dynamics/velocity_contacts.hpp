@@ -150,6 +150,7 @@ private:
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
+    void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);
     /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
     /// that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);

@@ -39,16 +39,30 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
     return true;
 }
 
-// The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). The row of that time, which
-// stays, meets at the same time from another gap.
+// Where a contact touches and did not push, its rows stay those of the middle, and its rates become those of the end.
+void VelocityContacts::take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.cone.rows); ++i) {
+        double& rate = rows_.rows()[contact.row + i].rate;
+        rate += (1.0 - theta_) / theta_ * (rate - before_.rows()[contact.before + i].rate);
+    }
+}
+
+// The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate,
+// whose means are those of times θ h/2 apart; the speed at the beginning is that with the rate of this instant. The row
+// of the meeting, which stays, meets at the same time from another gap.
 void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
         double gap = contact.resolved_gap();
         const bool bounces = block.restitution > 0.0;
-        if (!contact.along_normal || !(bounces || (gap > 0.0 && !contact.pushed))) continue;
-        double speed = -contact.approach;
+        if (!contact.along_normal) continue;
+        if (!bounces && !contact.pushed && gap <= 0.0 && contact.known) take_rates_of_end(contact, block);
+        if (!bounces && (contact.pushed || gap <= 0.0)) continue;
+        const double rate = contact.known && !contact.met_on_the_way ? before_.rows()[contact.before].rate
+                                                                     : rows_.rows()[contact.row].rate;
+        const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
+        double speed = -contact.approach - 0.5 * h_ * pull;
         if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap)) continue;  // it corrects
         const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
         const auto speed_of = [&](const double* v) {
@@ -59,7 +73,8 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             return bounce_within(h_, from, begin, acceleration() + turning, block.restitution);
         };
         const double open = std::max(contact.gap, 0.0);
-        const double turning = contact.met_on_the_way ? 0.0 : (block.speed - speed) / (theta_ * h_);
+        const double turning =
+            contact.met_on_the_way ? 0.0 : pull + (block.speed + contact.approach - change) / (theta_ * h_);
         const auto meeting = meeting_from(open, speed, turning);
         const double time = meeting ? meeting->meets : h_;
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
