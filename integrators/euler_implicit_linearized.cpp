@@ -397,13 +397,7 @@ private:
             for (std::int32_t i = 0; i < std::min(rows, 3); ++i) acted.force[i] = lambda[m_ + first + i] / h;
             if (reaction != 0.0) ++report.active_blocks;
             if (!along_normal || !(reaction > 0.0)) continue;
-            const double speed = std::max(std::abs(approach), gap / h);
-            const double e = rows_.blocks()[k].restitution;
-            const bool comes_back = e > 0.0 && -approach > e * restitution_speed_;
-            if ((comes_back || !pushed_before) && speed > report.impact_speed) {
-                report.impact_speed = speed;
-                report.impact_time = approach < 0.0 ? h : gap / speed;
-            }
+            note_impact(rows_.blocks()[k], gap, approach, pushed_before, h, restitution_speed_, report);
         }
         std::size_t entry = 0;
         for (const auto& [block, rate, recovery, end] : penetrating_) {

@@ -535,12 +535,7 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         }
         const double gap = std::max(contact.gap, 0.0), speed = std::max(std::abs(contact.approach), gap / h_);
         if (settings_.once && speed <= 0.25 * contact.change) continue;
-        const double e = rows_.blocks()[k].restitution;
-        const bool comes_back = e > 0.0 && -contact.approach > e * settings_.restitution_speed;
-        if ((comes_back || !contact.pushed) && speed > report.impact_speed) {
-            report.impact_speed = speed;
-            report.impact_time = contact.approach < 0.0 ? h_ : gap / speed;
-        }
+        note_impact(rows_.blocks()[k], gap, contact.approach, contact.pushed, h_, settings_.restitution_speed, report);
     }
     kept_.keep(rows_.blocks(), rows_.contacts(), std::span(lambda).subspan(first_row_));
     const std::size_t first_contact = contacts_.size() - rows_.contacts().size();
@@ -572,6 +567,15 @@ OptionInfo recovery_speed_option() {
             .doc =
                 "largest speed with which penetration that a step finds is undone; negative: a hundredth of the speed "
                 "that a fall through the size of the shapes gives"};
+}
+
+void note_impact(const UnilateralRows::Block& block, double gap, double approach, bool pushed, double h,
+                 double restitution_speed, StepReport& report) {
+    const double speed = std::max(std::abs(approach), gap / h), e = block.restitution;
+    const bool comes_back = e > 0.0 && -approach > e * restitution_speed;
+    if ((pushed && !comes_back) || speed <= report.impact_speed) return;
+    report.impact_speed = speed;
+    report.impact_time = approach < 0.0 ? h : gap / speed;
 }
 
 OptionInfo restitution_speed_option() {

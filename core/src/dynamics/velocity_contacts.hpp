@@ -179,6 +179,11 @@ private:
     bool coulomb_ = false, settled_ = true;
 };
 
+/// report ← the impact of a normal row that pushes, if it is one and the fastest so far: it did not push in the step
+/// before, or it opens as fast as what bounced does. gap, approach: at the beginning, the latter the speed of closing.
+void note_impact(const UnilateralRows::Block& block, double gap, double approach, bool pushed, double h,
+                 double restitution_speed, StepReport& report);
+
 /// The options of timesteppers that take contacts, and what their values say.
 OptionInfo recovery_speed_option();
 OptionInfo restitution_speed_option();

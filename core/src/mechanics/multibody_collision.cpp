@@ -191,9 +191,10 @@ double MultibodySystem::size_of_shapes() const {
 
 double MultibodySystem::extent_of_shapes(BodyIndex body) const {
     double largest = 0.0;
-    for (const Shape& shape : shapes())
-        if (const double extent = largest_extent(shape); shape.body == body && std::isfinite(extent))
-            largest = std::max(largest, extent);
+    for (const Shape& shape : shapes()) {
+        if (shape.body != body) continue;
+        if (const double extent = largest_extent(shape); std::isfinite(extent)) largest = std::max(largest, extent);
+    }
     return largest;
 }
 

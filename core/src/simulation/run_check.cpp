@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "delassus/timestepper.hpp"
 #include "simulation/run_loop.hpp"
@@ -122,12 +121,9 @@ private:
 }  // namespace
 
 Track::Track(const Simulation& simulation) {
-    low_.fill(std::numeric_limits<double>::infinity());
-    high_.fill(-std::numeric_limits<double>::infinity());
     for (const BodyParameters& body : simulation.system().bodies) {
         if (body.fixed || body.motion || !(body.mass > 0.0)) continue;
-        const double largest = std::max({body.inertia.xx, body.inertia.yy, body.inertia.zz});
-        gyration_ = std::max(gyration_, std::sqrt(largest / body.mass));
+        gyration_ = std::max(gyration_, radius_of_gyration(body));
     }
     add(simulation);
 }
@@ -137,16 +133,10 @@ void Track::add(const Simulation& simulation) {
     if (!kept) return;
     frames_.push_back(frame_of(simulation));
     const Frame& frame = frames_.back();
-    const auto widen = [this](const Vector3& place) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            low_[i] = std::min(low_[i], place[i]);
-            high_[i] = std::max(high_[i], place[i]);
-        }
-    };
     const auto& bodies = simulation.system().bodies;
     for (std::size_t i = 0; i < frame.poses.size(); ++i)
-        if (i >= bodies.size() || !(bodies[i].fixed || bodies[i].motion)) widen(frame.poses[i].position);
-    for (const Vector3& place : frame.nodes) widen(place);
+        if (i >= bodies.size() || !(bodies[i].fixed || bodies[i].motion)) places_.widen(frame.poses[i].position);
+    for (const Vector3& place : frame.nodes) places_.widen(place);
     if (frames_.size() * (7 * frame.poses.size() + 3 * frame.nodes.size()) <= most_numbers) return;
     std::size_t count = 0;
     for (std::size_t i = 0; i < frames_.size(); i += 2) std::swap(frames_[count++], frames_[i]);
@@ -155,8 +145,7 @@ void Track::add(const Simulation& simulation) {
 }
 
 double Track::extent() const {
-    const double box = low_[0] <= high_[0] ? 0.5 * distance(low_, high_) : 0.0;
-    return std::max(box, gyration_);
+    return std::max(places_.half_diagonal(), gyration_);
 }
 
 void halve_errors(SceneSystem& system) {

@@ -10,6 +10,7 @@
 
 #include "delassus/export.hpp"
 #include "delassus/simulation.hpp"
+#include "simulation/extent.hpp"
 
 namespace delassus {
 
@@ -34,7 +35,7 @@ public:
 private:
     std::vector<Frame> frames_;
     std::size_t every_ = 1, seen_ = 0;
-    Vector3 low_{}, high_{};
+    Extent places_;
     double gyration_ = 0.0;
 };
 

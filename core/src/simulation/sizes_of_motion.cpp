@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
+
+#include "simulation/extent.hpp"
 
 namespace delassus {
 namespace {
@@ -19,7 +20,7 @@ public:
         for (const auto& beam : scene.beams) unite(beam[0], beam[1]);
         for (const AttachmentParameters& attachment : scene.attachments)
             if (moves(attachment.body)) root_[find(static_cast<std::size_t>(attachment.body))] = find(root_.size() - 1);
-        boxes_.resize(root_.size());
+        sizes_.resize(root_.size());
         measure();
     }
 
@@ -28,16 +29,9 @@ public:
     [[nodiscard]] double size_with_nodes() const { return size_of(root_.size() - 1); }
 
 private:
-    struct Box {
-        Vector3 low = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    struct Size {
+        Extent places;
         double least = 0.0;
-
-        void widen(const Vector3& place) {
-            for (std::size_t i = 0; i < 3; ++i) {
-                low[i] = std::min(low[i], place[i]);
-                high[i] = std::max(high[i], place[i]);
-            }
-        }
     };
 
     [[nodiscard]] bool moves(BodyIndex body) const { return body != world_body && system_.body_column(body) >= 0; }
@@ -49,40 +43,38 @@ private:
         if (moves(one) && moves(other))
             root_[find(static_cast<std::size_t>(one))] = find(static_cast<std::size_t>(other));
     }
-    Box& box_with(BodyIndex body) { return boxes_[find(static_cast<std::size_t>(body))]; }
+    Size& of(BodyIndex body) { return sizes_[find(static_cast<std::size_t>(body))]; }
     [[nodiscard]] double size_of(std::size_t one) const {
-        const auto& [low, high, least] = boxes_[find(one)];
-        const double diagonal = std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-        return low[0] <= high[0] ? std::max(0.5 * diagonal, least) : least;
+        const auto& [places, least] = sizes_[find(one)];
+        return std::max(places.half_diagonal(), least);
     }
 
     void measure() {
         const State start = system_.initial_state();
         for (BodyIndex body = 0; body < system_.body_count(); ++body) {
             if (!moves(body)) continue;
-            Box& box = box_with(body);
-            box.widen(system_.pose(start, body).position);
-            box.least = std::max(box.least, 0.5 * system_.extent_of_shapes(body));
+            Size& size = of(body);
+            size.places.widen(system_.pose(start, body).position);
+            size.least = std::max(size.least, 0.5 * system_.extent_of_shapes(body));
             const BodyParameters& given = system_.body(body);
-            const double moment = std::max({given.inertia.xx, given.inertia.yy, given.inertia.zz});
-            if (!given.massless) box.least = std::max(box.least, std::sqrt(moment / given.mass));
+            if (!given.massless) size.least = std::max(size.least, radius_of_gyration(given));
         }
         for (const JointParameters& joint : scene_.joints) {
             const auto widen = [&](BodyIndex body, const Vector3& place) {
-                if (moves(body)) box_with(body).widen(place);
+                if (moves(body)) of(body).places.widen(place);
             };
             if (joint.kind == JointKind::Gear) continue;
             widen(joint.first, joint.point);
             widen(joint.second, joint.kind == JointKind::Distance ? joint.second_point : joint.point);
         }
         for (std::int32_t node = 0; node < system_.node_count(); ++node)
-            boxes_[find(root_.size() - 1)].widen(system_.node_position(start, node));
+            sizes_[find(root_.size() - 1)].places.widen(system_.node_position(start, node));
     }
 
     const SceneSystem& scene_;
     const MultibodySystem& system_;
     std::vector<std::size_t> root_;
-    std::vector<Box> boxes_;
+    std::vector<Size> sizes_;
 };
 
 /// How many of a joint's velocities are lengths; they come first.
