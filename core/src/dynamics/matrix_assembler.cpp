@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <numeric>
 
 #include "delassus/error.hpp"
@@ -46,18 +45,30 @@ void MatrixAssembler::sum_up(Array<double>& values) const {
 }
 
 void MatrixAssembler::find_pattern() {
+    // A stable counting sort of places by keys from 0 to keys − 1: those of one key stay in the order of `before`, or
+    // in that of adding. By columns and then by rows, this takes time in proportion to the places.
+    std::vector<std::size_t> start;
+    const auto sort_by = [&](std::vector<std::int32_t>& sorted, const std::vector<std::int32_t>& before,
+                             std::int32_t keys, const auto& key) {
+        start.assign(static_cast<std::size_t>(keys) + 1, 0);
+        for (std::size_t k = 0; k < count_; ++k) ++start[static_cast<std::size_t>(key(k)) + 1];
+        std::partial_sum(start.begin(), start.end(), start.begin());
+        sorted.resize(count_);
+        for (std::size_t i = 0; i < count_; ++i) {
+            const std::size_t k = before.empty() ? i : static_cast<std::size_t>(before[i]);
+            sorted[start[static_cast<std::size_t>(key(k))]++] = static_cast<std::int32_t>(k);
+        }
+    };
     places_.resize(count_);
     values_.resize(count_);
     for (const Place& place : places_)
         if (place.row < 0 || place.row >= matrix_.rows || place.column < 0 || place.column >= matrix_.columns)
             throw InputError(fmt::format("a matrix of {} x {} was given an entry at ({}, {})", matrix_.rows,
                                          matrix_.columns, place.row, place.column));
-    std::vector<std::int32_t> order(count_);
-    std::iota(order.begin(), order.end(), 0);
+    std::vector<std::int32_t> by_column, order;
+    sort_by(by_column, {}, matrix_.columns, [&](std::size_t k) { return places_[k].column; });
+    sort_by(order, by_column, matrix_.rows, [&](std::size_t k) { return places_[k].row; });
     const auto at = [&](std::int32_t k) -> const Place& { return places_[static_cast<std::size_t>(k)]; };
-    std::stable_sort(order.begin(), order.end(), [&](std::int32_t first, std::int32_t second) {
-        return at(first).row != at(second).row ? at(first).row < at(second).row : at(first).column < at(second).column;
-    });
     slot_.resize(count_);
     matrix_.row_start.assign(static_cast<std::size_t>(matrix_.rows) + 1, 0);
     matrix_.column.clear();

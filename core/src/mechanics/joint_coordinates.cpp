@@ -66,7 +66,8 @@ struct JointCoordinates::Implementation {
     // Work space of the call that runs:
     State state;  // of the bodies
     std::vector<double> force, rates;
-    MatrixAssembler matrix, rows;
+    // One for each matrix of the bodies, so that its pattern lasts from call to call.
+    MatrixAssembler stiffness, damping, gyroscopic, pull_of_rows, rows, joint_rows;
     UnilateralRows body_rows;
     std::vector<FreeSpin> body_spins;
     struct Loaded {
@@ -80,6 +81,9 @@ struct JointCoordinates::Implementation {
     };
     std::vector<Entry> entries;
     std::vector<std::pair<std::int32_t, Vector6>> way, other_way;
+    std::vector<std::int32_t> other_bodies, reached;
+    std::vector<char> reaches;
+    std::vector<Vector6> pushed;
 
     /// A body that a free joint holds and that carries none: its gyroscopic torque is that of free_spins().
     [[nodiscard]] bool spins_alone(std::size_t k) const {
@@ -165,29 +169,40 @@ struct JointCoordinates::Implementation {
     /// H += factor · Jᵀ A J, or Jᵀ A ∂(J u)/∂q; A: of the bodies.
     void project_matrix(const SparseMatrix& A, double factor, bool along_velocities, MatrixAssembler& H) {
         const auto blocks = static_cast<std::size_t>(A.rows / 6);
-        std::vector<std::int32_t> columns;
+        reaches.assign(static_cast<std::size_t>(tree.n()), 0);
+        pushed.assign(reaches.size(), Vector6::Zero());
         for (std::size_t row = 0; row < blocks; ++row) {
-            columns.clear();
+            // A times the columns of J that reach these six rows, each once.
+            reached.clear();
+            other_bodies.clear();
             const auto begin = static_cast<std::size_t>(A.row_start[6 * row]),
                        end = static_cast<std::size_t>(A.row_start[6 * row + 6]);
-            for (std::size_t e = begin; e < end; ++e) columns.push_back(A.column[e] / 6);
-            std::sort(columns.begin(), columns.end());
-            columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
-            if (columns.empty()) continue;
-            columns_of(link_at[row], way);
-            for (const std::int32_t column : columns) {
+            for (std::size_t e = begin; e < end; ++e)
+                if (other_bodies.empty() || other_bodies.back() != A.column[e] / 6)
+                    other_bodies.push_back(A.column[e] / 6);
+            std::sort(other_bodies.begin(), other_bodies.end());
+            other_bodies.erase(std::unique(other_bodies.begin(), other_bodies.end()), other_bodies.end());
+            for (const std::int32_t body : other_bodies) {
                 mechanics::Matrix6 block = mechanics::Matrix6::Zero();
                 for (std::size_t i = 0; i < 6; ++i)
                     for (auto e = static_cast<std::size_t>(A.row_start[6 * row + i]);
                          e < static_cast<std::size_t>(A.row_start[6 * row + i + 1]); ++e)
-                        if (A.column[e] / 6 == column)
-                            block(static_cast<Eigen::Index>(i), A.column[e] % 6) += A.value[e];
-                const std::size_t other = link_at[static_cast<std::size_t>(column)];
+                        if (A.column[e] / 6 == body) block(static_cast<Eigen::Index>(i), A.column[e] % 6) += A.value[e];
+                const std::size_t other = link_at[static_cast<std::size_t>(body)];
                 columns_of(other, other_way);
                 for (auto& [j, J] : other_way) {
-                    const Vector6 product = block * (along_velocities ? derivatives.turned_velocity(other, j) : J);
-                    for (const auto& [i, own] : way) H.add(i, j, factor * own.dot(product));
+                    if (!reaches[static_cast<std::size_t>(j)]) reached.push_back(j);
+                    reaches[static_cast<std::size_t>(j)] = 1;
+                    pushed[static_cast<std::size_t>(j)] +=
+                        block * (along_velocities ? derivatives.turned_velocity(other, j) : J);
                 }
+            }
+            if (reached.empty()) continue;
+            columns_of(link_at[row], way);
+            for (const std::int32_t j : reached) {
+                for (const auto& [i, own] : way) H.add(i, j, factor * own.dot(pushed[static_cast<std::size_t>(j)]));
+                pushed[static_cast<std::size_t>(j)].setZero();
+                reaches[static_cast<std::size_t>(j)] = 0;
             }
         }
     }
@@ -468,15 +483,15 @@ void JointCoordinates::add_stiffness(const State& state, double factor, Tangent 
     const bool forces = self.bodies.has_stiffness(), exact = tangent == Tangent::Exact;
     if (exact) self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
     if (forces) {
-        self.matrix.begin(n, n);
-        self.bodies.add_stiffness(self.state, 1.0, tangent, self.matrix);
-        self.project_matrix(self.matrix.finish(), factor, false, H);
+        self.stiffness.begin(n, n);
+        self.bodies.add_stiffness(self.state, 1.0, tangent, self.stiffness);
+        self.project_matrix(self.stiffness.finish(), factor, false, H);
     }
     if (!exact || !self.turns) return;
     if (forces) {
-        self.matrix.begin(n, n);
-        self.bodies.add_damping(self.state, 1.0, tangent, self.matrix);
-        self.project_matrix(self.matrix.finish(), factor, true, H);
+        self.damping.begin(n, n);
+        self.bodies.add_damping(self.state, 1.0, tangent, self.damping);
+        self.project_matrix(self.damping.finish(), factor, true, H);
         self.derivatives.geometry(self.forces_beside_weight().data(), self.adder(-factor, H));
     }
     self.derivatives.positions(self.adder(factor, H));
@@ -487,9 +502,9 @@ void JointCoordinates::add_damping(const State& state, double factor, Tangent ta
     self.place(state);
     const std::int32_t n = self.bodies.n();
     if (self.bodies.has_stiffness()) {
-        self.matrix.begin(n, n);
-        self.bodies.add_damping(self.state, 1.0, tangent, self.matrix);
-        self.project_matrix(self.matrix.finish(), factor, false, H);
+        self.damping.begin(n, n);
+        self.bodies.add_damping(self.state, 1.0, tangent, self.damping);
+        self.project_matrix(self.damping.finish(), factor, false, H);
     }
     if (tangent != Tangent::Exact || !self.turns) return;
     self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
@@ -501,9 +516,9 @@ void JointCoordinates::add_gyroscopic_damping(const State& state, double factor,
     auto& self = *implementation_;
     self.place(state);
     const std::int32_t n = self.bodies.n();
-    self.matrix.begin(n, n);
-    self.bodies.add_gyroscopic_damping(self.state, factor, tangent, self.matrix);
-    const SparseMatrix& R = self.matrix.finish();
+    self.gyroscopic.begin(n, n);
+    self.bodies.add_gyroscopic_damping(self.state, factor, tangent, self.gyroscopic);
+    const SparseMatrix& R = self.gyroscopic.finish();
     for (std::int32_t row = 0; row < n; ++row) {
         const std::size_t k = self.link_at[static_cast<std::size_t>(row / 6)];
         if (!self.spins_alone(k)) continue;
@@ -588,10 +603,10 @@ void JointCoordinates::add_constraint_stiffness(const State& state, const double
     if (m() == 0 || tangent != Tangent::Exact) return;
     self.place(state);
     const std::int32_t n = self.bodies.n();
-    self.matrix.begin(n, n);
-    self.bodies.add_constraint_stiffness(self.state, lambda, 1.0, tangent, self.matrix);
+    self.pull_of_rows.begin(n, n);
+    self.bodies.add_constraint_stiffness(self.state, lambda, 1.0, tangent, self.pull_of_rows);
     self.derivatives.set_motion(state.v.data(), Vector3d::Zero());
-    self.project_matrix(self.matrix.finish(), factor, false, H);
+    self.project_matrix(self.pull_of_rows.finish(), factor, false, H);
     self.rows.begin(m(), n);
     self.bodies.add_constraint_jacobian(self.state, 0, self.rows);
     self.force.assign(self.force.size(), 0.0);
@@ -651,9 +666,9 @@ std::vector<double> JointCoordinates::tree_reactions(const State& state, const s
     for (std::size_t i = 0; i < f.size(); ++i) wanting[i] -= f[i];
     self.add_rotors(moving.v.data(), wanting.data());
 
-    self.rows.begin(self.bodies.constraint_rows(), bodies);
-    self.bodies.add_joint_jacobian(self.state, self.rows);
-    const SparseMatrix& C = self.rows.finish();
+    self.joint_rows.begin(self.bodies.constraint_rows(), bodies);
+    self.bodies.add_joint_jacobian(self.state, self.joint_rows);
+    const SparseMatrix& C = self.joint_rows.finish();
     std::vector<double> carried(self.held.size(), 0.0);
     const auto& links = self.tree.links();
     for (std::size_t k = links.size(); k-- > 1;) {
