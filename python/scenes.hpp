@@ -177,7 +177,8 @@ inline std::shared_ptr<SharedScene> make_scene(const std::string& text, bool is_
                                                const std::vector<std::pair<std::string, std::string>>& values,
                                                const std::string& solver, const std::string& integrator,
                                                const std::optional<std::string>& law, std::optional<double> step,
-                                               std::optional<double> end, std::optional<double> tolerance) {
+                                               std::optional<double> end, std::optional<double> tolerance,
+                                               std::optional<double> accuracy) {
     SceneOverrides overrides;
     overrides.values = values;
     overrides.solver = solver;
@@ -186,6 +187,7 @@ inline std::shared_ptr<SharedScene> make_scene(const std::string& text, bool is_
     overrides.step = step;
     overrides.end = end;
     overrides.tolerance = tolerance;
+    overrides.accuracy = accuracy;
     return std::make_shared<SharedScene>(text, is_file, overrides);
 }
 
@@ -194,7 +196,7 @@ inline void bind_scenes(py::module_& module) {
 
     py::class_<SharedScene, std::shared_ptr<SharedScene>>(module, "Scene")
         .def(py::init(&make_scene), "text"_a, "is_file"_a, "values"_a, "solver"_a, "integrator"_a, "law"_a, "step"_a,
-             "end"_a, "tolerance"_a)
+             "end"_a, "tolerance"_a, "accuracy"_a)
         .def_property_readonly("title", [](const SharedScene& self) { return self.scene.title; })
         .def_property_readonly("systems", &SharedScene::names, "The names of its systems.")
         .def(

@@ -34,13 +34,14 @@ class Scene(_delassus.Scene):
     law : 'associated' or 'coulomb', for every system
     step, end : s, for every system
     tolerance : m or rad, from which steps follow
+    accuracy : a share of the size of what moves, a second, to which steps are divided (docs/integrators.md)
 
     Raises InputError that names file, line, key and the nearest valid key.
     """
 
     def __init__(self, source: Union[Path, Mapping[str, Any]], *, set: Optional[Mapping[str, Any]] = None,
                  solver: str = "", integrator: str = "", law: Optional[str] = None, step: Optional[float] = None,
-                 end: Optional[float] = None, tolerance: Optional[float] = None):
+                 end: Optional[float] = None, tolerance: Optional[float] = None, accuracy: Optional[float] = None):
         if isinstance(source, SceneBuilder):
             scene, is_file = source.to_yaml() or "{}\n", False
         elif isinstance(source, Mapping):
@@ -49,7 +50,7 @@ class Scene(_delassus.Scene):
             scene = os.fspath(source)
             is_file = "\n" not in scene
         values = [(path, yaml_of(value)) for path, value in (set or {}).items()]
-        super().__init__(scene, is_file, values, solver, integrator, law, step, end, tolerance)
+        super().__init__(scene, is_file, values, solver, integrator, law, step, end, tolerance, accuracy)
 
     def __repr__(self) -> str:
         return f"<delassus.Scene: {self.title or 'without a title'}, systems {', '.join(self.systems)}>"
@@ -85,12 +86,13 @@ class Simulation:
     law : 'associated' or 'coulomb', of friction
     step, end : s; a simulation of a DynamicalSystem needs a step or a tolerance, and an end (which may be inf)
     tolerance : in units of positions, from which steps follow; for a DynamicalSystem also {'absolute': …, 'relative': …}
+    accuracy : of a scene, as Scene has it
     """
 
     def __init__(self, scene: Union[Scene, DynamicalSystem, Path, Mapping[str, Any]], system: str = "",
                  plugin_path: Sequence[Path] = (), *, integrator: Named = "", solver: Named = "",
                  law: Optional[str] = None, step: Optional[float] = None, end: Optional[float] = None,
-                 tolerance: Any = None):
+                 tolerance: Any = None, accuracy: Optional[float] = None):
         plugins = registry(folders(plugin_path))
         chosen = dict(integrator=integrator, solver=solver, law=law, step=step, end=end, tolerance=tolerance)
         self.bodies: list = []  #: names, in the order of poses and twists; none of a DynamicalSystem
@@ -101,6 +103,8 @@ class Simulation:
         if isinstance(scene, DynamicalSystem):
             if system:
                 raise InputError("system is for scenes with several; a DynamicalSystem is one")
+            if accuracy is not None:
+                raise InputError("accuracy is for scenes, whose bodies have a size; give a DynamicalSystem a tolerance")
             self._asked = _Asked(scene)
             if not integrator:
                 chosen["integrator"] = ("moreau_jean" if "unilateral" in self._asked.methods else
@@ -109,7 +113,7 @@ class Simulation:
             self.end: Optional[float] = end  #: s; None where the scene knows it
             self._run: Any = self._noting(lambda: _delassus.SystemRun(self._asked, _settings(**chosen), plugins))
             return
-        given = {key: value for key, value in chosen.items() if value not in ("", None)}
+        given = {key: value for key, value in {**chosen, "accuracy": accuracy}.items() if value not in ("", None)}
         if not isinstance(scene, Scene):
             scene = Scene(scene, **given)
         elif given:
@@ -288,12 +292,13 @@ class Trajectory:
 
 def simulate(scene: Union[Scene, DynamicalSystem, Simulation, Path, Mapping[str, Any]], system: str = "", every: int = 1,
              plugin_path: Sequence[Path] = (), *, integrator: Named = "", solver: Named = "", law: Optional[str] = None,
-             step: Optional[float] = None, end: Optional[float] = None, tolerance: Any = None) -> Trajectory:
+             step: Optional[float] = None, end: Optional[float] = None, tolerance: Any = None,
+             accuracy: Optional[float] = None) -> Trajectory:
     """Simulate a system to its end, and record every so many steps, the start and the end.
 
     scene : a Scene, what Scene takes, a DynamicalSystem, or a Simulation, which goes on from where it is
     system : its name; '' where the scene has only one
-    integrator, solver, law, step, end, tolerance : as Simulation has them; not for a Scene or a Simulation
+    integrator, solver, law, step, end, tolerance, accuracy : as Simulation has them; not for a Scene or a Simulation
 
     A step that fails ends the run: what was recorded comes back with status 'failed' and the sentence. Whatever is not
     'finished' is also a RuntimeWarning. Raises Unsupported where a solver or timestepper cannot take the system, and
@@ -301,7 +306,7 @@ def simulate(scene: Union[Scene, DynamicalSystem, Simulation, Path, Mapping[str,
     """
     if every < 1:
         raise InputError(f"every is {every}; it must be 1 or more")
-    chosen = dict(integrator=integrator, solver=solver, law=law, step=step, end=end, tolerance=tolerance)
+    chosen = dict(integrator=integrator, solver=solver, law=law, step=step, end=end, tolerance=tolerance, accuracy=accuracy)
     if not isinstance(scene, Simulation):
         simulation = Simulation(scene, system, plugin_path, **chosen)
     else:

@@ -91,6 +91,21 @@ class Sources(unittest.TestCase):
         with self.assertRaisesRegex(delassus.InputError, "solver belong to the Simulation"):
             delassus.simulate(delassus.Simulation(ball()), solver="pgs")
 
+    def test_steps_follow_from_an_accuracy(self):
+        # Half a metre down to the ground, and up again with half the speed, in steps that the impact does not meet.
+        g, h, end = 9.81, 0.5, 0.55
+        scene = {"materials": {"m": {"restitution": 0.5}},
+                 "bodies": [{"name": "ground", "fixed": True, "shapes": [{"plane": {}, "material": "m"}]},
+                            {"name": "ball", "mass": 1.0, "position": [0, 0, h + 0.1],
+                             "shapes": [{"sphere": {"radius": 0.1}, "material": "m"}]}]}
+        run = delassus.simulate(scene, step=0.05, end=end, accuracy=1e-6)
+        np.testing.assert_allclose(run.time, 0.05 * np.arange(12), atol=1e-9)
+        after = end - np.sqrt(2 * h / g)
+        height = 0.5 * np.sqrt(2 * g * h) * after - 0.5 * g * after**2
+        self.assertAlmostEqual(run.poses[-1, 1, 2], 0.1 + height, delta=1e-6)
+        with self.assertRaisesRegex(delassus.InputError, "tolerance"):
+            delassus.simulate(scene, step=0.05, end=end, accuracy=1e-6, tolerance=1e-4)
+
     def test_refusals(self):
         for sentence, scene in (('did you mean "bodies"', {"bodys": []}), ("/nowhere.yaml", "/nowhere.yaml"),
                                 ("sticks, slides", EXAMPLES / "box_on_incline.yaml"),

@@ -398,6 +398,8 @@ class Running(unittest.TestCase):
             run = delassus.simulate(DuffingByHand(), integrator=method, end=2.0, tolerance=1e-5)
             self.assertEqual(run.time[-1], 2.0)
             self.assertLess(np.abs(run.positions[-1] - exact.positions[-1]).max(), 2e-4, method)
+        with self.assertRaisesRegex(delassus.InputError, "accuracy is for scenes"):
+            delassus.simulate(DuffingByHand(), end=2.0, accuracy=1e-3)
 
     def test_without_an_end_step_by_step(self):
         simulation = delassus.Simulation(Duffing(), step=0.01, end=math.inf)
