@@ -40,6 +40,10 @@ DELASSUS_API void check_closed_surface(const Mesh& mesh, const std::string& who)
 /// InputError, naming the file, as check_terrain does.
 [[nodiscard]] DELASSUS_API Mesh read_terrain(const std::filesystem::path& file, double scale = 1.0);
 
+/// The triangles in a file as they are, equal points joined, whatever they bound. Throws InputError, naming the file,
+/// where this build has no assimp, the file is unreadable or has no triangles, or a vertex is not finite or not there.
+[[nodiscard]] DELASSUS_API Mesh read_triangles(const std::filesystem::path& file);
+
 /// Heights over a grid, row by row as on a map: the first row is that of the largest y, and x ascends in a row.
 struct Heights {
     std::int32_t rows = 0, columns = 0;

@@ -139,9 +139,7 @@ private:
         if (!before.insert(joint.name).second)
             throw InputError(fmt::format("the joint \"{}\" mimics itself", joint.name));
         const auto followed = robot_.getJoint(joint.mimic->joint_name);
-        if (!followed)
-            throw InputError(fmt::format("the joint \"{}\" mimics \"{}\", and there is no such joint", joint.name,
-                                         joint.mimic->joint_name));
+        if (!followed) return 0.0;
         return joint.mimic->multiplier * reference(*followed, std::move(before)) + joint.mimic->offset;
     }
 
@@ -232,8 +230,10 @@ private:
             const double ratio = joint->mimic->multiplier;
             if (followed == place_.end() || kind(second) != kind(followed->second) ||
                 kind(second) == JointKind::Planar) {
-                model_.lose(
-                    what, fmt::format("it mimics \"{}\", which is a joint of another kind", joint->mimic->joint_name));
+                model_.lose(what, fmt::format("it mimics \"{}\", {}", joint->mimic->joint_name,
+                                              robot_.getJoint(joint->mimic->joint_name)
+                                                  ? "which is a joint of another kind"
+                                                  : "and there is no such joint"));
                 continue;
             }
             if (ratio == 0.0) {

@@ -120,7 +120,7 @@ void scale_by(double scale, std::vector<Vector3>& vertices) {
         for (double& x : vertex) x *= scale;
 }
 
-Surface read_triangles(const std::filesystem::path& file, double scale) {
+Surface read_surface(const std::filesystem::path& file, double scale) {
     must_be_there(file);
     const auto read = reinterpret_cast<DelassusSurfaceMeshRead>(module_symbol(
         "delassus_surface_mesh", "delassus_surface_mesh_read", file.string() + " cannot be read", "assimp"));
@@ -181,7 +181,7 @@ void check_elements(const TetrahedralMesh& mesh, const std::string& who) {
 }  // namespace
 
 std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double scale) {
-    const Surface surface = read_triangles(file, scale);
+    const Surface surface = read_surface(file, scale);
     std::vector<Mesh> parts = parts_of(surface.mesh);
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const std::string who = parts.size() == 1 ? file.string() : fmt::format("{}, part {}", file.string(), i + 1);
@@ -191,8 +191,12 @@ std::vector<Mesh> read_surface_mesh(const std::filesystem::path& file, double sc
     return parts;
 }
 
+Mesh read_triangles(const std::filesystem::path& file) {
+    return read_surface(file, 1.0).mesh;
+}
+
 Mesh read_terrain(const std::filesystem::path& file, double scale) {
-    Surface surface = read_triangles(file, scale);
+    Surface surface = read_surface(file, scale);
     check_terrain(surface.mesh, file.string());
     surface.check_precision(surface.mesh, file.string());
     return std::move(surface.mesh);
@@ -211,7 +215,7 @@ TetrahedralMesh read_tetrahedral_mesh(const std::filesystem::path& file, double 
         read(file, mesh);
         scale_by(scale, mesh.vertices);
     } else {
-        const Surface surface = read_triangles(file, scale);
+        const Surface surface = read_surface(file, scale);
         check_closed_surface(surface.mesh, file.string());
         surface.check_precision(surface.mesh, file.string());
         const auto fill = reinterpret_cast<DelassusVolumeMeshFill>(module_symbol(

@@ -150,9 +150,9 @@ RawMesh read_raw_mesh(const std::filesystem::path& file) {
         const std::string bytes = read_file(file);
         mesh = kind == ".obj" ? read_obj(bytes) : kind == ".stl" ? read_stl(bytes) : read_msh(bytes);
     } else {
-        const Mesh terrain = read_terrain(file);
-        for (const auto& vertex : terrain.vertices) mesh.points.emplace_back(vertex.data());
-        mesh.triangles = terrain.triangles;
+        const Mesh surface = read_triangles(file);
+        for (const auto& vertex : surface.vertices) mesh.points.emplace_back(vertex.data());
+        mesh.triangles = surface.triangles;
     }
     for (const Vector3d& point : mesh.points)
         if (!point.allFinite()) throw InputError("a coordinate of a vertex is not finite");

@@ -105,17 +105,12 @@ void add_mesh(Model& model, const ModelShape& at, const std::string& address, co
         parts = read_surface_mesh(file, 1.0);
     } catch (const InputError& error) {
         try {
-            parts = {read_terrain(file, 1.0)};
+            const RawMesh raw = read_raw_mesh(file);
+            Mesh& mesh = parts.emplace_back();
+            for (const Vector3d& point : raw.points) mesh.vertices.push_back(array(point));
             open = true;
         } catch (const InputError&) {
-            try {
-                const RawMesh raw = read_raw_mesh(file);
-                Mesh& mesh = parts.emplace_back();
-                for (const Vector3d& point : raw.points) mesh.vertices.push_back(array(point));
-                open = true;
-            } catch (const InputError&) {
-                return model.lose(what, fmt::format("its mesh is of no use: {}", error.what()));
-            }
+            return model.lose(what, fmt::format("its mesh is of no use: {}", error.what()));
         }
     }
     if (open) {

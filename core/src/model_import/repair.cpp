@@ -23,6 +23,9 @@ double inertia_of_water(double mass) {
     return 0.4 * mass * radius * radius;
 }
 
+/// Of that, where an inertia is 0 but for the rounding of who wrote the model. A point mass may have more.
+constexpr double least_share_of_water = 1e-10;
+
 bool has_extent(const ModelShape& shape) {
     switch (shape.form) {
         case Form::Sphere:
@@ -70,10 +73,7 @@ void repair_inertias(Model& model) {
                                          100.0 * (body.inertia - J).norm() / size));
         }
         const Eigen::SelfAdjointEigenSolver<Matrix3d> whole(body.inertia);
-        const double least = 1e-6 * inertia_of_water(body.mass);
-        if (whole.eigenvalues().minCoeff() > least ||
-            whole.eigenvalues().minCoeff() > 1e-6 * whole.eigenvalues().maxCoeff())
-            continue;
+        if (whole.eigenvalues().minCoeff() > least_share_of_water * inertia_of_water(body.mass)) continue;
         const double bound = std::max(inertia_of_water(body.mass), 1e-6 * whole.eigenvalues().maxCoeff());
         body.inertia = body.inertia + bound * Matrix3d::Identity();
         model.lose(what,
