@@ -51,7 +51,7 @@ TEST_P(PairGap, IsTheSignedDistance) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, PairGap, ::testing::Combine(::testing::Range(0, 8), ::testing::Range(0, 8)));
+INSTANTIATE_TEST_SUITE_P(Kinds, PairGap, ::testing::Combine(::testing::Range(0, 10), ::testing::Range(0, 10)));
 
 TEST(Gap, OfEveryKindToAPlane) {
     const Shape plane = shape(ShapeKind::Plane, {}, 0);
@@ -138,6 +138,21 @@ TEST(Gap, OfAVertexOnAFace) {
         EXPECT_NEAR(contacts[0].point_a[0], 0.1, 1e-12);
         EXPECT_NEAR(contacts[0].point_a[1], -0.2, 1e-12);
     }
+}
+
+TEST(Gap, OfLargeHullsThatLieFlush) {
+    const Shape prism = convex(prism_mesh(), 0), cube = shape(ShapeKind::Box, {0.5, 0.5, 0.5}, 0);
+    for (const double gap : {-1e-3, 0.0, 1e-9, 1e-3})
+        for (const Shape& below : {prism, cube}) {
+            const double top = below.kind == ShapeKind::Box ? 0.5 : 0.4;
+            const auto contacts = touch(below, prism, pose(Vector3d::Zero()),
+                                        pose(Vector3d(0.01, -0.02, top + 0.4 + gap), turn(0.3, Vector3d::UnitZ())), 0.01);
+            EXPECT_GE(contacts.size(), 3U);
+            for (const ContactPoint& contact : contacts) {
+                EXPECT_NEAR(contact.gap, gap, 1e-12);
+                EXPECT_NEAR(contact.normal[2], 1.0, 1e-12);
+            }
+        }
 }
 
 TEST(Gap, OfTwoVertices) {

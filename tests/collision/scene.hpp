@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
+#include <numbers>
 #include <random>
 
 #include "delassus/collision.hpp"
@@ -51,6 +53,41 @@ inline std::shared_ptr<const Mesh> tetrahedron_mesh() {
     return mesh;
 }
 
+/// Rings of this many vertices about z, at radii and heights; convex if these are.
+inline std::shared_ptr<const Mesh> rings_mesh(const std::vector<std::array<double, 2>>& rings, std::int32_t sides) {
+    auto mesh = std::make_shared<Mesh>();
+    const auto last = static_cast<std::int32_t>(rings.size() - 1) * sides;
+    for (const auto& [radius, height] : rings)
+        for (std::int32_t i = 0; i < sides; ++i) {
+            const double angle = 2.0 * std::numbers::pi * i / sides;
+            mesh->vertices.push_back({radius * std::cos(angle), radius * std::sin(angle), height});
+        }
+    for (std::int32_t ring = 0; ring < last; ring += sides)
+        for (std::int32_t i = 0; i < sides; ++i) {
+            const std::int32_t next = (i + 1) % sides;
+            mesh->triangles.push_back({ring + i, ring + next, ring + sides + next});
+            mesh->triangles.push_back({ring + i, ring + sides + next, ring + sides + i});
+        }
+    for (std::int32_t i = 2; i < sides; ++i) {
+        mesh->triangles.push_back({0, i, i - 1});
+        mesh->triangles.push_back({last, last + i - 1, last + i});
+    }
+    return mesh;
+}
+
+/// With more vertices than are looked at one by one.
+inline std::shared_ptr<const Mesh> pebble_mesh() {
+    std::vector<std::array<double, 2>> rings;
+    for (int k = 0; k < 7; ++k) {
+        const double angle = std::numbers::pi * (k + 0.5) / 7;
+        rings.push_back({0.4 * std::sin(angle), -0.25 * std::cos(angle)});
+    }
+    return rings_mesh(rings, 9);
+}
+inline std::shared_ptr<const Mesh> prism_mesh() {
+    return rings_mesh({{0.3, -0.4}, {0.3, 0.4}}, 40);
+}
+
 inline Shape convex(std::shared_ptr<const Mesh> mesh, std::int32_t body, double margin = 0.0) {
     Shape result = shape(ShapeKind::Convex, {}, body, margin);
     result.mesh = std::move(mesh);
@@ -66,7 +103,9 @@ inline std::vector<Shape> kinds(std::int32_t body) {
             shape(ShapeKind::Cylinder, {0.3, 0.4, 0.0}, body),
             shape(ShapeKind::Cylinder, {0.5, 0.1, 0.0}, body, 0.03),
             convex(tetrahedron_mesh(), body),
-            convex(box_mesh(0.2, 0.5, 0.3), body, 0.02)};
+            convex(box_mesh(0.2, 0.5, 0.3), body, 0.02),
+            convex(pebble_mesh(), body),
+            convex(prism_mesh(), body)};
 }
 
 /// Two bodies with one shape each.

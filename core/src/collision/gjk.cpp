@@ -96,8 +96,10 @@ Vector3d reduce(Simplex& simplex) {
 // v is the nearest point so far of the difference B − A to the origin. The support point of the difference against v
 // gives the lower bound v·w/|v| of the distance, and v the upper; the search ends where they meet, or where rounding
 // lets v shrink no more. For polytopes that is after finitely many steps.
-std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& offset) {
+std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& offset, double limit) {
     const double scale = a.solid->reach + b.solid->reach;
+    const double beyond = limit + 1e-12 * scale;
+    Separation result;
     Simplex simplex;
     simplex.on_a[0] = a.support(offset);
     simplex.difference[0] = offset + b.support(-offset) - simplex.on_a[0];
@@ -109,6 +111,8 @@ std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& 
         if (square <= 1e-30 * scale * scale) return std::nullopt;
         const Vector3d on_a = a.support(v);
         const Vector3d w = offset + b.support(-v) - on_a;
+        result.distance = v.dot(w) / std::sqrt(square);
+        if (result.distance > beyond) return result;
         if (square - v.dot(w) <= 1e-15 * (square + scale * std::sqrt(square))) break;
         bool repeated = false;
         for (int i = 0; i < simplex.count; ++i) repeated = repeated || simplex.difference[i] == w;
@@ -122,7 +126,6 @@ std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& 
         simplex = larger;
         v = nearest;
     }
-    Separation result;
     result.distance = v.norm();
     result.normal = v / result.distance;
     for (int i = 0; i < simplex.count; ++i) result.point_a += simplex.weight[i] * simplex.on_a[i];

@@ -333,6 +333,7 @@ void Manifold::facing(const Placed& placed, const Vector3d& direction, std::vect
 void Manifold::on_plane(Placed& other, const Vector3d& point, const Vector3d& normal, bool plane_is_a, double limit,
                         std::vector<CorePoint>& points) {
     points.clear();
+    if (other.solid->core.is_large() && normal.dot(other.support(-normal) - point) >= limit) return;
     other.rotate_core();
     incident_polygon(other, -normal);
     for (const Corner& corner : polygon_) {

@@ -16,6 +16,69 @@ double Polytope::reach() const {
     return std::sqrt(square);
 }
 
+namespace {
+
+/// Fewer vertices are looked at one by one in less time.
+constexpr std::size_t most_looked_at = 32;
+
+std::size_t first_greatest(const std::vector<Vector3d>& at, const Vector3d& direction) {
+    std::size_t best = 0;
+    double most = at[0].dot(direction);
+    for (std::size_t i = 1; i < at.size(); ++i) {
+        const double value = at[i].dot(direction);
+        if (value > most) {
+            most = value;
+            best = i;
+        }
+    }
+    return best;
+}
+
+void find_neighbours(Polytope& polytope) {
+    const std::size_t count = polytope.vertices.size();
+    if (count <= most_looked_at) return;
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+        for (const double sign : {1.0, -1.0})
+            polytope.furthest_along_axes.push_back(
+                static_cast<std::int32_t>(first_greatest(polytope.vertices, sign * Vector3d::Unit(axis))));
+    auto& first = polytope.first_neighbour;
+    first.assign(count + 1, 0);
+    for (const auto& edge : polytope.edges)
+        for (const std::int32_t end : {edge.tail, edge.head}) ++first[static_cast<std::size_t>(end) + 1];
+    for (std::size_t i = 0; i < count; ++i) first[i + 1] += first[i];
+    polytope.neighbours.resize(2 * polytope.edges.size());
+    std::vector<std::int32_t> next(first.begin(), first.end() - 1);
+    for (const auto& edge : polytope.edges) {
+        polytope.neighbours[static_cast<std::size_t>(next[static_cast<std::size_t>(edge.tail)]++)] = edge.head;
+        polytope.neighbours[static_cast<std::size_t>(next[static_cast<std::size_t>(edge.head)]++)] = edge.tail;
+    }
+}
+
+}  // namespace
+
+// On a convex polytope a vertex from which no edge leads further along a direction is furthest: the climb ends there.
+// A neighbour that is as far and comes before counts as further, so that the climb ends, and where it began is all the
+// same but for ties.
+std::size_t Polytope::furthest(const std::vector<Vector3d>& at, const Vector3d& direction) const {
+    if (!is_large()) return first_greatest(at, direction);
+    std::int32_t best = furthest_along_axes[0];
+    double most = at[static_cast<std::size_t>(best)].dot(direction);
+    const auto take_if_further = [&](std::int32_t vertex) {
+        const double value = at[static_cast<std::size_t>(vertex)].dot(direction);
+        if (value < most || (value == most && vertex >= best)) return;
+        most = value;
+        best = vertex;
+    };
+    for (const std::int32_t vertex : furthest_along_axes) take_if_further(vertex);
+    for (std::int32_t from = -1; from != best;) {
+        from = best;
+        const auto place = static_cast<std::size_t>(from);
+        for (std::int32_t k = first_neighbour[place]; k < first_neighbour[place + 1]; ++k)
+            take_if_further(neighbours[static_cast<std::size_t>(k)]);
+    }
+    return static_cast<std::size_t>(best);
+}
+
 Polytope point_polytope() {
     Polytope result;
     result.vertices.push_back(Vector3d::Zero());
@@ -101,6 +164,7 @@ Polytope polytope_of_loops(std::vector<Vector3d> vertices, const std::vector<std
             face.edges[i] = place->second;
         }
     }
+    find_neighbours(result);
     return result;
 }
 

@@ -26,6 +26,15 @@ struct Polytope {
     std::vector<Vector3d> vertices;  ///< m
     std::vector<Face> faces;
     std::vector<Edge> edges;
+    /// Where there are many vertices, those that edges join to vertex i: neighbours[first_neighbour[i]] and on, up to
+    /// first_neighbour[i + 1]; and the vertices furthest along x, −x, y, −y, z, −z. Empty otherwise.
+    std::vector<std::int32_t> first_neighbour, neighbours, furthest_along_axes;
+
+    [[nodiscard]] bool is_large() const { return !neighbours.empty(); }
+
+    /// The vertex that is furthest along a direction, at: the vertices as they are or turned. Of equals the first; in a
+    /// large polytope the first that edges between equals lead to.
+    [[nodiscard]] std::size_t furthest(const std::vector<Vector3d>& at, const Vector3d& direction) const;
 
     /// Largest distance of a vertex from the origin, m.
     [[nodiscard]] double reach() const;

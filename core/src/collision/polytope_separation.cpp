@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "collision/separation.hpp"
@@ -9,33 +10,49 @@
 namespace delassus::collision {
 namespace {
 
-/// The index of the vertex of a core that is least along a direction, of equals the first; value: where.
-std::size_t least_vertex(const Placed& placed, const Vector3d& direction, double& value) {
-    value = std::numeric_limits<double>::infinity();
-    std::size_t least = 0;
-    for (std::size_t i = 0; i < placed.vertices.size(); ++i) {
-        const double along = direction.dot(placed.vertices[i]);
-        if (along < value) {
-            value = along;
-            least = i;
-        }
-    }
-    return least;
+/// The vertex of a core that is least along a direction.
+std::size_t least_vertex(const Placed& placed, const Vector3d& direction) {
+    return placed.solid->core.furthest(placed.vertices, -direction);
 }
+
+// Nearest points p_a and p_b at the distance d along n, where they are known, bound every other direction:
+//
+//     s(m) ≤ m·(p_b − p_a) = d m·n
+//
+// So only what is turned by little from n may part as much, and an edge of which that is a normal is normal to n.
+class NearestBound {
+public:
+    NearestBound() = default;
+    /// least: what has to be parted.
+    NearestBound(const Separation& nearest, double least)
+        : known_(true),
+          normal_(nearest.normal),
+          cosine_(least / nearest.distance),
+          sine_(std::sqrt(std::max(0.0, 1.0 - cosine_ * cosine_))) {}
+    [[nodiscard]] bool admits_normal(const Vector3d& m) const { return !known_ || m.dot(normal_) > cosine_; }
+    [[nodiscard]] bool admits_edge(const Vector3d& direction) const {
+        return !known_ || std::abs(direction.dot(normal_)) <= sine_;
+    }
+
+private:
+    bool known_ = false;
+    Vector3d normal_ = Vector3d::Zero();
+    double cosine_ = -1.0, sine_ = 1.0;
+};
 
 // The best face of first against second; sign −1 if first is b. Each vertex v of second bounds the distance that a face
 // finds from above, n·v − offset: with the vertex of the best face so far, few faces of a large polytope have to look
 // at all vertices. The face that this bound promises most is looked at before the others, for what it is worth.
 void face_axes(const Placed& first, const Placed& second, const Vector3d& to_second, double sign, double preference,
-               Separation& best) {
+               const NearestBound& nearest, Separation& best) {
     if (first.normals.empty()) return;
     const auto& faces = first.solid->core.faces;
-    double unused = 0.0;
-    std::size_t witness = least_vertex(second, to_second, unused);
-    const auto distance_of = [&](std::size_t f, double least) {
-        return least + first.normals[f].dot(to_second) - faces[f].offset;
+    std::size_t witness = least_vertex(second, to_second);
+    const auto distance_of = [&](std::size_t f, std::size_t vertex) {
+        const Vector3d& normal = first.normals[f];
+        return normal.dot(second.vertices[vertex]) + normal.dot(to_second) - faces[f].offset;
     };
-    const auto bound = [&](std::size_t f) { return distance_of(f, first.normals[f].dot(second.vertices[witness])); };
+    const auto bound = [&](std::size_t f) { return distance_of(f, witness); };
     std::size_t promising = 0;
     double most = bound(promising);
     for (std::size_t f = 1; f < faces.size(); ++f) {
@@ -44,28 +61,28 @@ void face_axes(const Placed& first, const Placed& second, const Vector3d& to_sec
         most = promised;
         promising = f;
     }
-    double least = 0.0;
-    witness = least_vertex(second, first.normals[promising], least);
-    const double reached = distance_of(promising, least) - 3.0 * preference;
+    witness = least_vertex(second, first.normals[promising]);
+    const double reached = bound(promising) - 3.0 * preference;
     for (std::size_t f = 0; f < faces.size(); ++f) {
-        if (bound(f) <= std::max(best.distance + preference, reached)) continue;
         const Vector3d& normal = first.normals[f];
-        const std::size_t nearest = least_vertex(second, normal, least);
+        if (!nearest.admits_normal(sign * normal)) continue;
+        if (bound(f) <= std::max(best.distance + preference, reached)) continue;
+        const std::size_t least = least_vertex(second, normal);
         const double distance = distance_of(f, least);
         if (distance <= best.distance + preference) continue;
-        witness = nearest;
+        witness = least;
         best.distance = distance;
         best.normal = sign * normal;
-        const Vector3d vertex = second.vertices[nearest];
+        const Vector3d vertex = second.vertices[least];
         if (sign > 0.0) {
             best.point_b = to_second + vertex;
             best.point_a = best.point_b - distance * normal;
-            best.feature = feature_id(FeatureKind::VertexOfB, nearest, 0);
+            best.feature = feature_id(FeatureKind::VertexOfB, least, 0);
         } else {
             best.point_a = vertex;
             best.point_b = vertex - to_second - distance * normal;
             best.point_b += to_second;
-            best.feature = feature_id(FeatureKind::VertexOfA, nearest, 0);
+            best.feature = feature_id(FeatureKind::VertexOfA, least, 0);
         }
     }
 }
@@ -106,21 +123,23 @@ bool may_exceed(const Placed& placed, std::size_t edge, const Vector3d& x, doubl
 
 // Most pairs of edges are left out by the bound of one of the two, with the vertices as points that are nearest along
 // the best face.
-void edge_axes(const Placed& a, const Placed& b, const Vector3d& offset, double preference, Separation& best) {
+void edge_axes(const Placed& a, const Placed& b, const Vector3d& offset, double preference, const NearestBound& nearest,
+               Separation& best) {
     const Polytope& core_a = a.solid->core;
     const Polytope& core_b = b.solid->core;
-    double unused = 0.0;
     const bool known = best.distance > -std::numeric_limits<double>::infinity();
     const Vector3d direction = known ? best.normal : offset;
-    const Vector3d nearest_of_a = a.vertices[least_vertex(a, -direction, unused)];
-    const Vector3d nearest_of_b = offset + b.vertices[least_vertex(b, direction, unused)];
+    const Vector3d nearest_of_a = a.vertices[least_vertex(a, -direction)];
+    const Vector3d nearest_of_b = offset + b.vertices[least_vertex(b, direction)];
     thread_local std::vector<std::size_t> edges_of_b;
     edges_of_b.clear();
     for (std::size_t j = 0; j < core_b.edges.size(); ++j)
-        if (may_exceed(b, j, nearest_of_a - offset - b.vertices[core_b.edges[j].tail], best.distance))
+        if (nearest.admits_edge(b.directions[j]) &&
+            may_exceed(b, j, nearest_of_a - offset - b.vertices[core_b.edges[j].tail], best.distance))
             edges_of_b.push_back(j);
     for (std::size_t i = 0; i < core_a.edges.size(); ++i) {
         const Polytope::Edge& edge_a = core_a.edges[i];
+        if (!nearest.admits_edge(a.directions[i])) continue;
         if (!may_exceed(a, i, nearest_of_b - a.vertices[edge_a.tail], best.distance)) continue;
         for (const std::size_t j : edges_of_b) {
             const Polytope::Edge& edge_b = core_b.edges[j];
@@ -153,31 +172,45 @@ void edge_axes(const Placed& a, const Placed& b, const Vector3d& offset, double 
 
 // The faces of the difference B − A are those of A, those of B, and the pairs of edges whose arcs cross. In penetration
 // the best of them is the answer. Apart, it is the answer unless the nearest features are vertices, or a vertex and an
-// edge; then it is less than the distance, which GJK finds.
+// edge; then it is less than the distance, which GJK finds. For large polytopes that is found first: most of their pairs
+// are further apart than limit, and of the others only what reaches the distance is looked for.
 std::optional<Separation> polytope_separation(Placed& a, Placed& b, const Vector3d& offset, double limit) {
-    a.rotate_core();
-    b.rotate_core();
     // Equal up to rounding, faces go before edges and those of a before those of b.
-    const double rounding = 1e-14 * (a.solid->reach + b.solid->reach);
+    const double rounding = 1e-14 * (a.solid->reach + b.solid->reach), equal = 10.0 * rounding;
+    const bool large = a.solid->core.is_large() || b.solid->core.is_large();
+    // What a normal parts is less than the distance of the points where rounding ended the search, which for gaps near
+    // rounding leaves a direction that is wrong.
+    const auto parted_by = [&](const Vector3d& n) { return n.dot(offset + b.support(-n) - a.support(n)); };
     Separation best;
     best.distance = -std::numeric_limits<double>::infinity();
-    face_axes(a, b, offset, 1.0, rounding, best);
+    std::optional<Separation> apart;
+    NearestBound nearest;
+    if (large) {
+        for (Placed* const one : {&a, &b})
+            if (!one->solid->core.is_large()) one->rotate_core();
+        apart = gjk(a, b, offset, limit);
+        if (apart && apart->distance > limit) return std::nullopt;
+        if (apart) {
+            best = *apart;
+            best.distance = parted_by(apart->normal) - equal - rounding;
+            nearest = NearestBound(*apart, best.distance);
+        }
+    }
+    a.rotate_core();
+    b.rotate_core();
+    face_axes(a, b, offset, 1.0, rounding, nearest, best);
     if (best.distance > limit) return std::nullopt;
-    face_axes(b, a, -offset, -1.0, rounding, best);
+    face_axes(b, a, -offset, -1.0, rounding, nearest, best);
     if (best.distance > limit) return std::nullopt;
-    edge_axes(a, b, offset, rounding, best);
+    edge_axes(a, b, offset, rounding, nearest, best);
     if (best.distance > limit) return std::nullopt;
     if (best.distance <= 0.0 && !(a.normals.empty() && b.normals.empty())) return best;
-    if (auto apart = gjk(a, b, offset); apart && apart->distance > best.distance + 10.0 * rounding) {
-        // What its normal parts is less than the distance of its points where rounding ended the search, which for gaps
-        // near rounding leaves a direction that is wrong.
-        const Vector3d& n = apart->normal;
-        if (n.dot(offset + b.support(-n) - a.support(n)) <= best.distance + 10.0 * rounding) return best;
-        if (apart->distance > limit) return std::nullopt;
-        apart->feature = feature_id(FeatureKind::Nearest, 0, 0);
-        return apart;
-    }
-    return best;
+    if (!large) apart = gjk(a, b, offset);
+    if (!apart || apart->distance <= best.distance + equal || parted_by(apart->normal) <= best.distance + equal)
+        return best;
+    if (apart->distance > limit) return std::nullopt;
+    apart->feature = feature_id(FeatureKind::Nearest, 0, 0);
+    return apart;
 }
 
 }  // namespace delassus::collision

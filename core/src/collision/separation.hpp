@@ -7,6 +7,7 @@
 // n gives a lower bound, so taking the best of several candidates is always safe.
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "collision/solid.hpp"
@@ -26,8 +27,10 @@ struct Separation {
 };
 
 /// Nearest points of two cores that are apart (Gilbert, Johnson, Keerthi); none where they touch or overlap.
-/// offset: from the position of a to that of b.
-[[nodiscard]] std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& offset);
+/// offset: from the position of a to that of b. Where they are further apart than limit, a lower bound of their distance
+/// that says so, and no points.
+[[nodiscard]] std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& offset,
+                                            double limit = std::numeric_limits<double>::infinity());
 
 /// Polytopes, exactly; none if further apart than limit. A cylinder counts as its prism.
 [[nodiscard]] std::optional<Separation> polytope_separation(Placed& a, Placed& b, const Vector3d& offset, double limit);

@@ -106,16 +106,9 @@ Vector3d Placed::support(const Vector3d& direction) const {
         if (length > 1e-14 * std::abs(along)) point += solid->cylinder_radius / length * across;
         return point;
     }
-    std::size_t best = 0;
-    double most = vertices[0].dot(direction);
-    for (std::size_t i = 1; i < vertices.size(); ++i) {
-        const double value = vertices[i].dot(direction);
-        if (value > most) {
-            most = value;
-            best = i;
-        }
-    }
-    return vertices[best];
+    const Polytope& core = solid->core;
+    if (core.is_large()) return rotation * core.vertices[core.furthest(core.vertices, rotation.transpose() * direction)];
+    return vertices[core.furthest(vertices, direction)];
 }
 
 Vector3d half_extent(const Placed& placed) {

@@ -47,7 +47,8 @@ struct Placed {
 
     /// Fills vertices, normals and directions once a detection.
     void rotate_core();
-    /// The point of the core furthest along a direction, relative to position; of equals the first.
+    /// The point of the core furthest along a direction, relative to position, as Polytope::furthest has it. Of a small
+    /// polytope after rotate_core().
     [[nodiscard]] Vector3d support(const Vector3d& direction) const;
     [[nodiscard]] Vector3d axis() const { return rotation.col(2); }
     [[nodiscard]] bool is_cylinder() const { return solid->kind == ShapeKind::Cylinder; }
