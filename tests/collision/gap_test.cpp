@@ -145,8 +145,9 @@ TEST(Gap, OfLargeHullsThatLieFlush) {
     for (const double gap : {-1e-3, 0.0, 1e-9, 1e-3})
         for (const Shape& below : {prism, cube}) {
             const double top = below.kind == ShapeKind::Box ? 0.5 : 0.4;
-            const auto contacts = touch(below, prism, pose(Vector3d::Zero()),
-                                        pose(Vector3d(0.01, -0.02, top + 0.4 + gap), turn(0.3, Vector3d::UnitZ())), 0.01);
+            const auto contacts =
+                touch(below, prism, pose(Vector3d::Zero()),
+                      pose(Vector3d(0.01, -0.02, top + 0.4 + gap), turn(0.3, Vector3d::UnitZ())), 0.01);
             EXPECT_GE(contacts.size(), 3U);
             for (const ContactPoint& contact : contacts) {
                 EXPECT_NEAR(contact.gap, gap, 1e-12);

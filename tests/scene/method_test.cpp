@@ -69,7 +69,12 @@ TEST(Method, FollowsFromTheScene) {
     EXPECT_EQ(chosen_for(head + chain(6, ", friction: 0.1")), midpoint_in_joints);
     EXPECT_EQ(chosen_for(head + "coordinates: maximal\n" + chain(6, ", lower: -1")), implicit);
     EXPECT_EQ(chosen_for("tolerance: 1.0e-5\nend: 1\n" + chain(6, ", lower: -1")), implicit);
-    EXPECT_EQ(chosen_for(head + chain(6, ", spring: {stiffness: 1.0e+6}, lower: -1")), implicit) << "stiff";
+    EXPECT_EQ(chosen_for(head + chain(6, ", spring: {stiffness: 1.0e+6}, lower: -1")),
+              Chosen("switching", Coordinates::Joint))
+        << "stiff";
+    EXPECT_EQ(chosen_for(head + chain(6, ", spring: {stiffness: 1.0e+6}, friction: 0.1")),
+              Chosen("euler_implicit_linearized", Coordinates::Joint))
+        << "stiff, and friction acts all the time";
     EXPECT_EQ(chosen_for(head + "solver: cholmod\n" + chain(6)), implicit);
     EXPECT_EQ(chosen_for(head + "leave_out: false\n" + chain(6)), implicit);
     EXPECT_EQ(chosen_for(head + "sleeping: true\n" + chain(6)), implicit);

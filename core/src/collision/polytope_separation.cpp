@@ -172,8 +172,8 @@ void edge_axes(const Placed& a, const Placed& b, const Vector3d& offset, double 
 
 // The faces of the difference B − A are those of A, those of B, and the pairs of edges whose arcs cross. In penetration
 // the best of them is the answer. Apart, it is the answer unless the nearest features are vertices, or a vertex and an
-// edge; then it is less than the distance, which GJK finds. For large polytopes that is found first: most of their pairs
-// are further apart than limit, and of the others only what reaches the distance is looked for.
+// edge; then it is less than the distance, which GJK finds. For large polytopes that is found first: most of their
+// pairs are further apart than limit, and of the others only what reaches the distance is looked for.
 std::optional<Separation> polytope_separation(Placed& a, Placed& b, const Vector3d& offset, double limit) {
     // Equal up to rounding, faces go before edges and those of a before those of b.
     const double rounding = 1e-14 * (a.solid->reach + b.solid->reach), equal = 10.0 * rounding;

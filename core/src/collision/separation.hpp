@@ -27,8 +27,8 @@ struct Separation {
 };
 
 /// Nearest points of two cores that are apart (Gilbert, Johnson, Keerthi); none where they touch or overlap.
-/// offset: from the position of a to that of b. Where they are further apart than limit, a lower bound of their distance
-/// that says so, and no points.
+/// offset: from the position of a to that of b. Where they are further apart than limit, a lower bound of their
+/// distance that says so, and no points.
 [[nodiscard]] std::optional<Separation> gjk(const Placed& a, const Placed& b, const Vector3d& offset,
                                             double limit = std::numeric_limits<double>::infinity());
 

@@ -107,7 +107,8 @@ Vector3d Placed::support(const Vector3d& direction) const {
         return point;
     }
     const Polytope& core = solid->core;
-    if (core.is_large()) return rotation * core.vertices[core.furthest(core.vertices, rotation.transpose() * direction)];
+    if (core.is_large())
+        return rotation * core.vertices[core.furthest(core.vertices, rotation.transpose() * direction)];
     return vertices[core.furthest(vertices, direction)];
 }
 

@@ -146,13 +146,14 @@ void MjcfReader::read_shape(std::size_t g) {
             break;
         case GeomType::Mesh: {
             const mjcf::Mesh& mesh = *geom.of_mesh;
-            if (mesh.hull.empty())
+            const mjcf::Mesh::Hull& hull = mesh.hull();
+            if (hull.points.empty())
                 return model_.lose(what, fmt::format("its mesh \"{}\" is of no use: {}", mesh.name,
-                                                     mesh.points.empty() ? mesh.trouble : mesh.hull_trouble));
+                                                     mesh.points.empty() ? mesh.trouble : hull.trouble));
             shape.form = Form::Hull;
             shape.name = mesh.name;
-            shape.points = mesh.hull;
-            shape.triangles = mesh.hull_triangles;
+            shape.points = hull.points;
+            shape.triangles = hull.triangles;
             break;
         }
         case GeomType::HeightField: {

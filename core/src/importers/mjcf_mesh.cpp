@@ -89,16 +89,6 @@ MassProperties mass_properties(const std::vector<Vector3d>& points, const Triang
     return result;
 }
 
-void find_hull(Mesh& mesh) {
-    std::vector<Vector3> given;
-    given.reserve(mesh.points.size());
-    for (const Vector3d& point : mesh.points) given.push_back(model_import::array(point));
-    const ConvexHull hull = convex_hull(given);
-    for (const Vector3& vertex : hull.vertices) mesh.hull.emplace_back(vertex.data());
-    for (const auto& face : hull.faces)
-        for (std::size_t k = 2; k < face.size(); ++k) mesh.hull_triangles.push_back({face[0], face[k - 1], face[k]});
-}
-
 /// Vertices and faces in attributes of the element.
 model_import::RawMesh inline_mesh(const XmlElement& element, const std::vector<double>& vertices) {
     model_import::RawMesh raw;
@@ -122,6 +112,24 @@ model_import::RawMesh inline_mesh(const XmlElement& element, const std::vector<d
 }
 
 }  // namespace
+
+const Mesh::Hull& Mesh::hull() const {
+    if (hull_) return *hull_;
+    Hull& found = hull_.emplace();
+    try {
+        std::vector<Vector3> given;
+        given.reserve(points.size());
+        for (const Vector3d& point : points) given.push_back(model_import::array(point));
+        const ConvexHull hull = convex_hull(given);
+        for (const Vector3& vertex : hull.vertices) found.points.emplace_back(vertex.data());
+        for (const auto& face : hull.faces)
+            for (std::size_t k = 2; k < face.size(); ++k) found.triangles.push_back({face[0], face[k - 1], face[k]});
+        if (found.points.empty()) found.trouble = "its points span no volume";
+    } catch (const InputError& error) {
+        found.trouble = error.what();
+    }
+    return found;
+}
 
 Mesh read_mesh(const XmlElement& element, const MeshDefaults& defaults, const std::filesystem::path& file) {
     Mesh mesh;
@@ -158,15 +166,9 @@ Mesh read_mesh(const XmlElement& element, const MeshDefaults& defaults, const st
     if (own.scale.prod() < 0.0)
         for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
     try {
-        find_hull(mesh);
-        if (mesh.hull.empty()) mesh.hull_trouble = "its points span no volume";
-    } catch (const InputError& error) {
-        mesh.hull_trouble = error.what();
-    }
-    try {
         const bool by_hull = mesh.triangles.empty() || mesh.inertia == MeshInertia::Convex;
-        if (by_hull && mesh.hull.empty()) throw InputError(mesh.hull_trouble);
-        mesh.unit = by_hull ? mass_properties(mesh.hull, mesh.hull_triangles, MeshInertia::Exact)
+        if (by_hull && mesh.hull().points.empty()) throw InputError(mesh.hull().trouble);
+        mesh.unit = by_hull ? mass_properties(mesh.hull().points, mesh.hull().triangles, MeshInertia::Exact)
                             : mass_properties(mesh.points, mesh.triangles, mesh.inertia);
     } catch (const InputError& error) {
         mesh.trouble = error.what();

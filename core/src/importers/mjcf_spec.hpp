@@ -107,11 +107,19 @@ struct Mesh {
     std::vector<Vector3d> points;
     std::vector<std::array<std::int32_t, 3>> triangles;
     MeshInertia inertia = MeshInertia::Legacy;
-    MassProperties unit;         ///< of density 1 (of a volume, or of a surface for shells)
-    std::vector<Vector3d> hull;  ///< vertices of the convex hull, and its triangles; empty: without volume
-    std::vector<std::array<std::int32_t, 3>> hull_triangles;
-    std::string trouble;       ///< why it has no mass, or is not there at all; empty: all is well
-    std::string hull_trouble;  ///< why it has no hull
+    MassProperties unit;  ///< of density 1 (of a volume, or of a surface for shells)
+    std::string trouble;  ///< why it has no mass, or is not there at all; empty: all is well
+
+    struct Hull {
+        std::vector<Vector3d> points;  ///< empty: without volume
+        std::vector<std::array<std::int32_t, 3>> triangles;
+        std::string trouble;  ///< why there is none
+    };
+    /// The convex hull, found when first asked for: most meshes are only seen.
+    [[nodiscard]] const Hull& hull() const;
+
+private:
+    mutable std::optional<Hull> hull_;
 };
 
 struct MeshDefaults {

@@ -210,25 +210,24 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         system.method_reason = "joints have stops, dry friction or forces with limits";
         return;
     }
-    const bool switches = touching && !chosen_steps, flies = switches && !always_acts(system);
+    const bool flies = !chosen_steps && !always_acts(system);
     const std::string stiff =
-        why_stiff(system, flies ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
-                                : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2});
-    if (!stiff.empty()) {
-        system.method_reason = stiff;
+        why_stiff(system, touching && flies ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
+                                            : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2});
+    system.coordinates = Coordinates::Joint;
+    system.method_reason =
+        (touching ? "bodies with joints may touch, and "
+                  : "nothing can touch, joints have stops, dry friction or forces with limits, and ") +
+        (stiff.empty() ? "no force is stiff" : stiff);
+    if (!stiff.empty() && !flies) return;
+    if (chosen_steps || (!touching && stiff.empty())) {
+        system.integrator = "moreau_jean";
         return;
     }
-    system.coordinates = Coordinates::Joint;
-    if (!touching) {
-        system.integrator = "moreau_jean";
-        system.method_reason =
-            "nothing can touch, joints have stops, dry friction or forces with limits, and no force is stiff";
-    } else {
-        system.integrator = switches ? "switching" : "moreau_jean";
-        system.method_reason = "bodies with joints may touch, and no force is stiff";
-        if (!switches) return;
-        system.integrator_options.insert_or_assign("error_limit", error_limit);
-    }
+    // In flight a stiff force costs nothing, and in contact the undamped method keeps what little it excites.
+    system.integrator = "switching";
+    system.integrator_options.insert_or_assign("error_limit", error_limit);
+    if (!stiff.empty()) system.integrator_options.insert_or_assign("flight", "radau_iia");
 }
 
 }  // namespace

@@ -13,6 +13,8 @@ namespace delassus {
 
 namespace {
 
+constexpr auto of_stiff_forces = "euler_implicit_linearized";
+
 std::string described(const SteppingMethod& method) {
     return fmt::format("{} in {} coordinates", method.integrator,
                        method.coordinates == Coordinates::Joint ? "joint" : "maximal");
@@ -24,7 +26,9 @@ std::vector<SteppingMethod> methods_of(const SceneSystem& system) {
     std::vector<SteppingMethod> methods = {{system.integrator, system.integrator_options, system.coordinates}};
     if (system.method_reason.empty() || system.control || system.sleeping) return methods;
     if (system.coordinates == Coordinates::Joint && system.coordinates_chosen && system.system->detects_contacts())
-        methods.push_back({"linearly_implicit_trapezoidal", {}, Coordinates::Maximal});
+        methods.push_back({system.integrator == of_stiff_forces ? of_stiff_forces : "linearly_implicit_trapezoidal",
+                           {},
+                           Coordinates::Maximal});
     return methods;
 }
 
