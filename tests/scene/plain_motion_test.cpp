@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -119,6 +120,52 @@ TEST(PlainMotion, ABallBouncesByItsRestitution) {
             EXPECT_NEAR(run.pose("ball").position[2] - 0.05, height, 1e-9) << run.simulation.state().t;
         }
         EXPECT_GT(in_second, 0);
+    }
+}
+
+// A slider, a box that holds on a slope, and 100 kg on 0.1 kg, in a world that stands askew. Rounding leaves corners
+// that close by 1e-17 m/s; none of it is a bounce, and restitution changes nothing.
+TEST(PlainMotion, WhatRestsOrSlidesDoesNotBounce) {
+    const auto end = [](double restitution, double step) {
+        const Eigen::Quaterniond turn = Eigen::Quaterniond(0.31, -0.74, 0.22, 0.55).normalized();
+        const auto placed = [&](const Eigen::Vector3d& v) {
+            const Eigen::Vector3d w = turn * v;
+            return fmt::format("[{}, {}, {}]", w.x(), w.y(), w.z());
+        };
+        const std::string stands = fmt::format("orientation: [{}, {}, {}, {}]", turn.w(), turn.x(), turn.y(), turn.z());
+        const auto box = [&](const char* name, double mass, const Eigen::Vector3d& at, const std::string& more = "") {
+            return fmt::format(
+                "- {{name: {}, mass: {}, position: {}, {}, shapes: [{{box: {{size: [0.3, 0.2, 0.1]}}, material: "
+                "m}}]{}}}\n",
+                name, mass, placed(at), stands, more);
+        };
+        const auto system = [&](const char* name, const Eigen::Vector3d& gravity, const std::string& bodies) {
+            return fmt::format(
+                       "  {}:\n    step: {}\n    end: 0.9\n    gravity: {}\n    materials: {{m: {{friction: 0.4, "
+                       "restitution: {}}}}}\n"
+                       "    bodies:\n    - {{name: ground, fixed: true, {}, shapes: [{{plane: {{}}, material: m}}]}}\n",
+                       name, step, placed(gravity), restitution, stands) +
+                   bodies;
+        };
+        const std::string text =
+            "systems:\n" +
+            system("slides", {0, 0, -9.81}, "    " + box("b", 2, {0, 0, 0.05}, ", velocity: " + placed({2, 0.3, 0}))) +
+            system("holds", {3.0, 0, -9.0}, "    " + box("b", 2, {0, 0, 0.05})) +
+            system("stands", {0, 0, -9.81},
+                   "    " + box("low", 0.1, {0, 0, 0.05}) + "    " + box("b", 100, {0, 0, 0.15}));
+        std::vector<Vector3> places;
+        const Scene scene = parse_scene(text, "test.yaml");
+        for (std::size_t k = 0; k < scene.systems.size(); ++k) {
+            Running run(parse_scene(text, "test.yaml"), k);
+            run.finish();
+            places.push_back(run.pose("b").position);
+        }
+        return places;
+    };
+    for (const double step : {1.0 / 60, 0.01, 0.0037}) {
+        const auto with = end(0.7, step), without = end(0.0, step);
+        for (std::size_t k = 0; k < with.size(); ++k)
+            for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(with[k][i], without[k][i], 1e-8) << k << ' ' << step;
     }
 }
 

@@ -191,6 +191,7 @@ std::optional<Separation> polytope_separation(Placed& a, Placed& b, const Vector
         apart = gjk(a, b, offset, limit);
         if (apart && apart->distance > limit) return std::nullopt;
         if (apart) {
+            apart->feature = feature_id(FeatureKind::Nearest, 0, 0);
             best = *apart;
             best.distance = parted_by(apart->normal) - equal - rounding;
             nearest = NearestBound(*apart, best.distance);

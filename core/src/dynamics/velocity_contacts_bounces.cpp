@@ -63,7 +63,8 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
                                                                      : rows_.rows()[contact.row].rate;
         const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
         double speed = -contact.approach - 0.5 * h_ * pull;
-        if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap)) continue;  // it corrects
+        // It corrects, or moves by less than the gap is resolved to: what pushes on is no bounce.
+        if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap) + contact.resolution) continue;
         const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
         const auto speed_of = [&](const double* v) {
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
