@@ -152,7 +152,10 @@ TEST(PlainMotion, WhatRestsOrSlidesDoesNotBounce) {
             system("slides", {0, 0, -9.81}, "    " + box("b", 2, {0, 0, 0.05}, ", velocity: " + placed({2, 0.3, 0}))) +
             system("holds", {3.0, 0, -9.0}, "    " + box("b", 2, {0, 0, 0.05})) +
             system("stands", {0, 0, -9.81},
-                   "    " + box("low", 0.1, {0, 0, 0.05}) + "    " + box("b", 100, {0, 0, 0.15}));
+                   "    " + box("low", 0.1, {0, 0, 0.05}) + "    " + box("b", 100, {0, 0, 0.15})) +
+            system("slide_together", {0, 0, -9.81},
+                   "    " + box("low", 1, {0, 0, 0.05}, ", velocity: " + placed({2, 0, 0})) + "    " +
+                       box("b", 0.3, {0, 0, 0.15}, ", velocity: " + placed({2, 0, 0})));
         std::vector<Vector3> places;
         const Scene scene = parse_scene(text, "test.yaml");
         for (std::size_t k = 0; k < scene.systems.size(); ++k) {
@@ -165,8 +168,36 @@ TEST(PlainMotion, WhatRestsOrSlidesDoesNotBounce) {
     for (const double step : {1.0 / 60, 0.01, 0.0037}) {
         const auto with = end(0.7, step), without = end(0.0, step);
         for (std::size_t k = 0; k < with.size(); ++k)
-            for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(with[k][i], without[k][i], 1e-8) << k << ' ' << step;
+            for (std::size_t i = 0; i < 3; ++i)
+                EXPECT_NEAR(with[k][i], without[k][i], k < 3 ? 1e-8 : 3e-4) << k << ' ' << step;
     }
+}
+
+// Contacts that carry what lies on them and bounce at once: the load acts over the whole step. With all of an impulse
+// at the time of the bounce, the stack gained three quarters of what it lost.
+TEST(PlainMotion, AStackThatBouncesGainsNoEnergy) {
+    auto run = run_of(
+        "step: 0.016666666666666666\nend: 2.5\nmaterials: {m: {friction: 0.57, restitution: 0.8}}\nbodies:\n"
+        "- {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n"
+        "- {name: a, mass: 1.1, position: [0, 0, 0.1], velocity: [0.6, 0, 0], shapes: [{box: {size: [0.3, 0.25, 0.2]}, "
+        "material: m}]}\n"
+        "- {name: b, mass: 2.3, position: [0, 0, 0.3], orientation: {axis: [0, 0, 1], angle: 37}, shapes: [{box: "
+        "{size: "
+        "[0.31, 0.17, 0.2]}, material: m}]}\n"
+        "- {name: c, mass: 0.6, position: [0, 0, 0.55], orientation: {axis: [0, 0, 1], angle: 71}, shapes: [{box: "
+        "{size: "
+        "[0.2, 0.35, 0.2]}, material: m}]}\n");
+    run.simulation.step();
+    const double start = run.simulation.record().energy;
+    double least = start, rise = 0.0;
+    while (!run.simulation.finished()) {
+        run.simulation.step();
+        const double energy = run.simulation.record().energy;
+        rise = std::max(rise, energy - least);
+        least = std::min(least, energy);
+    }
+    EXPECT_LT(least, start - 0.3);
+    EXPECT_LT(rise, 5e-3 * (start - least));
 }
 
 // A plate that lands on an edge turns and meets the ground again within a step: it does not go in by more than its

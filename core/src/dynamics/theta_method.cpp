@@ -108,7 +108,8 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     require_finite(state, end_, h, settings_.name);
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
     late_.clear();
-    if (contacts_.bounced(solution_)) {
+    if (settings_.linearly_implicit && contacts_.any() &&
+        contacts_.weigh_bounces(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
         late_.resize(static_cast<std::size_t>(n_));
         contacts_.add_late_impulse(problem_, solution_, late_);
     }

@@ -60,8 +60,8 @@ namespace delassus {
 //
 //     M x = (1 − θ − τ/h) h Dᵀ P
 //
-// is what positions lack, where the step moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end
-// of the step (position_projection.cpp).
+// is what positions lack, with the share of P that is the bounce's (velocity_contacts_bounces.cpp), where the step
+// moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end of the step (position_projection.cpp).
 //
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)

@@ -75,10 +75,11 @@ public:
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
-    /// Whether a contact bounced in this step at a time within it (`once`). solution: of the whole problem.
-    [[nodiscard]] bool bounced(const Solution& solution) const;
+    /// Whether a contact bounced in this step at a time within it (`once`); if so, it is found out how far its impulse
+    /// is that of the bounce. solution: of the whole problem; smooth: that of time_meetings().
+    [[nodiscard]] bool weigh_bounces(const Problem& problem, const Solution& solution, std::span<const double> smooth);
     /// momentum += what positions at the end of the step lack where impulses of bounces act at their own times and not
-    /// over the whole step, divided by h; n.
+    /// over the whole step, divided by h; n. After weigh_bounces().
     void add_late_impulse(const Problem& problem, const Solution& solution, std::vector<double>& momentum) const;
     /// Sets the marks of the velocities that bounces changed at once, n.
     void mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
@@ -139,6 +140,7 @@ private:
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool bounces = false;                        ///< b has restitution
         std::optional<Bounce> bounce;                ///< `once`: it bounces at a time within the step
+        double share = 1.0;                          ///< of its impulse, that of the bounce
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.

@@ -1,11 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Bounces at their time within a step; the derivation is in velocity_contacts.cpp.
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "dynamics/velocity_contacts.hpp"
 
 namespace delassus {
+
+namespace {
+
+/// The part of H in these rows and columns (ascending).
+Eigen::MatrixXd part_of(const SparseMatrix& H, const std::vector<std::int32_t>& columns) {
+    const auto count = static_cast<Eigen::Index>(columns.size());
+    Eigen::MatrixXd part = Eigen::MatrixXd::Zero(count, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+        const auto row = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
+        for (auto e = static_cast<std::size_t>(H.row_start[row]); e < static_cast<std::size_t>(H.row_start[row + 1]);
+             ++e) {
+            const auto place = std::lower_bound(columns.begin(), columns.end(), H.column[e]);
+            if (place != columns.end() && *place == H.column[e]) part(i, place - columns.begin()) = H.value[e];
+        }
+    }
+    return part;
+}
+
+}  // namespace
 
 bool VelocityContacts::may_bounce() const {
     return std::any_of(rows_.blocks().begin(), rows_.blocks().end(),
@@ -64,7 +85,8 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
         double speed = -contact.approach - 0.5 * h_ * pull;
         // It corrects, or moves by less than the gap is resolved to: what pushes on is no bounce.
-        if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap) + contact.resolution) continue;
+        if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap) + contact.resolution)
+            continue;
         const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
         const auto speed_of = [&](const double* v) {
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
@@ -107,21 +129,72 @@ void VelocityContacts::for_each_bounced(const Solution& solution, const Visit& v
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const std::size_t first = first_row_ + contacts_[k].row;
         if (contacts_[k].bounce && solution.lambda[first] > 0.0)
-            visit(contacts_[k], *contacts_[k].bounce, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
+            visit(k, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
     }
 }
 
-bool VelocityContacts::bounced(const Solution& solution) const {
+// The impulses p of two bodies on one another are those of a bounce as far as they change how these move; what presses
+// the bodies together besides acts over the whole step. With the normal ones p_n, the share
+//
+//     p_nᵀ (v⁺ − ṽ) / p_nᵀ H⁻¹ p
+//
+// is 1 where nothing else acts, v⁺ − ṽ = H⁻¹ p, and 0 where p holds against other impulses, or goes on as before. H is
+// taken where p acts alone.
+bool VelocityContacts::weigh_bounces(const Problem& problem, const Solution& solution, std::span<const double> smooth) {
+    const auto& D = problem.D;
+    std::vector<std::int32_t> columns, next;
+    std::vector<std::size_t> pair;
+    const auto for_each_entry = [&](std::size_t first, std::size_t rows, const auto& act) {
+        for (std::size_t row = first; row < first + rows; ++row)
+            for (auto e = static_cast<std::size_t>(D.row_start[row]);
+                 e < static_cast<std::size_t>(D.row_start[row + 1]); ++e)
+                act(row, D.column[e], D.value[e]);
+    };
+    const auto weigh_pair = [&] {
+        if (pair.empty()) return;
+        const auto count = static_cast<Eigen::Index>(columns.size());
+        Eigen::VectorXd push = Eigen::VectorXd::Zero(count), normal = push, change(count);
+        for (const std::size_t k : pair) {
+            const std::size_t first = first_row_ + contacts_[k].row;
+            for_each_entry(first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
+                           [&](std::size_t row, std::int32_t column, double value) {
+                               const auto i =
+                                   std::lower_bound(columns.begin(), columns.end(), column) - columns.begin();
+                               push[i] += value * solution.lambda[row];
+                               if (row == first) normal[i] += value * solution.lambda[row];
+                           });
+        }
+        for (Eigen::Index i = 0; i < count; ++i) {
+            const auto column = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
+            change[i] = solution.x[column] - smooth[column];
+        }
+        const double all = normal.dot(part_of(problem.H, columns).ldlt().solve(push));
+        const double share = all > 0.0 ? std::clamp(normal.dot(change) / all, 0.0, 1.0) : 0.0;
+        for (const std::size_t k : pair) contacts_[k].share = share;
+        pair.clear();
+    };
     bool any = false;
-    for_each_bounced(solution, [&](const Contact&, const Bounce&, std::size_t, std::size_t) { any = true; });
+    for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
+        any = true;
+        next.clear();
+        for_each_entry(first, rows, [&](std::size_t, std::int32_t column, double) { next.push_back(column); });
+        std::sort(next.begin(), next.end());
+        next.erase(std::unique(next.begin(), next.end()), next.end());
+        if (next != columns) {
+            weigh_pair();
+            columns = next;
+        }
+        pair.push_back(k);
+    });
+    weigh_pair();
     return any;
 }
 
 void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& solution,
                                         std::vector<double>& momentum) const {
     const auto& D = problem.D;
-    for_each_bounced(solution, [&](const Contact&, const Bounce& bounce, std::size_t first, std::size_t rows) {
-        const double late = 1.0 - theta_ - bounce.acts / h_;
+    for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
+        const double late = contacts_[k].share * (1.0 - theta_ - contacts_[k].bounce->acts / h_);
         for (std::size_t row = first; row < first + rows; ++row)
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 momentum[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] +=
@@ -131,7 +204,8 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
 
 void VelocityContacts::mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {
     const auto& D = problem.D;
-    for_each_bounced(solution, [&](const Contact&, const Bounce&, std::size_t first, std::size_t rows) {
+    for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
+        if (contacts_[k].share < 0.5) return;
         for (auto e = D.row_start[first]; e < D.row_start[first + rows]; ++e)
             marks[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] = 1;
     });
