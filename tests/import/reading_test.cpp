@@ -142,6 +142,10 @@ TEST(ImportUrdf, MendsWhatRobotsOfOthersHave) {
     std::map<std::string, std::string> lost;
     for (const auto& item : made.lost) lost[item.what] = item.why;
     EXPECT_EQ(lost.size(), 4U);
+    std::ofstream(folder / "nameless.urdf")
+        << "<robot>" + link_of("a") + link_of("b") + hinge_of("a", "b") + "</robot>";
+    EXPECT_NE(import_model(folder / "nameless.urdf", folder / "s.yaml").yaml.find("title: \"nameless\""),
+              std::string::npos);
     EXPECT_EQ(lost["joint \"ab\""], "it mimics \"none\", and there is no such joint");
     EXPECT_EQ(lost["collision 1 of link \"b\""], "an open mesh: the convex hull of its points collides");
     EXPECT_EQ(lost["collision 2 of link \"b\""], "an open mesh: the convex hull of its points collides");

@@ -2,6 +2,7 @@
 // Reads a URDF file by urdfdom.
 #include <console_bridge/console.h>
 #include <fmt/format.h>
+#include <tinyxml2.h>
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
@@ -230,10 +231,10 @@ private:
             const double ratio = joint->mimic->multiplier;
             if (followed == place_.end() || kind(second) != kind(followed->second) ||
                 kind(second) == JointKind::Planar) {
-                model_.lose(what, fmt::format("it mimics \"{}\", {}", joint->mimic->joint_name,
-                                              robot_.getJoint(joint->mimic->joint_name)
-                                                  ? "which is a joint of another kind"
-                                                  : "and there is no such joint"));
+                model_.lose(what,
+                            fmt::format("it mimics \"{}\", {}", joint->mimic->joint_name,
+                                        robot_.getJoint(joint->mimic->joint_name) ? "which is a joint of another kind"
+                                                                                  : "and there is no such joint"));
                 continue;
             }
             if (ratio == 0.0) {
@@ -300,6 +301,18 @@ private:
     std::size_t visuals_ = 0;
 };
 
+/// The model with a name, which urdfdom insists on.
+std::string with_name(const std::string& text, const std::string& name) {
+    tinyxml2::XMLDocument document;
+    if (document.Parse(text.c_str(), text.size()) != tinyxml2::XML_SUCCESS) return text;
+    tinyxml2::XMLElement* robot = document.RootElement();
+    if (robot == nullptr || robot->Attribute("name") != nullptr) return text;
+    robot->SetAttribute("name", name.c_str());
+    tinyxml2::XMLPrinter printer;
+    document.Print(&printer);
+    return printer.CStr();
+}
+
 /// What urdfdom passes over without a word.
 void note_unread(const XmlElement& robot, Model& model) {
     static const std::set<std::string> of_link = {"inertial", "visual", "collision"};
@@ -340,7 +353,8 @@ extern "C" DELASSUS_API void delassus_import_urdf_read(const std::filesystem::pa
                                                        delassus::model_import::Model& model) {
     using namespace delassus;
     importers::UrdfReports reports;
-    const urdf::ModelInterfaceSharedPtr robot = urdf::parseURDF(read_file(file));
+    const urdf::ModelInterfaceSharedPtr robot =
+        urdf::parseURDF(importers::with_name(read_file(file), file.stem().string()));
     if (!robot)
         throw InputError("urdfdom refuses the model: " +
                          (reports.error.empty() ? "it gives no reason" : reports.error));

@@ -28,6 +28,9 @@ constexpr double most_explicit_rate = 50.0;
 constexpr double most_explicit_rate_of_elements = 1.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
+/// The same where steps are divided until their error is small: beyond that it keeps no energy (docs/integrators.md),
+/// and what is damped as fast alternates in sign.
+constexpr double most_rate_of_chosen_steps = 100.0;
 /// Beside contacts, where the flights between them are taken in explicit parts and contacts in parts by their error
 /// (measured on servos of an arm).
 constexpr double most_motion_beside_contacts = 10.0, most_damping_beside_contacts = most_explicit_rate;
@@ -211,9 +214,11 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         return;
     }
     const bool flies = !chosen_steps && !always_acts(system);
-    const std::string stiff =
-        why_stiff(system, touching && flies ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
-                                            : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2});
+    const Rates::Fastest most = chosen_steps ? Rates::Fastest{most_rate_of_chosen_steps, most_rate_of_chosen_steps}
+                                : touching && flies
+                                    ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
+                                    : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2};
+    const std::string stiff = why_stiff(system, most);
     system.coordinates = Coordinates::Joint;
     system.method_reason =
         (touching ? "bodies with joints may touch, and "

@@ -568,7 +568,12 @@ std::string Simulation::what_acts() const {
             text = fmt::format("; the body that moves fastest: \"{}\", {:.3g} m/s", name(body), speed);
         }
     }
-    return text;
+    if (!text.empty() || system_->joints.empty()) return text;
+    std::vector<std::string> joints;
+    for (const JointParameters& joint : system_->joints)
+        if (joints.size() < most) joints.push_back(joint.name);
+    return fmt::format("; nothing moves yet, held by {} joints, the first of them \"{}\"", system_->joints.size(),
+                       fmt::join(joints, "\", \""));
 }
 
 std::vector<ContactRecord> Simulation::contacts() const {
