@@ -140,6 +140,9 @@ TEST_F(HostileFiles, OtherLettersPass) {
 
 // OpenBLAS asks for memory for ever where the system refuses it, and interrupts its process if a thread does not start.
 TEST_F(HostileFiles, LittleMemoryIsASentence) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "sanitizers take terabytes of addresses";
+#endif
     for (const char* solver : {"mumps", "siconos", "ipm", "cholmod", "auto"})
         for (const int mebibytes : {80, 120, 160, 200, 300, 400}) {
             const auto result =
