@@ -19,30 +19,30 @@ std::size_t least_vertex(const Placed& placed, const Vector3d& direction) {
 //
 //     s(m) ≤ m·(p_b − p_a) = d m·n
 //
-// So only what is turned by little from n may part as much, and an edge of which that is a normal is normal to n.
+// So only what is turned by little from n may part as much, and an edge of which that is a normal is nearly normal to
+// n. Where they are not known, every direction is admitted.
 class NearestBound {
 public:
     NearestBound() = default;
     /// least: what has to be parted.
     NearestBound(const Separation& nearest, double least)
-        : known_(true),
-          normal_(nearest.normal),
+        : normal_(nearest.normal),
           cosine_(least / nearest.distance),
           sine_(std::sqrt(std::max(0.0, 1.0 - cosine_ * cosine_))) {}
-    [[nodiscard]] bool admits_normal(const Vector3d& m) const { return !known_ || m.dot(normal_) > cosine_; }
+    [[nodiscard]] bool admits_normal(const Vector3d& m) const { return m.dot(normal_) > cosine_; }
     [[nodiscard]] bool admits_edge(const Vector3d& direction) const {
-        return !known_ || std::abs(direction.dot(normal_)) <= sine_;
+        return std::abs(direction.dot(normal_)) <= sine_;
     }
 
 private:
-    bool known_ = false;
     Vector3d normal_ = Vector3d::Zero();
     double cosine_ = -1.0, sine_ = 1.0;
 };
 
 // The best face of first against second; sign −1 if first is b. Each vertex v of second bounds the distance that a face
 // finds from above, n·v − offset: with the vertex of the best face so far, few faces of a large polytope have to look
-// at all vertices. The face that this bound promises most is looked at before the others, for what it is worth.
+// for their nearest vertex. The face that this bound promises most is looked at before the others, for what it is
+// worth.
 void face_axes(const Placed& first, const Placed& second, const Vector3d& to_second, double sign, double preference,
                const NearestBound& nearest, Separation& best) {
     if (first.normals.empty()) return;

@@ -205,7 +205,7 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
 void VelocityContacts::mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {
     const auto& D = problem.D;
     for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
-        if (contacts_[k].share < 0.5) return;
+        if (contacts_[k].share < 0.5) return;  // most of it is a load, which the next step has as well
         for (auto e = D.row_start[first]; e < D.row_start[first + rows]; ++e)
             marks[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] = 1;
     });

@@ -1,19 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where the method that was chosen for a scene cannot go on, another takes its place.
+// The method of a simulation, and the one that takes its place where it cannot go on.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "delassus/simulation.hpp"
+#include "simulation/fixed_step.hpp"
 #include "simulation/look_ahead.hpp"
 #include "simulation/method_change.hpp"
+#include "simulation/shared_run.hpp"
+#include "simulation/sizes_of_motion.hpp"
 
 namespace delassus {
 
 namespace {
 
 constexpr auto of_stiff_forces = "euler_implicit_linearized";
+
+/// Of a step: in which an impact happens by itself. What lands flat lands on all its corners in it, though rounding
+/// tilts it.
+constexpr double shortest_impact = 1e-4;
+/// Of an accuracy: what solves may err by.
+constexpr double share_of_solves = 0.1;
 
 std::string described(const SteppingMethod& method) {
     return fmt::format("{} in {} coordinates", method.integrator,
@@ -30,6 +41,45 @@ std::vector<SteppingMethod> methods_of(const SceneSystem& system) {
                            {},
                            Coordinates::Maximal});
     return methods;
+}
+
+void Simulation::make_method() {
+    control_.reset();
+    ahead_.reset();
+    revision_ = system_->system->revision();
+    timestepper_ = make_timestepper(method().integrator, dynamics(), method().options);
+    if (shared_) {
+        shared_->restart();
+        gathered_ = timestepper_->save();
+        gathered_at_ = now_.step;
+        return;
+    }
+    if (system_->control) {
+        control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
+        return;
+    }
+    const double named = timestepper_->error_limit();
+    const bool by_accuracy = system_->steps_by_accuracy && !std::isfinite(named);
+    if (by_accuracy || std::isfinite(named)) {
+        StepControl control = control_within(by_accuracy ? system_->accuracy : named, system_->step);
+        if (by_accuracy) {
+            SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
+            control.sizes = std::move(sizes.of_velocities);
+            control.slow = control.absolute * sizes.least;
+            if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
+            std::vector<double> bounds = control.sizes;
+            for (double& bound : bounds) bound *= share_of_solves * control.absolute;
+            solver_->bound_errors(std::move(bounds));
+        }
+        control_ = std::make_unique<AdaptiveStepping>(
+            dynamics(), *timestepper_, control,
+            fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
+                        "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
+                        method().integrator));
+        if (timestepper_->has_extension() && system_->system->foreseeable())
+            ahead_ =
+                std::make_unique<LookAhead>(dynamics(), *system_->system, system_->step, shortest_part * system_->step);
+    }
 }
 
 void Simulation::change_method(std::size_t number) {

@@ -19,7 +19,6 @@
 #include "simulation/method_change.hpp"
 #include "simulation/overlap_watch.hpp"
 #include "simulation/shared_run.hpp"
-#include "simulation/sizes_of_motion.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
 #include "simulation/touching.hpp"
@@ -105,11 +104,6 @@ void choose_method_to_share(SceneSystem& system, const Registry& registry) {
     if (system.coordinates_chosen) system.coordinates = Coordinates::Maximal;
 }
 
-/// Of a step: in which an impact happens by itself. What lands flat lands on all its corners in it, though rounding
-/// tilts it.
-constexpr double shortest_impact = 1e-4;
-/// Of an accuracy: what solves may err by.
-constexpr double share_of_solves = 0.1;
 /// Of the energy that can have moved: a change that a plot would show.
 constexpr double visible_share = 0.05;
 
@@ -216,45 +210,6 @@ void Simulation::share(const Registry& registry) {
     if (system_->steps_by_accuracy) refuse("with steps that follow from an accuracy", "remove \"accuracy\", or ");
     if (!system_->leave_out) refuse("of which nothing is left out", "");
     shared_ = std::make_unique<SharedRun>(*system_, communicator_of_run(), registry, *solver_);
-}
-
-void Simulation::make_method() {
-    control_.reset();
-    ahead_.reset();
-    revision_ = system_->system->revision();
-    timestepper_ = make_timestepper(method().integrator, dynamics(), method().options);
-    if (shared_) {
-        shared_->restart();
-        gathered_ = timestepper_->save();
-        gathered_at_ = now_.step;
-        return;
-    }
-    if (system_->control) {
-        control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
-        return;
-    }
-    const double named = timestepper_->error_limit();
-    const bool by_accuracy = system_->steps_by_accuracy && !std::isfinite(named);
-    if (by_accuracy || std::isfinite(named)) {
-        StepControl control = control_within(by_accuracy ? system_->accuracy : named, system_->step);
-        if (by_accuracy) {
-            SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
-            control.sizes = std::move(sizes.of_velocities);
-            control.slow = control.absolute * sizes.least;
-            if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
-            std::vector<double> bounds = control.sizes;
-            for (double& bound : bounds) bound *= share_of_solves * control.absolute;
-            solver_->bound_errors(std::move(bounds));
-        }
-        control_ = std::make_unique<AdaptiveStepping>(
-            dynamics(), *timestepper_, control,
-            fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
-                        "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
-                        method().integrator));
-        if (timestepper_->has_extension() && system_->system->foreseeable())
-            ahead_ =
-                std::make_unique<LookAhead>(dynamics(), *system_->system, system_->step, shortest_part * system_->step);
-    }
 }
 
 DynamicalSystem& Simulation::dynamics() {
