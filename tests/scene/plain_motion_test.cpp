@@ -83,6 +83,28 @@ TEST(PlainMotion, AnImpactAtTheEndOfAStepBouncesOnce) {
     }
 }
 
+// A box falls flat and slides on: friction takes μ times its speed of fall at once, at whatever time of a step, and
+// slows it by μ g from then on.
+TEST(PlainMotion, ABoxLandsAtItsOwnTime) {
+    const double g = 9.81, mu = 0.3, fall = 1.1, speed = 2.0, end = 0.35;
+    for (const double step : {0.0097, 0.0049})
+        for (const double height : {0.1, 0.1037, 0.1071, 0.11}) {
+            SCOPED_TRACE(fmt::format("step {}, height {}", step, height));
+            auto run =
+                run_of(fmt::format("step: {}\nend: {}\nmaterials: {{m: {{friction: {}}}}}\nbodies:\n"
+                                   "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                                   "- {{name: box, mass: 1.7, position: [0, 0, {:.17g}], velocity: [{}, 0, {}], "
+                                   "shapes: [{{box: {{size: [0.3, 0.2, 0.04]}}, material: m}}]}}\n",
+                                   step, end, mu, height + 0.02, speed, -fall));
+            run.finish();
+            const double lands = (std::sqrt(fall * fall + 2.0 * g * height) - fall) / g, rest = end - lands;
+            const double after = speed - mu * (fall + g * lands);
+            EXPECT_NEAR(run.pose("box").position[0], speed * lands + (after - 0.5 * mu * g * rest) * rest,
+                        mu * g * step * step);
+            EXPECT_NEAR(run.pose("box").position[2], 0.02, 1e-9);
+        }
+}
+
 TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     auto run = run_of(
         "step: 0.0017\nend: 6\nmaterials: {m: {friction: 1}}\nbodies:\n"

@@ -109,7 +109,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
     late_.clear();
     if (settings_.linearly_implicit && contacts_.any() &&
-        contacts_.weigh_bounces(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
+        contacts_.weigh_impacts(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
         late_.resize(static_cast<std::size_t>(n_));
         contacts_.add_late_impulse(problem_, solution_, late_);
     }
@@ -179,18 +179,18 @@ void ThetaMethod::extrapolate(double h) {
     }
 }
 
-// What a bounce changes at once is no acceleration: there the last ones stay.
+// What an impact changes at once is no acceleration: there the last ones stay.
 void ThetaMethod::remember_change(const Vector& result, double h) {
     const auto n = static_cast<std::size_t>(n_);
-    bounced_.assign(n, 0);
-    contacts_.mark_bounced(problem_, solution_, bounced_);
+    struck_.assign(n, 0);
+    contacts_.mark_struck(problem_, solution_, struck_);
     std::vector<double>& last = changes_[0];
     std::vector<double>& before = changes_[1];
     if (!last.empty()) before.resize(n);
     last.resize(n);
     for (std::int32_t i = 0; i < n_; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        if (bounced_[k]) continue;
+        if (struck_[k]) continue;
         if (!before.empty()) before[k] = last[k];
         last[k] = (result[i] - free_[i]) / h;
     }
@@ -369,7 +369,7 @@ Vector ThetaMethod::without_contacts(const State& begin, double h, StepSolver& s
     return Eigen::Map<const Vector>(solution.x.data(), n_);
 }
 
-// One problem. Two in the first step, which has no history to extrapolate from; a few where a contact bounces with
+// One problem. Two in the first step, which has no history to extrapolate from; a few where a contact strikes with
 // friction and the solver does not know Coulomb's law.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
     const auto linearize_at_guess = [&] {
@@ -384,7 +384,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         return guess_.allFinite();
     };
     if (contacts_.any()) {
-        if (changes_[0].empty() && contacts_.may_bounce()) {
+        if (changes_[0].empty() && contacts_.may_strike()) {
             smooth_ = without_contacts(begin, h, solver, report);
         } else {
             smooth_ = guess_;

@@ -81,7 +81,7 @@ private:
     double last_h_ = 0.0;
     StepError error_;
     StepRequest request_{.warm_start = true};
-    std::vector<double> late_;    ///< impulses of bounces for the projection, n; empty where none bounced
+    std::vector<double> late_;    ///< impulses of impacts for the projection, n; empty where none was
     std::vector<double> left_;    ///< by the last solve, in the norm of the masses, n, or empty
     bool chooses_steps_ = false;  ///< steps are chosen by their error
     MatrixAssembler H_, D_;
@@ -93,7 +93,7 @@ private:
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
     /// implicit.
     std::array<std::vector<double>, 2> changes_;
-    std::vector<char> bounced_;                  ///< by velocity, in this step
+    std::vector<char> struck_;                   ///< by velocity, in this step
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem

@@ -45,23 +45,28 @@ namespace delassus {
 //     closing with restitution, g + h u⁻ ≤ 0:   b = e u⁻:                     u⁺ ≥ −e u⁻
 //     else                                      b = (g + (1 − θ) h u⁻)/(θ h): g + (1 − θ) h u⁻ + θ h u⁺ ≥ 0
 //
-// but not below 0 in the last case. There the gap at the end of the step, g⁺ to first order, stays open: an inelastic
-// contact lands with g⁺ = 0, and loses what is left of its speed in the next step. If it were stopped in one step, half
-// the way would remain open, and the body would fall through it again, with a speed of the order √h. A contact with
-// restitution would lose by such a row what it is to return; so it is left alone until it closes at its own speed (b
-// has −u⁻ besides), and what it penetrates by acceleration, below ½ a h², is undone in the positions.
+// but not below 0 in the last case. There the gap at the end of the step, g⁺ to first order, stays open: a contact
+// without restitution lands with g⁺ = 0, and loses what is left of its speed in the next step. If it were stopped in
+// one step, half the way would remain open, and the body would fall through it again, with a speed of the order √h. A
+// contact with restitution would lose by such a row what it is to return; so it is left alone until it closes at its
+// own speed (b has −u⁻ besides), and what it penetrates by acceleration, below ½ a h², is undone in the positions.
 //
 // Gaps nearer to 0 than the resolution are 0.
 //
 // `once` knows the acceleration of a row besides impulses, a = D̄ (ṽ⁺ − v)/h with the guess of a smooth motion. So with
-// u⁻ = D̄ v a contact with restitution meets when g + u⁻ τ + ½ a τ² = 0, bounces with the speed that it has then, and
-// has moved on at the end of the step (bounce.cpp): b = −u⁺ of that. Speeds before and after are those of one D̄, so
-// that e ≤ 1 gains no energy. The impulse acts from τ on, by which
+// u⁻ = D̄ v a contact meets when g + u⁻ τ + ½ a τ² = 0, strikes with the speed that it has then, and has moved on at the
+// end of the step, or stays (impact.cpp): b = −u⁺ of that. Speeds before and after are those of one D̄, so that e ≤ 1
+// gains no energy. The impulse acts from τ on, by which
 //
 //     M x = (1 − θ − τ/h) h Dᵀ P
 //
-// is what positions lack, with the share of P that is the bounce's (velocity_contacts_bounces.cpp), where the step
+// is what positions lack, with the share of P that is the impact's (velocity_contacts_impacts.cpp), where the step
 // moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end of the step (position_projection.cpp).
+//
+// Without restitution a contact strikes if it is faster at the beginning of the step than the step makes it, u⁻ < −|a|
+// h. What is slower belongs to the smooth motion, as the next corner of what rolls: it lands by the last case, and its
+// time would change positions by O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of
+// order 1.
 //
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)
@@ -93,8 +98,8 @@ namespace delassus {
 // `once` takes s of the guess alone, which is off by O(h²) while a contact slides: the contact opens or closes at that
 // speed, and the gap is g⁺ = ½ h (μ |u_t⁺| − s) = O(h³), since the row above takes back what the step before left. No
 // energy comes of it: the impulse does the work P·u⁺ = −P_n (s + b). Where the guess has turned round against u_t⁻, the
-// contact comes to rest in this step, and s = 0. A contact that bounces needs its s to leave at e u⁻ and not at some
-// other speed: this one iterates as above. One that lands without bouncing takes another step for it.
+// contact comes to rest in this step, and s = 0. A contact that strikes needs its s to leave at e u⁻ and not at some
+// other speed: this one iterates as above.
 
 namespace {
 
@@ -276,7 +281,7 @@ void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& c
     contact.normal = 0.0;
     if (!settings_.once && block.restitution > 0.0 && speed < -settings_.restitution_speed) {
         const bool closes = gap + h_ * speed <= 0.0;
-        contact.bounces = closes && !contact.pushed;
+        contact.strikes = closes && !contact.pushed;
         contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
                                 : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
         if (closes) contact.turns = contact.turns && contact.pushed;
@@ -361,7 +366,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         const std::size_t first = first_row_ + contact.row;
-        if (settings_.once && iteration > 0 && (!contact.bounces || !(solution.lambda[first] > 0.0))) continue;
+        if (settings_.once && iteration > 0 && (!contact.strikes || !(solution.lambda[first] > 0.0))) continue;
         const auto size = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
         double squares = 0.0, along = 0.0;  // of the sliding speed at the end; that times the one at the beginning
         for (std::size_t i = 0; i < size; ++i) {
@@ -464,7 +469,7 @@ bool VelocityContacts::only_take() {
         Contact& contact = contacts_[k];
         if (!contact.along_normal) continue;
         changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
-        contact.turns = contact.bounces = false;
+        contact.turns = contact.strikes = false;
         contact.moved = contact.wanted = 0.0;
         contact.sliding = -1.0;
         const double gap = contact.resolved_gap();
@@ -526,10 +531,10 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         }
         report.recovered +=
             lambda[first] * std::clamp(0.5 * (contact.end_speed - contact.approach), 0.0, contact.recovery);
-        if (contact.bounce) {
-            if (contact.bounces && contact.bounce->closing > report.impact_speed) {
-                report.impact_speed = contact.bounce->closing;
-                report.impact_time = contact.bounce->meets;
+        if (contact.impact) {
+            if (contact.strikes && contact.impact->closing > report.impact_speed) {
+                report.impact_speed = contact.impact->closing;
+                report.impact_time = contact.impact->meets;
             }
             continue;
         }

@@ -11,8 +11,8 @@
 
 #include "delassus/export.hpp"
 #include "delassus/timestepper.hpp"
-#include "dynamics/bounce.hpp"
 #include "dynamics/gap_resolution.hpp"
+#include "dynamics/impact.hpp"
 #include "dynamics/kept_impulses.hpp"
 
 namespace delassus {
@@ -30,7 +30,7 @@ struct VelocityContactSettings {
     double recovery_speed = 0.01;    ///< with which penetration that a step finds is undone at most
     double restitution_speed = 0.0;  ///< contacts that close slower do not bounce
     /// One problem a step: gaps are corrected by the speeds of their rows, and De Saxcé's terms are those of the guess,
-    /// but for contacts that bounce. Otherwise gaps are left to PositionProjection.
+    /// but for contacts that strike. Otherwise gaps are left to PositionProjection.
     bool once = false;
 };
 
@@ -56,9 +56,9 @@ public:
     /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
     /// law, else De Saxcé's term stands in b. The rows of problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
-    /// Whether a contact has restitution.
-    [[nodiscard]] bool may_bounce() const;
-    /// `once`, before set_b(): contacts that meet within the step get the rows of that time, and bounce then. smooth:
+    /// `once`, after append_to(): whether an impact is possible in this step.
+    [[nodiscard]] bool may_strike() const;
+    /// `once`, before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
     /// the velocities at the end of the step without impacts, n.
     void time_meetings(Problem& problem, std::span<const double> smooth);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
@@ -75,14 +75,14 @@ public:
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
-    /// Whether a contact bounced in this step at a time within it (`once`); if so, it is found out how far its impulse
-    /// is that of the bounce. solution: of the whole problem; smooth: that of time_meetings().
-    [[nodiscard]] bool weigh_bounces(const Problem& problem, const Solution& solution, std::span<const double> smooth);
-    /// momentum += what positions at the end of the step lack where impulses of bounces act at their own times and not
-    /// over the whole step, divided by h; n. After weigh_bounces().
+    /// Whether a contact struck in this step at a time within it (`once`); if so, it is found out how far its impulse
+    /// is that of the impact. solution: of the whole problem; smooth: that of time_meetings().
+    [[nodiscard]] bool weigh_impacts(const Problem& problem, const Solution& solution, std::span<const double> smooth);
+    /// momentum += what positions at the end of the step lack where those of impacts act at their own times and not
+    /// over the whole step, divided by h; n. After weigh_impacts().
     void add_late_impulse(const Problem& problem, const Solution& solution, std::vector<double>& momentum) const;
-    /// Sets the marks of the velocities that bounces changed at once, n.
-    void mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
+    /// Sets the marks of the velocities that impacts changed at once, n.
+    void mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
 
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n. solution: of the whole problem.
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
@@ -138,9 +138,9 @@ private:
         const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
         bool pushed = false;                         ///< in the step before
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
-        bool bounces = false;                        ///< b has restitution
-        std::optional<Bounce> bounce;                ///< `once`: it bounces at a time within the step
-        double share = 1.0;                          ///< of its impulse, that of the bounce
+        bool strikes = false;                        ///< b is that of an impact
+        std::optional<Impact> impact;                ///< `once`: it strikes at a time within the step
+        double share = 1.0;                          ///< of its impulse, that of the impact
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -159,7 +159,7 @@ private:
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
     template <class Visit>
-    void for_each_bounced(const Solution& solution, const Visit& visit) const;
+    void for_each_impact(const Solution& solution, const Visit& visit) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bounces within a step beside the motion that goes through them one after the other.
-#include "dynamics/bounce.hpp"
+// Impacts within a step beside the motion that goes through them one after the other.
+#include "dynamics/impact.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace delassus::bounce_test {
+namespace delassus::impact_test {
 namespace {
 
 struct End {
@@ -32,7 +32,7 @@ End followed(double h, double gap, double speed, double acceleration, double res
     return end;
 }
 
-TEST(Bounce, EndsWhereTheMotionThroughAllOfThemEnds) {
+TEST(Impact, EndsWhereTheMotionThroughAllOfThemEnds) {
     const double h = 0.016;
     struct Case {
         double gap, speed, acceleration, restitution;
@@ -43,31 +43,31 @@ TEST(Bounce, EndsWhereTheMotionThroughAllOfThemEnds) {
           Case{0.01, 0.2, -500.0, 0.7, 2}, Case{0.001, -1.0, -1000.0, 0.95, 6}, Case{0.002, -0.5, -700.0, 1.0, 3},
           Case{0.01, -3.0, 100.0, 0.3, 1}, Case{0.0, 0.5, -200.0, 0.9, 3}}) {
         SCOPED_TRACE(fmt::format("{} {} {} {}", one.gap, one.speed, one.acceleration, one.restitution));
-        const auto bounce = bounce_within(h, one.gap, one.speed, one.acceleration, one.restitution);
-        ASSERT_TRUE(bounce);
+        const auto impact = impact_within(h, one.gap, one.speed, one.acceleration, one.restitution);
+        ASSERT_TRUE(impact);
         const End end = followed(h, one.gap, one.speed, one.acceleration, one.restitution);
         EXPECT_EQ(end.bounces, one.bounces);
-        EXPECT_NEAR(bounce->end_speed, end.speed, 2e-4 * (std::abs(one.speed) + std::abs(one.acceleration) * h));
+        EXPECT_NEAR(impact->end_speed, end.speed, 2e-4 * (std::abs(one.speed) + std::abs(one.acceleration) * h));
         const double alone = one.gap + (one.speed + 0.5 * one.acceleration * h) * h;
-        EXPECT_NEAR(alone + (h - bounce->acts) * bounce->change, end.gap, 1e-5);
+        EXPECT_NEAR(alone + (h - impact->acts) * impact->change, end.gap, 1e-5);
     }
 }
 
-TEST(Bounce, ComesToRestWhereAllFlightsAreOver) {
-    const auto bounce = bounce_within(0.1, 0.001, -0.1, -9.81, 0.3);
-    ASSERT_TRUE(bounce);
-    EXPECT_EQ(bounce->end_speed, 0.0);
+TEST(Impact, ComesToRestWhereAllFlightsAreOver) {
+    const auto impact = impact_within(0.1, 0.001, -0.1, -9.81, 0.3);
+    ASSERT_TRUE(impact);
+    EXPECT_EQ(impact->end_speed, 0.0);
     const double alone = 0.001 + (-0.1 - 0.5 * 9.81 * 0.1) * 0.1;
-    EXPECT_NEAR(alone + (0.1 - bounce->acts) * bounce->change, 0.0, 1e-15);
+    EXPECT_NEAR(alone + (0.1 - impact->acts) * impact->change, 0.0, 1e-15);
 }
 
-TEST(Bounce, IsNoneWhereTheContactDoesNotMeet) {
-    EXPECT_FALSE(bounce_within(0.01, 0.02, -1.0, 0.0, 0.5));
-    EXPECT_FALSE(bounce_within(0.01, 0.02, -1.0, 200.0, 0.5));
-    EXPECT_FALSE(bounce_within(0.01, 0.005, -1.0, 200.0, 0.5)) << "turns round before";
-    EXPECT_FALSE(bounce_within(0.01, 0.0, 0.0, -9.81, 0.5)) << "rests";
-    EXPECT_FALSE(bounce_within(0.01, 0.0, 1.0, 9.81, 0.5));
+TEST(Impact, IsNoneWhereTheContactDoesNotMeet) {
+    EXPECT_FALSE(impact_within(0.01, 0.02, -1.0, 0.0, 0.5));
+    EXPECT_FALSE(impact_within(0.01, 0.02, -1.0, 200.0, 0.5));
+    EXPECT_FALSE(impact_within(0.01, 0.005, -1.0, 200.0, 0.5)) << "turns round before";
+    EXPECT_FALSE(impact_within(0.01, 0.0, 0.0, -9.81, 0.5)) << "rests";
+    EXPECT_FALSE(impact_within(0.01, 0.0, 1.0, 9.81, 0.5));
 }
 
 }  // namespace
-}  // namespace delassus::bounce_test
+}  // namespace delassus::impact_test

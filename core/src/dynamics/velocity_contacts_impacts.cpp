@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bounces at their time within a step; the derivation is in velocity_contacts.cpp.
+// Impacts at their time within a step; the derivation is in velocity_contacts.cpp.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -28,9 +28,13 @@ Eigen::MatrixXd part_of(const SparseMatrix& H, const std::vector<std::int32_t>& 
 
 }  // namespace
 
-bool VelocityContacts::may_bounce() const {
-    return std::any_of(rows_.blocks().begin(), rows_.blocks().end(),
-                       [](const UnilateralRows::Block& block) { return block.restitution > 0.0; });
+bool VelocityContacts::may_strike() const {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        const bool closes = contact.along_normal && !contact.pushed && contact.approach > 0.0;
+        if (closes || rows_.blocks()[k].restitution > 0.0) return true;
+    }
+    return false;
 }
 
 // In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²),
@@ -77,14 +81,12 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         Contact& contact = contacts_[k];
         double gap = contact.resolved_gap();
         const bool bounces = block.restitution > 0.0;
-        if (!contact.along_normal) continue;
-        if (!bounces && !contact.pushed && gap <= 0.0 && contact.known) take_rates_of_end(contact, block);
-        if (!bounces && (contact.pushed || gap <= 0.0)) continue;
+        if (!contact.along_normal || (!bounces && contact.pushed)) continue;
         const double rate = contact.known && !contact.met_on_the_way ? before_.rows()[contact.before].rate
                                                                      : rows_.rows()[contact.row].rate;
         const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
         double speed = -contact.approach - 0.5 * h_ * pull;
-        // It corrects, or moves by less than the gap is resolved to: what pushes on is no bounce.
+        // It corrects, or moves by less than the gap is resolved to: what pushes on does not strike.
         if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap) + contact.resolution)
             continue;
         const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
@@ -92,8 +94,15 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
         };
         const auto acceleration = [&] { return (speed_of(smooth.data()) - speed_of(begin_speeds_)) / h_; };
+        const auto strikes = [&] {
+            return bounces ? speed < -settings_.restitution_speed : speed < -h_ * std::abs(acceleration());
+        };
+        if (!bounces && gap <= 0.0 && !strikes()) {
+            if (contact.known) take_rates_of_end(contact, block);
+            continue;
+        }
         const auto meeting_from = [&](double from, double begin, double turning) {
-            return bounce_within(h_, from, begin, acceleration() + turning, block.restitution);
+            return impact_within(h_, from, begin, acceleration() + turning, block.restitution);
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
@@ -101,23 +110,23 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         const auto meeting = meeting_from(open, speed, turning);
         const double time = meeting ? meeting->meets : h_;
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
-        std::optional<Bounce> bounce;
+        std::optional<Impact> impact;
         if (take_rows_at(time, k, problem)) {
             speed = speed_of(begin_speeds_);
             gap = left - (speed + 0.5 * acceleration() * time) * time;
-            if (meeting) bounce = meeting_from(std::max(gap, 0.0), speed, 0.0);
+            if (meeting) impact = meeting_from(std::max(gap, 0.0), speed, 0.0);
             contact.turns = false;
         } else {
-            bounce = meeting_from(open, block.speed, 0.0);
+            impact = meeting_from(open, block.speed, 0.0);
         }
         const double drift = (1.0 - theta_) * h_ * speed;
-        if (bounces && bounce && bounce->closing > settings_.restitution_speed) {
-            contact.bounce = bounce;
-            contact.bounces = !contact.pushed || gap > 0.0;
+        if (impact && (bounces ? impact->closing > settings_.restitution_speed : strikes())) {
+            contact.impact = impact;
+            contact.strikes = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;
-            contact.normal = -bounce->end_speed;
+            contact.normal = -impact->end_speed;
             contact.recovery = 0.0;
-        } else if (gap > 0.0 && (!bounces || speed < -settings_.restitution_speed)) {
+        } else if (gap > 0.0 && (!bounces || strikes())) {
             contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_) - (bounces ? speed : 0.0);
             contact.recovery = 0.0;
         }
@@ -125,22 +134,22 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
 }
 
 template <class Visit>
-void VelocityContacts::for_each_bounced(const Solution& solution, const Visit& visit) const {
+void VelocityContacts::for_each_impact(const Solution& solution, const Visit& visit) const {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const std::size_t first = first_row_ + contacts_[k].row;
-        if (contacts_[k].bounce && solution.lambda[first] > 0.0)
+        if (contacts_[k].impact && solution.lambda[first] > 0.0)
             visit(k, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
     }
 }
 
-// The impulses p of two bodies on one another are those of a bounce as far as they change how these move; what presses
+// The impulses p of two bodies on one another are those of an impact as far as they change how these move; what presses
 // the bodies together besides acts over the whole step. With the normal ones p_n, the share
 //
 //     p_nᵀ (v⁺ − ṽ) / p_nᵀ H⁻¹ p
 //
 // is 1 where nothing else acts, v⁺ − ṽ = H⁻¹ p, and 0 where p holds against other impulses, or goes on as before. H is
 // taken where p acts alone.
-bool VelocityContacts::weigh_bounces(const Problem& problem, const Solution& solution, std::span<const double> smooth) {
+bool VelocityContacts::weigh_impacts(const Problem& problem, const Solution& solution, std::span<const double> smooth) {
     const auto& D = problem.D;
     std::vector<std::int32_t> columns, next;
     std::vector<std::size_t> pair;
@@ -174,7 +183,7 @@ bool VelocityContacts::weigh_bounces(const Problem& problem, const Solution& sol
         pair.clear();
     };
     bool any = false;
-    for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
+    for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
         any = true;
         next.clear();
         for_each_entry(first, rows, [&](std::size_t, std::int32_t column, double) { next.push_back(column); });
@@ -193,8 +202,8 @@ bool VelocityContacts::weigh_bounces(const Problem& problem, const Solution& sol
 void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& solution,
                                         std::vector<double>& momentum) const {
     const auto& D = problem.D;
-    for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
-        const double late = contacts_[k].share * (1.0 - theta_ - contacts_[k].bounce->acts / h_);
+    for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
+        const double late = contacts_[k].share * (1.0 - theta_ - contacts_[k].impact->acts / h_);
         for (std::size_t row = first; row < first + rows; ++row)
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 momentum[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] +=
@@ -202,9 +211,9 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
     });
 }
 
-void VelocityContacts::mark_bounced(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {
+void VelocityContacts::mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {
     const auto& D = problem.D;
-    for_each_bounced(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
+    for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
         if (contacts_[k].share < 0.5) return;  // most of it is a load, which the next step has as well
         for (auto e = D.row_start[first]; e < D.row_start[first + rows]; ++e)
             marks[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] = 1;

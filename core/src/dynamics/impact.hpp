@@ -8,8 +8,9 @@
 
 namespace delassus {
 
-/// A contact that meets within a step and bounces, perhaps several times, as if its row had one acceleration besides.
-struct Bounce {
+/// A contact that meets within a step, and stays or bounces, perhaps several times, as if its row had one acceleration
+/// besides.
+struct Impact {
     double meets = 0.0;      ///< after the beginning of the step, s
     double closing = 0.0;    ///< speed with which it meets then, > 0
     double end_speed = 0.0;  ///< at the end of the step; negative if it closes again there
@@ -19,7 +20,7 @@ struct Bounce {
 
 /// Nothing if the contact does not meet. gap ≥ 0, speed (negative: closing) and acceleration of the row at the
 /// beginning of the step of size h > 0; restitution in [0, 1].
-[[nodiscard]] DELASSUS_API std::optional<Bounce> bounce_within(double h, double gap, double speed, double acceleration,
+[[nodiscard]] DELASSUS_API std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration,
                                                                double restitution);
 
 }  // namespace delassus

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "dynamics/bounce.hpp"
+#include "dynamics/impact.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,22 +19,22 @@ namespace delassus {
 //
 //     g + u h + ½ a h² + (h − τ*) (u⁺ − u − a h) = g⁺
 //
-// (τ* = τ for a single bounce).
-std::optional<Bounce> bounce_within(double h, double gap, double speed, double acceleration, double restitution) {
+// (τ* = τ for a single bounce; with e = 0 and a < 0 what then presses the bodies together is in it).
+std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration, double restitution) {
     const double square = speed * speed - 2.0 * acceleration * gap;
     if (!(square > 0.0)) return std::nullopt;
-    Bounce bounce;
-    bounce.closing = std::sqrt(square);
+    Impact impact;
+    impact.closing = std::sqrt(square);
     if (speed < 0.0) {
-        bounce.meets = 2.0 * gap / (bounce.closing - speed);
+        impact.meets = 2.0 * gap / (impact.closing - speed);
     } else if (acceleration < 0.0) {
-        bounce.meets = (speed + bounce.closing) / -acceleration;
+        impact.meets = (speed + impact.closing) / -acceleration;
     } else {
         return std::nullopt;
     }
-    double left = h - bounce.meets;
+    double left = h - impact.meets;
     if (!(left >= 0.0)) return std::nullopt;
-    double leaves = restitution * bounce.closing;
+    double leaves = restitution * impact.closing;
     if (acceleration < 0.0) {
         const double flight = 2.0 * leaves / -acceleration;
         if (flight <= left * (1.0 - restitution)) {
@@ -51,12 +51,12 @@ std::optional<Bounce> bounce_within(double h, double gap, double speed, double a
             }
         }
     }
-    bounce.end_speed = leaves + acceleration * left;
+    impact.end_speed = leaves + acceleration * left;
     const double end_gap = (leaves + 0.5 * acceleration * left) * left;
-    bounce.change = bounce.end_speed - speed - acceleration * h;
+    impact.change = impact.end_speed - speed - acceleration * h;
     const double alone = gap + (speed + 0.5 * acceleration * h) * h;
-    bounce.acts = bounce.change > 0.0 ? h - (end_gap - alone) / bounce.change : bounce.meets;
-    return bounce;
+    impact.acts = impact.change > 0.0 ? h - (end_gap - alone) / impact.change : impact.meets;
+    return impact;
 }
 
 }  // namespace delassus
