@@ -6,6 +6,7 @@
 
 #include "collision/scene.hpp"
 #include "delassus/error.hpp"
+#include "delassus/mesh_files.hpp"
 
 namespace delassus::collision_tests::flush_test {
 namespace {
@@ -17,20 +18,28 @@ Shape at(Shape shape, const Vector3d& position) {
     return shape;
 }
 
-/// 4 × 4 tiles with their tops in z = 0, on a body each, or all on body 0; hull: as hulls.
+enum class Tiles { Boxes, Hulls, Fields, Mixed };
+
+/// 4 × 4 tiles with their tops in z = 0, on a body each, or all on body 0; mixed: boxes and fields of heights in turns.
 struct Floor {
     std::vector<Shape> shapes;
     std::int32_t bodies = 0;
 };
 
-Floor tiles(bool one_body, bool hulls = false) {
+Floor tiles(bool one_body, Tiles kind = Tiles::Boxes) {
     Floor floor;
     for (int i = 0; i < 4; ++i)
         for (int j = 0; j < 4; ++j) {
             const std::int32_t body = one_body ? 0 : floor.bodies;
-            const Shape tile =
-                hulls ? convex(box_mesh(half, half, thick), body) : shape(ShapeKind::Box, {half, half, thick}, body);
-            floor.shapes.push_back(at(tile, Vector3d(i - 1.5, j - 1.5, -thick)));
+            const bool field = kind == Tiles::Fields || (kind == Tiles::Mixed && (i + j) % 2 == 0);
+            Shape tile = shape(ShapeKind::Box, {half, half, thick}, body);
+            if (kind == Tiles::Hulls) tile = convex(box_mesh(half, half, thick), body);
+            if (field) {
+                tile = shape(ShapeKind::HeightField, {}, body);
+                tile.mesh = std::make_shared<const Mesh>(
+                    height_field({3, 2, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0}}, 2.0 * half, 2.0 * half));
+            }
+            floor.shapes.push_back(at(tile, Vector3d(i - 1.5, j - 1.5, field ? 0.0 : -thick)));
             floor.bodies = body + 1;
         }
     return floor;
@@ -58,8 +67,8 @@ TEST(Flush, TilesActAsThePlaneThatTheyFill) {
     Random random(11);
     int compared = 0;
     for (const bool one_body : {false, true})
-        for (const bool hulls : {false, true}) {
-            const Floor floor = tiles(one_body, hulls);
+        for (const Tiles kind : {Tiles::Boxes, Tiles::Hulls, Tiles::Fields, Tiles::Mixed}) {
+            const Floor floor = tiles(one_body, kind);
             for (int trial = 0; trial < 60; ++trial)
                 for (const Shape& moving : kinds(0)) {
                     const bool is_odd = trial % 2 == 1;
@@ -81,7 +90,8 @@ TEST(Flush, TilesActAsThePlaneThatTheyFill) {
                     for (const ContactPoint& contact : found) {
                         ++compared;
                         EXPECT_LT((vector(contact.normal) - (contact.shape_a < 16 ? 1.0 : -1.0) * normal).norm(), 2e-3)
-                            << "kind " << static_cast<int>(moving.kind) << " trial " << trial;
+                            << "tiles " << static_cast<int>(kind) << " kind " << static_cast<int>(moving.kind)
+                            << " trial " << trial;
                     }
                 }
         }

@@ -105,6 +105,35 @@ TEST(PlainMotion, ABoxLandsAtItsOwnTime) {
         }
 }
 
+// Paths that curve: the ends of what spins, or swings, pass just above a floor that the straight ways along their
+// velocities would reach.
+TEST(PlainMotion, WhatTurnsPastAFloorDoesNotTouchIt) {
+    for (const double restitution : {0.0, 0.5, 1.0})
+        for (const double step : {0.0071, 1.0 / 60.0}) {
+            SCOPED_TRACE(fmt::format("step {}, restitution {}", step, restitution));
+            const std::string start = fmt::format(
+                "step: {}\nend: 1.1\nmaterials: {{m: {{friction: 0.3, restitution: {}}}}}\nbodies:\n"
+                "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n",
+                step, restitution);
+            auto spinning = run_of("gravity: [0, 0, 0]\n" + start +
+                                   "- {name: bar, mass: 1, inertia: {xx: 0.083, yy: 0.083, zz: 0.083}, "
+                                   "position: [0, 0, 0.501], angular_velocity: [0, 50, 0], shapes: [{sphere: {radius: "
+                                   "0.05}, position: [0.45, 0, 0], material: m}, {sphere: {radius: 0.05}, "
+                                   "position: [-0.45, 0, 0], material: m}]}\n");
+            spinning.finish();
+            EXPECT_NEAR(spinning.pose("bar").position[2], 0.501, 1e-9);
+            EXPECT_NEAR(spinning.simulation.record().energy, 0.5 * 0.083 * 2500.0, 1e-6);
+            auto swinging = run_of(start + fmt::format("- {{name: bob, mass: 2, position: [{:.17g}, 0, {:.17g}], "
+                                                       "shapes: [{{sphere: {{radius: 0.1}}, material: m}}]}}\n"
+                                                       "joints:\n- {{name: hinge, kind: revolute, second: bob, "
+                                                       "point: [0, 0, 1.1001], axis: [0, 1, 0]}}\n",
+                                                       -std::sin(1.2), 1.1001 - std::cos(1.2)));
+            const double energy = swinging.simulation.record().energy;
+            swinging.finish();
+            EXPECT_NEAR(swinging.simulation.record().energy, energy, 1e-3);
+        }
+}
+
 TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     auto run = run_of(
         "step: 0.0017\nend: 6\nmaterials: {m: {friction: 1}}\nbodies:\n"

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <utility>
 
 #include "delassus/error.hpp"
@@ -20,6 +21,15 @@ bool rotation_of(const Quaternion& orientation, Matrix3d& rotation) {
     const double norm = q.norm();
     rotation = q.normalized().toRotationMatrix();
     return std::isfinite(norm) && norm > 0.0;
+}
+
+/// In the world, with what may be out of flush.
+BroadPhase::Box box_of_terrain(const Placed& placed) {
+    const AlignedBox3d& own = placed.solid->terrain->box();
+    const Vector3d middle = placed.position + placed.rotation * own.center();
+    const Vector3d half = placed.rotation.cwiseAbs() * (0.5 * own.sizes()) +
+                          Vector3d::Constant(placed.solid->radius + kFlush * own.sizes().norm());
+    return {middle - half, middle + half};
 }
 
 }  // namespace
@@ -106,10 +116,22 @@ void Detector::find_neighbours() {
         neighbours_.emplace_back(bounded_[a], bounded_[b]);
         neighbours_.emplace_back(bounded_[b], bounded_[a]);
     }
+    for (std::size_t i = 0; i < terrains_.size(); ++i) {
+        const std::int32_t terrain = terrains_[i];
+        const BroadPhase::Box around = box_of_terrain(placed_[terrain]);
+        const auto add = [&](std::int32_t other, const BroadPhase::Box& box) {
+            if (!may_be_flush(terrain, other) || pass_flush(terrain, other) || !around.overlap(box)) return;
+            neighbours_.emplace_back(terrain, other);
+            neighbours_.emplace_back(other, terrain);
+        };
+        for (std::size_t k = 0; k < bounded_.size(); ++k) add(bounded_[k], boxes[k]);
+        for (std::size_t k = 0; k < i; ++k) add(terrains_[k], box_of_terrain(placed_[terrains_[k]]));
+    }
     std::sort(neighbours_.begin(), neighbours_.end());
     const bool others_come = given_moves_ || !planes_.empty();
-    for (const std::int32_t shape : bounded_)
-        has_neighbours_[shape] = others_come && solid_[shape] == 0 && has_flat_faces(solids_[shape]) ? 1 : 0;
+    for (const auto* shapes : {&bounded_, &terrains_})
+        for (const std::int32_t shape : *shapes)
+            has_neighbours_[shape] = others_come && solid_[shape] == 0 && has_flat_faces(solids_[shape]) ? 1 : 0;
     for (const auto& pair : neighbours_) has_neighbours_[pair.first] = 1;
 }
 
@@ -122,7 +144,8 @@ void Detector::collect_neighbours(std::int32_t shape, std::int32_t other,
     for (const auto* all : {&neighbours_, &passing_}) {
         auto next = std::lower_bound(all->begin(), all->end(), BroadPhase::Pair(shape, -1));
         for (; next != all->end() && next->first == shape; ++next)
-            if ((place < 0 || boxes_[place].overlap(boxes_[in_bounded_[next->second]])) &&
+            if ((place < 0 || in_bounded_[next->second] < 0 ||
+                 boxes_[place].overlap(boxes_[in_bounded_[next->second]])) &&
                 may_touch(other, next->second))
                 neighbours.push_back(&placed_[next->second]);
     }
@@ -185,12 +208,14 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
             throw InputError(fmt::format("The motion of body {} is not finite.", body));
         Sweep& sweep = sweeps_[i];
         sweep.rotation = vector(rotation);
-        sweep.translation = vector(translation);
+        sweep.straight = sweep.translation = vector(translation);
         const double angle = sweep.rotation.norm();
         sweep.turned = angle * placed_[i].solid->reach;
-        const Vector3d arm = placed_[i].position - vector(poses[static_cast<std::size_t>(body)].position);
-        if (angle > 0.0 && !arm.isZero(0.0))
-            sweep.translation += Eigen::AngleAxisd(angle, sweep.rotation / angle) * arm - arm;
+        sweep.arm = placed_[i].position - vector(poses[static_cast<std::size_t>(body)].position);
+        if (angle > 0.0 && !sweep.arm.isZero(0.0)) {
+            sweep.translation += Eigen::AngleAxisd(angle, sweep.rotation / angle) * sweep.arm - sweep.arm;
+            sweep.turned += sweep.arm.norm() * (1.0 - std::cos(std::min(0.5 * angle, std::numbers::pi)));
+        }
     }
 }
 

@@ -48,6 +48,8 @@ struct Sides {
     std::size_t count = 0;
 
     void add(const Vector3d& normal) {
+        for (std::size_t i = 0; i < count; ++i)
+            if (normals[i].dot(normal) > kFlatCosine) return;
         if (count < normals.size()) normals[count++] = normal;
     }
 };
@@ -79,8 +81,57 @@ bool in_cone(const Sides& sides, const Vector3d& n) {
     return false;
 }
 
+/// Calls f(triangle, height, foot) for the triangles of a terrain that a point of its frame lies on or above, by their
+/// normals, up to tolerance; below a height field too.
+template <class F>
+void for_each_triangle(const Solid& solid, const Vector3d& x, double tolerance, F&& f) {
+    const Terrain& surface = *solid.terrain;
+    AlignedBox3d box(x - Vector3d::Constant(tolerance + solid.radius),
+                     x + Vector3d::Constant(tolerance + solid.radius));
+    const bool fills = solid.kind == ShapeKind::HeightField;
+    if (fills) box.max().z() = std::max(box.max().z(), surface.box().max().z());
+    std::vector<std::int32_t> near;
+    surface.near(box, near);
+    for (const std::int32_t number : near) {
+        const Terrain::Triangle& triangle = surface.triangles()[static_cast<std::size_t>(number)];
+        const double height = surface.height(triangle, x) - solid.radius;
+        if (height > tolerance || (!fills && height < -tolerance)) continue;
+        const Vector3d foot = x - (height + solid.radius) * triangle.normal;
+        if ((surface.nearest(triangle, foot) - foot).norm() <= tolerance) f(triangle, height, foot);
+    }
+}
+
+/// Calls f(tail, head, triangle, k) for the sharp edges of a triangle that its point foot lies on up to tolerance.
+template <class F>
+void for_each_sharp_edge(const Terrain& surface, const Terrain::Triangle& triangle, const Vector3d& foot,
+                         double tolerance, F&& f) {
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (triangle.sharp_edge[k] < 0) continue;
+        const Vector3d& tail = surface.vertices()[static_cast<std::size_t>(triangle.corners[k])];
+        const Vector3d& head = surface.vertices()[static_cast<std::size_t>(triangle.corners[(k + 1) % 3])];
+        if (triangle.inward[k].dot(foot - tail) <= tolerance) f(tail, head, k);
+    }
+}
+
+/// covers() for a terrain and a point of its frame. Beyond a rim it has no surface: there its cone ends.
+bool terrain_covers(const Solid& solid, const Vector3d& x, const Vector3d& n, double tolerance) {
+    Sides sides;
+    bool holds = false;
+    for_each_triangle(solid, x, tolerance, [&](const Terrain::Triangle& triangle, double height, const Vector3d& foot) {
+        holds = true;
+        if (height < -tolerance) return;
+        sides.add(triangle.normal);
+        for_each_sharp_edge(*solid.terrain, triangle, foot, tolerance,
+                            [&](const Vector3d&, const Vector3d&, std::size_t k) {
+                                if (triangle.kinds[k] == Terrain::EdgeKind::Rim) sides.add(-triangle.inward[k]);
+                            });
+    });
+    return holds && !in_cone(sides, n);
+}
+
 bool covers(const Placed& by, const Vector3d& point, const Vector3d& n, double tolerance) {
     const Vector3d x = by.rotation.transpose() * (point - by.position);
+    if (by.solid->terrain) return terrain_covers(*by.solid, x, by.rotation.transpose() * n, tolerance);
     Sides sides;
     bool holds = true;
     for_each_side(*by.solid, x, [&](const Vector3d& normal, double height) {
@@ -90,11 +141,16 @@ bool covers(const Placed& by, const Vector3d& point, const Vector3d& n, double t
     return holds && !in_cone(sides, by.rotation.transpose() * n);
 }
 
-double height_above(const Placed& by, const Vector3d& point) {
-    double most = -std::numeric_limits<double>::infinity();
-    for_each_side(*by.solid, by.rotation.transpose() * (point - by.position),
-                  [&](const Vector3d&, double height) { most = std::max(most, height); });
-    return most;
+bool is_within(const Placed& by, const Vector3d& point, double distance) {
+    const Vector3d x = by.rotation.transpose() * (point - by.position);
+    if (by.solid->terrain) {
+        AlignedBox3d box = by.solid->terrain->box();
+        if (by.solid->kind == ShapeKind::HeightField) box.min().z() = std::min(box.min().z(), x.z());
+        return box.squaredExteriorDistance(x) <= distance * distance;
+    }
+    bool within = true;
+    for_each_side(*by.solid, x, [&](const Vector3d&, double height) { within = within && height <= distance; });
+    return within;
 }
 
 /// How far it is from a point inside to a side of a solid, but for one that faces against n, m.
@@ -108,9 +164,29 @@ double depth_across(const Placed& in, const Vector3d& point, const Vector3d& n) 
     return std::isfinite(least) ? std::max(least, 0.0) : 0.0;
 }
 
+/// any_near() for a terrain. Its triangles are open.
+template <class Open>
+bool any_near_on_terrain(const Solid& solid, const Vector3d& x, const Vector3d& d, double tolerance, double near,
+                         Open&& open) {
+    bool found = false;
+    for_each_triangle(solid, x, tolerance, [&](const Terrain::Triangle& triangle, double, const Vector3d& foot) {
+        found = found || triangle.normal.dot(d) > kFlatCosine;
+        for_each_sharp_edge(
+            *solid.terrain, triangle, foot, tolerance, [&](const Vector3d& tail, const Vector3d& head, std::size_t) {
+                const Vector3d along = (head - tail).normalized();
+                if (std::abs(along.dot(d)) > kFlatAngle) return;
+                const double ahead = std::min(near, along.dot(head - foot));
+                const double behind = std::min(near, along.dot(foot - tail));
+                found = found || (ahead > 0.0 && open(x + ahead * along)) || (behind > 0.0 && open(x - behind * along));
+            });
+    });
+    return found;
+}
+
 /// Whether one of the points of a shape's feature near x, which d is normal to, is open; x and d in its frame.
 template <class Open>
 bool any_near(const Solid& solid, const Vector3d& x, const Vector3d& d, double tolerance, double near, Open&& open) {
+    if (solid.terrain) return any_near_on_terrain(solid, x, d, tolerance, near, open);
     // As far as the solid goes, in a plane of one of its sides or along an edge.
     const auto open_towards = [&](const Vector3d& direction) {
         double way = near;
@@ -162,7 +238,7 @@ bool any_near(const Solid& solid, const Vector3d& x, const Vector3d& d, double t
 
 bool has_flat_faces(const Solid& solid) {
     return solid.kind == ShapeKind::Box || solid.kind == ShapeKind::Cylinder || solid.kind == ShapeKind::Convex ||
-           solid.kind == ShapeKind::Plane;
+           solid.kind == ShapeKind::Plane || solid.terrain;
 }
 
 bool is_covered(const Placed& shape, std::span<const Placed* const> neighbours, const Vector3d& point,
@@ -171,8 +247,10 @@ bool is_covered(const Placed& shape, std::span<const Placed* const> neighbours, 
     const Solid& solid = *shape.solid;
     if (neighbours.empty() || !has_flat_faces(solid) || solid.kind == ShapeKind::Plane) return false;
     const auto tolerance_with = [&](const Placed& neighbour) {
-        const double reach = neighbour.solid->reach;
-        return kFlush * std::min({solid.reach, other, reach > 0.0 ? reach : solid.reach});
+        double least = std::numeric_limits<double>::infinity();
+        for (const double reach : {other, solid.reach, neighbour.solid->reach})
+            if (reach > 0.0) least = std::min(least, reach);  // 0: of planes and terrains
+        return kFlush * least;
     };
     double tolerance = 0.0, buried = 0.0;
     for (const Placed* by : neighbours) {
@@ -186,7 +264,7 @@ bool is_covered(const Placed& shape, std::span<const Placed* const> neighbours, 
     std::array<const Placed*, most> close;
     std::size_t count = 0;
     for (const Placed* by : neighbours)
-        if (count < most && height_above(*by, point) <= tolerance + near) close[count++] = by;
+        if (count < most && is_within(*by, point, tolerance + near)) close[count++] = by;
     const auto open = [&](const Vector3d& x) {
         const Vector3d at = shape.position + shape.rotation * x;
         return std::none_of(close.begin(), close.begin() + static_cast<std::ptrdiff_t>(count),

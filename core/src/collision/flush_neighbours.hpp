@@ -14,6 +14,10 @@
 // directions that are normal to both; the face of a wall acts down to the floor that covers its foot, since above p it
 // is open; and so does a step, as far as it is higher than its neighbour by more than the tolerance.
 //
+// A terrain covers what lies on it, and it is covered along its rims: fields of heights that meet, or a terrain that goes
+// on in a box or a plane, have no edge between them. The cone of a rim is that of its triangle's normal and of the
+// direction out of the surface.
+//
 // "Near" is ten tolerances, and twice the depth to which p is buried along the face: a corner that has gone into a wall
 // still stands on the floor beside it.
 #pragma once
@@ -29,7 +33,7 @@ namespace delassus::collision {
 constexpr double kFlush = 1e-4;
 
 /// Whether a shape covers what is near it at all: where its faces, caps or plane are flush with those of others. Balls
-/// and capsules are flush with nothing, terrains know their own edges.
+/// and capsules are flush with nothing.
 [[nodiscard]] bool has_flat_faces(const Solid& solid);
 
 /// Whether neighbours cover the contact of a shape at a point of its surface along the outward normal n there (unit).

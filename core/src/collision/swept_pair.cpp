@@ -3,24 +3,46 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace delassus::collision {
 namespace {
 
+/// By the velocities of the beginning, as a linear bound has it.
 Vector3d displacement(const Placed& placed, const Sweep& sweep, const Vector3& point) {
-    return sweep.translation + sweep.rotation.cross(vector(point) - placed.position);
+    return sweep.straight + sweep.rotation.cross(vector(point) - placed.position + sweep.arm);
+}
+
+/// How far rotation would move a point of the core along a direction, as fast as it does after the share t of the way,
+/// and by how much more at the end of a whole way from there on.
+struct Turning {
+    double speed, acceleration;
+};
+
+/// The sphere about a core does not change as it turns.
+Turning turning(const Placed& placed, const Sweep& sweep, double t, Placed& moved, const Vector3d& direction) {
+    const double angle = sweep.rotation.norm(), reach = sweep.arm.norm() + placed.solid->reach;
+    if (angle == 0.0) return {0.0, 0.0};
+    if (placed.solid->core.vertices.empty()) return {angle * reach, 0.0};
+    moved.rotate_core();
+    const Vector3d fastest = direction.cross(sweep.rotation);
+    const Vector3d arm = moved.position - (placed.position - sweep.arm + t * sweep.straight);
+    return {fastest.dot(arm + moved.support(fastest)), angle * angle * reach};
 }
 
 /// moved ← placed, after the share t of its way.
 void advance(const Placed& placed, const Sweep& sweep, double t, Placed& moved) {
     moved.solid = placed.solid;
     moved.rotated = false;
-    moved.position = placed.position + t * sweep.translation;
+    moved.position = placed.position + t * sweep.straight;
     const double angle = sweep.rotation.norm();
     moved.rotation = placed.rotation;
-    if (angle > 0.0)
-        moved.rotation = Eigen::AngleAxisd(t * angle, sweep.rotation / angle).toRotationMatrix() * placed.rotation;
+    if (angle > 0.0) {
+        const Matrix3d turn = Eigen::AngleAxisd(t * angle, sweep.rotation / angle).toRotationMatrix();
+        moved.rotation = turn * placed.rotation;
+        moved.position += turn * sweep.arm - sweep.arm;
+    }
 }
 
 /// Where a point of the moved solid was at the beginning.
@@ -77,7 +99,7 @@ bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const 
 
 void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                                 double envelope) {
-    constexpr double touching = 1e-6, share = 1e-2, same_cosine = 0.9999;
+    constexpr double touching = 1e-6, share = 1e-3, same_cosine = 0.9999;
     const auto nearest = nearest_of(found_);
     const double reach = a.solid->reach > 0.0 && b.solid->reach > 0.0 ? std::min(a.solid->reach, b.solid->reach)
                                                                       : std::max(a.solid->reach, b.solid->reach);
@@ -105,10 +127,13 @@ void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Swe
         const auto nearest = nearest_of(found_);
         if (nearest == found_.end()) return;
         if (nearest->gap < meeting) break;
-        const double speed =
-            vector(nearest->normal).dot(of_a.translation - of_b.translation) + of_a.turned + of_b.turned;
-        if (speed > 0.0) t += (nearest->gap - 0.5 * meeting) / speed;
-        if (!(speed > 0.0) || t >= 1.0) {
+        const Vector3d normal = vector(nearest->normal);
+        const Turning turns_a = turning(a, of_a, t, moved_a_, normal), turns_b = turning(b, of_b, t, moved_b_, -normal);
+        const double speed = normal.dot(of_a.straight - of_b.straight) + turns_a.speed + turns_b.speed;
+        const double acceleration = turns_a.acceleration + turns_b.acceleration, way = nearest->gap - 0.5 * meeting;
+        const double root = speed + std::sqrt(speed * speed + 2.0 * acceleration * way);
+        if (root > 0.0) t += 2.0 * way / root;
+        if (!(root > 0.0) || t >= 1.0) {
             found_.clear();
             return;
         }

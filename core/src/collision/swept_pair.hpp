@@ -14,13 +14,16 @@
 //           all points of the pair, since what one of them stops turns the others in. Over so short a way normals
 //           hardly turn.
 //   far     the shapes are advanced conservatively (Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems,
-//           1996, section 2.3) until they are in the envelope: from the distance g and the normal n they cannot meet
-//           before the time g/(n·(d_a − d_b) + |θ_a| r_a + |θ_b| r_b). The points of that place are carried back to the
-//           beginning with their bodies, and their gap is n·(p_b − p_a) there. So shapes that pass each other get no
-//           contact, as they would with the normal of the beginning.
-// Of the points of a pair where it is, or near, one may be closer than its bodies move towards it, while none touches
-// yet. Then the shapes are advanced in the same way, to a hundredth of their distance: those that pass get no contact,
-// and where the normal has turned till then those of that place count.
+//           1996, section 2.3) until they are in the envelope. From the distance g and the normal n they cannot meet
+//           before g = s τ + ½ c τ²: s is the largest speed along n of two of their points, n·(d_a − d_b) + max
+//           p·(n×θ_a)
+//           + max p·(θ_b×n) over the points p of the cores about the origins of their bodies, whose translations are d,
+//           and c = |θ_a|² r_a + |θ_b|² r_b bounds how it grows. So what turns past a surface takes few advances. The
+//           points of that place are carried back to the beginning with their bodies, and their gap is n·(p_b − p_a)
+//           there. So shapes that pass each other get no contact, as they would with the normal of the beginning.
+// Of the points of a pair where it is, or near, one may be closer than its bodies move towards it at first, as the
+// bound has it, while none touches yet. Then the shapes are advanced in the same way, to a thousandth of their distance:
+// those that pass get no contact, and where the normal has turned till then those of that place count.
 #pragma once
 
 #include <vector>
@@ -29,11 +32,14 @@
 
 namespace delassus::collision {
 
-/// How a shape moves over the step.
+/// How a shape moves over the step: with its body, which moves straight on and turns about its origin.
 struct Sweep {
-    Vector3d translation = Vector3d::Zero();  ///< of its origin, m
+    Vector3d straight = Vector3d::Zero();     ///< translation of the body's origin, m
+    Vector3d arm = Vector3d::Zero();          ///< from there to the shape's origin, m
     Vector3d rotation = Vector3d::Zero();     ///< rotation vector, rad
-    double turned = 0.0;                      ///< how far its rotation moves a point at most, m
+    Vector3d translation = Vector3d::Zero();  ///< of the shape's origin over the whole step, m
+    /// How far a point of it gets at most from where the shape would be without rotation along the chord, m.
+    double turned = 0.0;
 };
 
 /// m: how much nearer to each other two shapes can come.

@@ -275,15 +275,17 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
     return change <= largest_turn_squared * size;
 }
 
-void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const {
+void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const {
     const double gap = contact.resolved_gap();
-    const double speed = -contact.approach, drift = (1.0 - theta_) * h_ * speed;
+    // What does not push yet closes by the row in the middle of the step, of order 2 along a path that curves.
+    const double speed = settings_.once || contact.pushed ? -contact.approach : middle_speed;
+    const double drift = (1.0 - theta_) * h_ * speed;
     contact.normal = 0.0;
     if (!settings_.once && block.restitution > 0.0 && speed < -settings_.restitution_speed) {
         const bool closes = gap + h_ * speed <= 0.0;
         contact.strikes = closes && !contact.pushed;
-        contact.normal = closes ? block.restitution * std::min(impact_speed, 0.0)
-                                : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
+        contact.normal =
+            closes ? block.restitution * std::min(speed, 0.0) : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
         if (closes) contact.turns = contact.turns && contact.pushed;
     } else if (settings_.once && (gap <= 0.0 || contact.pushed) && !contact.left) {
         const double wanted = gap + std::clamp(drift, -std::abs(gap), std::abs(gap));

@@ -157,7 +157,7 @@ private:
     /// that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);
     void report_closing(const Contact& contact, StepReport& report) const;
-    void set_normal(const UnilateralRows::Block& block, Contact& contact, double impact_speed) const;
+    void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     template <class Visit>
     void for_each_impact(const Solution& solution, const Visit& visit) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);

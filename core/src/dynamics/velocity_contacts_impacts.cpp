@@ -95,7 +95,8 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         };
         const auto acceleration = [&] { return (speed_of(smooth.data()) - speed_of(begin_speeds_)) / h_; };
         const auto strikes = [&] {
-            return bounces ? speed < -settings_.restitution_speed : speed < -h_ * std::abs(acceleration());
+            return bounces ? speed < -settings_.restitution_speed
+                           : speed < -h_ * std::abs(acceleration()) - contact.resolution / h_;
         };
         if (!bounces && gap <= 0.0 && !strikes()) {
             if (contact.known) take_rates_of_end(contact, block);
