@@ -168,6 +168,30 @@ TEST(KinematicBody, HoldsWhatRidesInADrum) {
     EXPECT_NEAR(angle_2, 0.0, 5e-3) << "it slips as it is set down";
 }
 
+// Round bodies that turn about their own axes do not change: a board rests on them for ever.
+TEST(KinematicBody, RollersCarryABoard) {
+    for (const std::string shape : {"cylinder: {radius: 0.1, length: 0.4}", "capsule: {radius: 0.1, length: 0.4}"})
+        for (const std::string step : {"0.002", "0.0167", "0.0131, integrator: euler_implicit_linearized"}) {
+            SCOPED_TRACE(shape + ", step " + step);
+            Running run(parse_scene(
+                fmt::format(
+                    "{{step: {}, end: 2, materials: {{m: {{friction: 0.3}}}}, bodies: ["
+                    "{{name: left, position: [-0.5, 0, -0.1], orientation: {{axis: [1, 0, 0], angle: 90}}, "
+                    "motion: {{rotation: {{axis: [0, 1, 0], angle: {{linear: {{rate: 60}}}}}}}}, "
+                    "shapes: [{{{}, material: m}}]}}, "
+                    "{{name: right, position: [0.5, 0, -0.1], orientation: {{axis: [1, 0, 0], angle: 90}}, "
+                    "motion: {{rotation: {{axis: [0, 1, 0], angle: {{linear: {{rate: -60}}}}}}}}, "
+                    "shapes: [{{{}, material: m}}]}}, "
+                    "{{name: board, mass: 2, position: [0, 0, 0.05], shapes: [{{box: {{size: [1.4, 0.3, 0.1]}}, "
+                    "material: m}}]}}]}}",
+                    step, shape, shape),
+                "s"));
+            run.finish();
+            EXPECT_NEAR(run.pose("board").position[0], 0.0, 1e-6);
+            EXPECT_NEAR(run.pose("board").position[2], 0.05, 1e-6);
+        }
+}
+
 TEST(KinematicBody, ThrowsABoxOffAboveTheBound) {
     Running run(parse_scene(turntable(3.5), "s"));  // ω² r = 4.9 m/s²
     run_to(run, 1.0);

@@ -260,6 +260,9 @@ struct MultibodySystem::Implementation {
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;
     };
     [[nodiscard]] PointOfOwner point_of(std::int32_t owner, const mechanics::Vector3d& point) const;
+    /// The point of the axis, or the centre, below a point of a round surface with this normal; nothing for others.
+    [[nodiscard]] std::optional<mechanics::Vector3d> axis_below(std::int32_t shape, const mechanics::Vector3d& point,
+                                                                const mechanics::Vector3d& outward) const;
     /// Of a point of an owner's surface, its mean over a step of length h (s) as what has this center meets it; 0 where
     /// the owner's motion is not prescribed. place_for_step() has been called.
     [[nodiscard]] mechanics::Vector3d prescribed_velocity(std::int32_t owner, const mechanics::Vector3d& point,

@@ -240,6 +240,25 @@ MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::p
 // the end of the step, and beside it as the body would that rides on it: what rests on the surface has D v + rate = 0
 // at all its points, and stays where it is on it. Along the tangent it would be carried outwards by r (ω h)²/2 in each
 // step.
+//
+// A round surface does not change as it turns about its axis, whatever lies on it: there c is the point of the axis
+// below, and the surface has the speed of that point and what the spin adds to it. With the chord of a point of the
+// surface it would withdraw by r (ω h)²/2 in each step, and a board would sink into the rollers that carry it.
+std::optional<Vector3d> MultibodySystem::Implementation::axis_below(std::int32_t number, const Vector3d& point,
+                                                                    const Vector3d& outward) const {
+    if (number >= static_cast<std::int32_t>(shapes.size())) return std::nullopt;
+    const Shape& shape = shapes[static_cast<std::size_t>(number)];
+    if (shape.kind != ShapeKind::Sphere && shape.kind != ShapeKind::Capsule && shape.kind != ShapeKind::Cylinder)
+        return std::nullopt;
+    if (shape.kind == ShapeKind::Cylinder && shape.body != world_body) {
+        constexpr double most_tilt = 1e-3;
+        const auto& [w, x, y, z] = shape.pose.orientation;
+        const Vector3d axis = at[shape.body].A * (mechanics::Quaterniond(w, x, y, z) * Vector3d::UnitZ());
+        if (std::abs(axis.dot(outward)) > most_tilt) return std::nullopt;
+    }
+    return point - shape.size[0] * outward;
+}
+
 Vector3d MultibodySystem::Implementation::prescribed_velocity(std::int32_t owner, const Vector3d& point,
                                                               const Vector3d& center, double h) const {
     if (owner >= static_cast<std::int32_t>(bodies.size()) || !at[owner].prescribed()) return Vector3d::Zero();
@@ -290,10 +309,13 @@ void MultibodySystem::Implementation::collect_contacts(double h, UnilateralRows&
         const std::int32_t owner_a = owner_of(contact.shape_a), owner_b = owner_of(contact.shape_b);
         const PointOfOwner a = point_of(owner_a, vector(contact.point_a));
         const PointOfOwner b = point_of(owner_b, vector(contact.point_b));
-        const Vector3d prescribed_speed =
-            prescribed.empty() ? Vector3d(Vector3d::Zero())
-                               : Vector3d(prescribed_velocity(owner_b, vector(contact.point_b), a.center, h) -
-                                          prescribed_velocity(owner_a, vector(contact.point_a), b.center, h));
+        Vector3d prescribed_speed = Vector3d::Zero();
+        if (!prescribed.empty()) {
+            const Vector3d on_a = vector(contact.point_a), on_b = vector(contact.point_b);
+            prescribed_speed =
+                prescribed_velocity(owner_b, on_b, axis_below(contact.shape_b, on_b, -normal).value_or(a.center), h) -
+                prescribed_velocity(owner_a, on_a, axis_below(contact.shape_a, on_a, normal).value_or(b.center), h);
+        }
         const auto put_row = [&](const Vector3d& direction, double gap) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
