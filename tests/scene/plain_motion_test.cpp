@@ -268,6 +268,24 @@ TEST(PlainMotion, ThinPlatesDoNotGoThroughOneAnother) {
     EXPECT_GT(run.pose("two").position[2], 0.0);
 }
 
+TEST(PlainMotion, JointsBeyondTheirStopsAtTheStartAreNamed) {
+    const auto warnings = [](const std::string& stops) {
+        auto run = run_of(
+            "step: 0.01\nend: 0.1\nbodies:\n- {name: arm, mass: 1, inertia: {xx: 0.1, yy: 0.1, zz: 0.1}, position: "
+            "[1, 0, 0]}\njoints:\n- {name: hinge, kind: revolute, second: arm, axis: [0, 1, 0], " +
+            stops + "}\n");
+        return run.simulation.warnings();
+    };
+    EXPECT_EQ(warnings("upper: 0, lower: -1"), std::vector<std::string>());
+    EXPECT_EQ(warnings("upper: -0.5, start: -0.6"), std::vector<std::string>());
+    for (const std::string stops : {"upper: -0.5", "lower: 0.5, upper: 1"}) {
+        const auto found = warnings(stops);
+        ASSERT_EQ(found.size(), 1) << stops;
+        EXPECT_NE(found[0].find("the joint \"hinge\" starts at 0 rad, beyond its stop at"), std::string::npos)
+            << found[0];
+    }
+}
+
 TEST(PlainMotion, OverlapsOfTheStartAreNamed) {
     const auto warnings = [](double height) {
         auto run = run_of(fmt::format(

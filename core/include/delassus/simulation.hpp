@@ -267,6 +267,7 @@ private:
     std::uint64_t revision_ = 0;                 // of the system, that the method knows
     std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
     Assembly assembly_;
+    std::string beyond_stops_;  // at the start, a warning; or empty
     std::shared_ptr<const Equilibrium> equilibrium_;
     std::unique_ptr<JointCoordinates> joint_;  // empty in maximal coordinates
     SimulationState now_;

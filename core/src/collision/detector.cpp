@@ -23,6 +23,12 @@ bool rotation_of(const Quaternion& orientation, Matrix3d& rotation) {
     return std::isfinite(norm) && norm > 0.0;
 }
 
+/// Whether volumes of boxes of this size are numbers.
+bool is_measurable(const Vector3d& v) {
+    constexpr double largest = 1e50;
+    return v.allFinite() && v.cwiseAbs().maxCoeff() < largest;
+}
+
 /// In the world, with what may be out of flush.
 BroadPhase::Box box_of_terrain(const Placed& placed) {
     const AlignedBox3d& own = placed.solid->terrain->box();
@@ -176,8 +182,9 @@ void Detector::place(std::span<const Pose> poses) {
                                      setup_.fixed.size()));
     }
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        if (!rotation_of(poses[i].orientation, body_rotations_[i]) || !vector(poses[i].position).allFinite())
-            throw InputError(fmt::format("The pose of body {} is not finite, or its quaternion is zero.", i));
+        if (!rotation_of(poses[i].orientation, body_rotations_[i]) || !is_measurable(vector(poses[i].position)))
+            throw InputError(
+                fmt::format("The pose of body {} is not finite or beyond 1e50 m, or its quaternion is zero.", i));
     }
     for (std::size_t i = 0; i < placed_.size(); ++i) {
         const Shape& shape = setup_.shapes[i];
@@ -204,8 +211,8 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
         const std::int32_t body = setup_.shapes[i].body;
         if (body < 0) continue;
         const auto& [translation, rotation] = displacements[static_cast<std::size_t>(body)];
-        if (!vector(translation).allFinite() || !vector(rotation).allFinite())
-            throw InputError(fmt::format("The motion of body {} is not finite.", body));
+        if (!is_measurable(vector(translation)) || !is_measurable(vector(rotation)))
+            throw InputError(fmt::format("The motion of body {} in a step is not finite or beyond 1e50 m.", body));
         Sweep& sweep = sweeps_[i];
         sweep.rotation = vector(rotation);
         sweep.straight = sweep.translation = vector(translation);

@@ -21,6 +21,7 @@
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
+#include "simulation/stops_at_start.hpp"
 #include "simulation/touching.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
@@ -169,6 +170,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (ahead_) ahead_->begin(now_.state);
     if (joint_) joint_->bodies_of(now_.state, bodies_);
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
+    beyond_stops_ = beyond_stops(*system.system, bodies_at(now_.state, next_bodies_));
     guard_ = std::make_unique<EnergyGuard>(system);
     if (!shared_ && !system.method_reason.empty())
         energy_ = std::make_unique<EnergyWatch>(*guard_, system, system.accuracy);
@@ -573,6 +575,7 @@ std::vector<std::string> Simulation::warnings() const {
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
     if (overlaps_ && !overlaps_->at_start().empty())
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
+    if (!beyond_stops_.empty()) sentences.push_back(fmt::format("system \"{}\": {}", system_->name, beyond_stops_));
     if (const auto& totals = now_.totals; totals.inexact_steps > 0)
         sentences.push_back(fmt::format(
             "system \"{}\": {} of {} steps are less exact than accuracy: {:.3g} asks, however short their parts: what "
