@@ -2,6 +2,7 @@
 // What the detector reports of many shapes, and what it refuses.
 #include <cstring>
 #include <limits>
+#include <tuple>
 
 #include "collision/scene.hpp"
 #include "delassus/error.hpp"
@@ -199,6 +200,21 @@ TEST(Detector, RespectsTheEnvelope) {
     EXPECT_EQ(touch(ball, ball, pose(Vector3d::Zero()), pose(Vector3d(2.1, 0.0, 0.0)), 0.1001).size(), 1U);
 }
 
+TEST(Detector, APairIsNearByTheLesserOfItsShapes) {
+    const Shape one = shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 0),
+                other = shape(ShapeKind::Sphere, {1.0, 0.0, 0.0}, 1);
+    CollisionSetup setup{{one, other}, {false, false}, {}};
+    setup.near = {0.3, 0.05};
+    const auto detector = make_collision_detector(setup);
+    std::vector<ContactPoint> contacts;
+    for (const auto& [envelope, gap, found] :
+         {std::tuple(0.2, 0.04, 1U), std::tuple(0.2, 0.06, 0U), std::tuple(0.02, 0.04, 0U)}) {
+        detector->detect(std::vector<Pose>{pose(Vector3d::Zero()), pose(Vector3d(2.0 + gap, 0.0, 0.0))}, envelope,
+                         contacts);
+        EXPECT_EQ(contacts.size(), found) << envelope << " " << gap;
+    }
+}
+
 TEST(Detector, ShapesSitWhereTheirPoseSays) {
     Shape ball = shape(ShapeKind::Sphere, {0.5, 0.0, 0.0}, 0), box = shape(ShapeKind::Box, {1.0, 0.2, 0.1}, 1);
     ball.pose = pose(Vector3d(0.0, 0.0, 2.0));
@@ -218,8 +234,10 @@ TEST(Detector, BadCallsAreRefused) {
     std::vector<Pose> poses(1);
     EXPECT_THROW(detector->detect(poses, -1.0, contacts), InputError);
     EXPECT_THROW(detector->detect({}, 0.1, contacts), InputError);
-    poses[0].position[1] = std::nan("");
-    EXPECT_THROW(detector->detect(poses, 0.1, contacts), InputError);
+    for (const double absurd : {std::nan(""), 1e300}) {
+        poses[0].position[1] = absurd;
+        EXPECT_THROW(detector->detect(poses, 0.1, contacts), InputError);
+    }
 }
 
 #endif

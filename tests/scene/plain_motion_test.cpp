@@ -134,6 +134,23 @@ TEST(PlainMotion, WhatTurnsPastAFloorDoesNotTouchIt) {
         }
 }
 
+// Walls that are large and far away change nothing about what is near: a heavy box rests on a light can.
+TEST(PlainMotion, AHeavyBoxRestsInARoom) {
+    std::string room =
+        "step: 0.002\nend: 1\nmaterials: {m: {friction: 0.5}}\nbodies:\n"
+        "- {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n"
+        "- {name: can, mass: 1, position: [0, 0, 0.1], shapes: [{cylinder: {radius: 0.2, length: 0.2}, material: m}]}\n"
+        "- {name: box, mass: 1000, position: [0.03, 0, 0.35], shapes: [{box: {size: [0.5, 0.5, 0.3]}, material: m}]}\n";
+    for (const auto& [x, y] : {std::pair(10, 0), std::pair(-10, 0), std::pair(0, 10), std::pair(0, -10)})
+        room += fmt::format(
+            "- {{name: wall_{}_{}, fixed: true, position: [{}, {}, 0], shapes: [{{box: {{size: [10, 10, 10]}}}}]}}\n",
+            x, y, x, y);
+    auto run = run_of(room);
+    run.finish();
+    EXPECT_NEAR(run.pose("box").position[0], 0.03, 1e-6);
+    EXPECT_NEAR(run.pose("box").position[2], 0.35, 1e-6);
+}
+
 TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     auto run = run_of(
         "step: 0.0017\nend: 6\nmaterials: {m: {friction: 1}}\nbodies:\n"

@@ -89,6 +89,9 @@ struct CollisionSetup {
     /// move against one another, but for those of number 0, the world's: all whose place is given, fixed or not. −1: a
     /// solid by itself. Empty: the fixed ones are of the world's, the others by themselves.
     std::vector<std::int32_t> solid{};
+    /// Of shapes: within which distance others are near, m. A pair takes the lesser of the two, or the envelope if that
+    /// is less. Empty: the envelope.
+    std::vector<double> near{};
     /// Of shapes: a number, pairs of which never touch as `passing` says, the lesser first. Empty: all touch.
     std::vector<std::int32_t> material{};
     std::vector<std::pair<std::int32_t, std::int32_t>> passing{};

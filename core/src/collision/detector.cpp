@@ -241,13 +241,13 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
     for (std::size_t i = 0; i < bounded_.size(); ++i) {
         const Placed& placed = placed_[bounded_[i]];
         const Sweep& sweep = sweeps_[bounded_[i]];
-        const double way = sweep.translation.norm() + sweep.turned;
-        const double more = 0.5 * envelope + (way <= 0.5 * envelope ? 0.0 : sweep.turned);
+        const double way = sweep.translation.norm() + sweep.turned, half_near = 0.5 * near_of(bounded_[i], envelope);
+        const double more = half_near + (way <= half_near ? 0.0 : sweep.turned);
         const Vector3d half = half_extent(placed) + Vector3d::Constant(more);
         boxes_[i].min_ = placed.position - half;
         boxes_[i].max_ = placed.position + half;
-        balls_[i] = {placed.position, (1.0 + 1e-12) * placed.solid->reach + 0.5 * envelope};
-        if (way <= 0.5 * envelope) continue;
+        balls_[i] = {placed.position, (1.0 + 1e-12) * placed.solid->reach + half_near};
+        if (way <= half_near) continue;
         boxes_[i].min_ += sweep.translation.cwiseMin(0.0);
         boxes_[i].max_ += sweep.translation.cwiseMax(0.0);
         balls_[i].radius += way;
@@ -270,7 +270,7 @@ void Detector::detect(std::span<const Pose> poses, double envelope, std::vector<
         const Vector3d normal = placed_[plane].axis();
         for (const std::int32_t shape : bounded_) {
             const Placed& placed = placed_[shape];
-            const double bound = std::max(envelope, approach_bound(sweeps_[plane], sweeps_[shape]));
+            const double bound = std::max(near_of(shape, envelope), approach_bound(sweeps_[plane], sweeps_[shape]));
             if (normal.dot(placed.position - placed_[plane].position) - placed.solid->reach >= bound) continue;
             if (may_touch(plane, shape)) with_ground_.emplace_back(std::min(plane, shape), std::max(plane, shape));
         }
@@ -315,7 +315,7 @@ void Detector::collide_pairs(std::size_t first, std::size_t last, double envelop
     for (std::size_t k = first; k < last; ++k) {
         const auto& [a, b] = pairs_[k];
         const std::size_t before = contacts.size();
-        by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], envelope, contacts);
+        by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], near_of(a, b, envelope), contacts);
         leave_out_covered(a, b, before, by, contacts);
         for (std::size_t i = before; i < contacts.size(); ++i) {
             contacts[i].shape_a = a;

@@ -29,6 +29,13 @@ private:
                        std::vector<ContactPoint>& contacts);
     [[nodiscard]] bool may_touch(std::int32_t shape_a, std::int32_t shape_b) const;
     [[nodiscard]] bool is_fixed(std::int32_t body) const;
+    /// The envelope of a shape, or of a pair, m.
+    [[nodiscard]] double near_of(std::int32_t shape, double envelope) const {
+        return setup_.near.empty() ? envelope : std::min(envelope, setup_.near[static_cast<std::size_t>(shape)]);
+    }
+    [[nodiscard]] double near_of(std::int32_t a, std::int32_t b, double envelope) const {
+        return std::min(near_of(a, envelope), near_of(b, envelope));
+    }
     /// Whether two shapes of one solid may be flush, and whether that changes while they move past each other.
     [[nodiscard]] bool may_be_flush(std::int32_t shape_a, std::int32_t shape_b) const;
     [[nodiscard]] bool pass_flush(std::int32_t shape_a, std::int32_t shape_b) const;

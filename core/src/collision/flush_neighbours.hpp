@@ -14,8 +14,8 @@
 // directions that are normal to both; the face of a wall acts down to the floor that covers its foot, since above p it
 // is open; and so does a step, as far as it is higher than its neighbour by more than the tolerance.
 //
-// A terrain covers what lies on it, and it is covered along its rims: fields of heights that meet, or a terrain that goes
-// on in a box or a plane, have no edge between them. The cone of a rim is that of its triangle's normal and of the
+// A terrain covers what lies on it, and it is covered along its rims: fields of heights that meet, or a terrain that
+// goes on in a box or a plane, have no edge between them. The cone of a rim is that of its triangle's normal and of the
 // direction out of the surface.
 //
 // "Near" is ten tolerances, and twice the depth to which p is buried along the face: a corner that has gone into a wall

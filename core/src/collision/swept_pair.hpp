@@ -22,8 +22,8 @@
 //           points of that place are carried back to the beginning with their bodies, and their gap is n·(p_b − p_a)
 //           there. So shapes that pass each other get no contact, as they would with the normal of the beginning.
 // Of the points of a pair where it is, or near, one may be closer than its bodies move towards it at first, as the
-// bound has it, while none touches yet. Then the shapes are advanced in the same way, to a thousandth of their distance:
-// those that pass get no contact, and where the normal has turned till then those of that place count.
+// bound has it, while none touches yet. Then the shapes are advanced in the same way, to a thousandth of their
+// distance: those that pass get no contact, and where the normal has turned till then those of that place count.
 #pragma once
 
 #include <vector>

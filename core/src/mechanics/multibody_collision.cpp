@@ -143,7 +143,14 @@ void MultibodySystem::Implementation::make_detector() {
     const bool bodies_touch = moves && std::any_of(setup.shapes.begin(), setup.shapes.end(), meets_another);
     if (bodies_touch || mesh_touching) {
         size = median_size(setup.shapes);
-        if (envelope == 0.0) envelope = 0.05 * size;
+        if (envelope == 0.0) {
+            constexpr double share = 0.05;
+            envelope = share * size;
+            for (const Shape& shape : setup.shapes) {
+                const double own = size_of(shape);
+                setup.near.push_back(own > 0.0 ? share * own : HUGE_VAL);
+            }
+        }
     }
     if (!bodies_touch) {
         if (!leaves_out) static_cast<void>(make_collision_detector({}));
