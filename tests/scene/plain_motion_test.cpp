@@ -151,6 +151,30 @@ TEST(PlainMotion, AHeavyBoxRestsInARoom) {
     EXPECT_NEAR(run.pose("box").position[2], 0.35, 1e-6);
 }
 
+// Impacts that follow one another within a step: each ball hands all of its speed to the next.
+TEST(PlainMotion, ARowOfBallsHandsOnItsSpeed) {
+    for (const double gap : {1e-3, 1e-5})
+        for (const double step : {0.0013, 1.0 / 60.0}) {
+            SCOPED_TRACE(fmt::format("step {}, gap {}", step, gap));
+            std::string row = fmt::format(
+                "step: {}\nend: 0.4\ngravity: [0, 0, 0]\nmaterials: {{m: {{restitution: 1}}}}\nbodies:\n"
+                "- {{name: cue, mass: 0.17, position: [-0.5, 0, 0], velocity: [3, 0, 0], "
+                "shapes: [{{sphere: {{radius: 0.03}}, material: m}}]}}\n",
+                step);
+            for (int k = 0; k < 4; ++k)
+                row += fmt::format(
+                    "- {{name: ball_{}, mass: 0.17, position: [{:.17g}, 0, 0], "
+                    "shapes: [{{sphere: {{radius: 0.03}}, material: m}}]}}\n",
+                    k, k * (0.06 + gap));
+            auto run = run_of(row);
+            run.finish();
+            EXPECT_NEAR(run.velocities("cue")[0][0], 0.0, 1e-6);
+            EXPECT_NEAR(run.velocities("ball_2")[0][0], 0.0, 1e-6);
+            EXPECT_NEAR(run.velocities("ball_3")[0][0], 3.0, 1e-6);
+            EXPECT_NEAR(run.pose("ball_3").position[0], 3.0 * 0.4 - 0.5 + 4.0 * 0.06, 1e-6);
+        }
+}
+
 TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     auto run = run_of(
         "step: 0.0017\nend: 6\nmaterials: {m: {friction: 1}}\nbodies:\n"

@@ -36,6 +36,9 @@ struct StepReport {
     // Of the fastest contact or stop that closed, that is, one that pushed in this step and not in the one before:
     double impact_speed = 0.0;  ///< with which it closed, in its unit a second; 0: none
     double impact_time = 0.0;   ///< when, after the beginning of the step
+    /// When, after the beginning, to cut a step in which a contact with restitution meets by what another impact did:
+    /// between the two; 0: there is none. It does not bounce in this step, as the method knew of no meeting.
+    double cut = 0.0;
     /// The error of a linearised method's forces at the end of the step, as a share of the velocities
     /// (docs/integrators.md); 0 where forces are linear, or where it is not measured.
     double linearization = 0.0;
@@ -114,6 +117,9 @@ public:
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
     [[nodiscard]] virtual double reaction_growth() const { return 0.0; }
+    /// Says that the next steps are parts of one that was cut (StepReport::cut), or no longer: open contacts of bodies
+    /// that something strikes close by what comes after that. Default: nothing.
+    virtual void follow_impacts(bool /*follow*/) {}
     /// Says, before the first step, that steps of sizes follow that a tolerance chooses (StepControl::absolute): what
     /// the method lets depend on h besides its error, as the height at which a sliding contact of the associated law
     /// floats, has to go, and what it leaves of its iterations may follow the tolerance. Default: nothing.

@@ -112,6 +112,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
         contacts_.weigh_impacts(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
         late_.resize(static_cast<std::size_t>(n_));
         contacts_.add_late_impulse(problem_, solution_, late_);
+        report.cut = contacts_.cut_between_impacts(solution_);
     }
     if (!settings_.linearly_implicit || !late_.empty() || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name, late_);
@@ -120,7 +121,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
         projection_.project_velocities(end_, problem_.H, solver, report);
     }
     if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
-    if (settings_.linearly_implicit) remember_change(result_, h);
+    if (settings_.linearly_implicit && !contacts_.follows_impacts()) remember_change(result_, h);
     last_h_ = h;
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;

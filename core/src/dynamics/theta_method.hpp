@@ -39,6 +39,7 @@ public:
     [[nodiscard]] int order() const override { return settings_.theta == 0.5 ? 2 : 1; }
     void choose_steps(double /*tolerance*/) override { chooses_steps_ = true; }
     void restart() override;
+    void follow_impacts(bool follow) override { contacts_.follow_impacts(follow); }
     void forces_jumped() override;
     [[nodiscard]] StepMemory memory() const override;
     void set_memory(StepMemory&& memory) override;

@@ -63,6 +63,11 @@ namespace delassus {
 // is what positions lack, with the share of P that is the impact's (velocity_contacts_impacts.cpp), where the step
 // moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end of the step (position_projection.cpp).
 //
+// A body that is struck at τ moves as it did until then, so that its open contacts close by what comes after: g + u⁻ τ
+// + (h − τ) u⁺ ≥ 0. One that is closed by this would bounce with a speed that the step does not know. A step with such
+// a contact is cut between the two impacts (StepReport::cut), and in the second part both bodies have the speeds with
+// which they meet.
+//
 // Without restitution a contact strikes if it is faster at the beginning of the step than the step makes it, u⁻ < −|a|
 // h. What is slower belongs to the smooth motion, as the next corner of what rolls: it lands by the last case, and its
 // time would change positions by O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -81,6 +82,11 @@ public:
     /// momentum += what positions at the end of the step lack where those of impacts act at their own times and not
     /// over the whole step, divided by h; n. After weigh_impacts().
     void add_late_impulse(const Problem& problem, const Solution& solution, std::vector<double>& momentum) const;
+    /// Timestepper::follow_impacts().
+    void follow_impacts(bool follow) { follows_ = follow; }
+    [[nodiscard]] bool follows_impacts() const { return follows_; }
+    /// StepReport::cut, after weigh_impacts(). solution: of the whole problem.
+    [[nodiscard]] double cut_between_impacts(const Solution& solution) const;
     /// Sets the marks of the velocities that impacts changed at once, n.
     void mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
 
@@ -140,7 +146,8 @@ private:
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool strikes = false;                        ///< b is that of an impact
         std::optional<Impact> impact;                ///< `once`: it strikes at a time within the step
-        double share = 1.0;                          ///< of its impulse, that of the impact
+        double struck = HUGE_VAL;  ///< `once`: when an impact first strikes one of the bodies of an open contact
+        double share = 1.0;        ///< of its impulse, that of the impact
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -158,6 +165,7 @@ private:
     bool take_rows_at(double time, std::size_t block, Problem& problem);
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
+    void find_struck(const Problem& problem);
     template <class Visit>
     void for_each_impact(const Solution& solution, const Visit& visit) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
@@ -175,10 +183,11 @@ private:
     std::vector<Contact> contacts_;
     State middle_;
     std::vector<double> delta_, diagonal_;
+    std::vector<double> struck_;  // of each velocity, when an impact first changes it; empty where there is none
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     std::size_t first_row_ = 0;             // in the problem
-    bool coulomb_ = false, settled_ = true;
+    bool coulomb_ = false, settled_ = true, follows_ = false;
 };
 
 /// report ← the impact of a normal row that pushes, if it is one and the fastest so far: it did not push in the step

@@ -132,6 +132,35 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             contact.recovery = 0.0;
         }
     }
+    find_struck(problem);
+}
+
+// An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ).
+void VelocityContacts::find_struck(const Problem& problem) {
+    constexpr double shortest_rest = 1e-9;
+    const auto& D = problem.D;
+    struck_.clear();
+    const auto for_each_column = [&](const Contact& contact, const auto& act) {
+        const std::size_t row = first_row_ + contact.row;
+        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
+            act(static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]));
+    };
+    for (const Contact& contact : contacts_) {
+        if (!contact.impact || contact.impact->closing <= 0.25 * contact.impact->change) continue;
+        struck_.resize(static_cast<std::size_t>(D.columns), HUGE_VAL);
+        for_each_column(
+            contact, [&](std::size_t column) { struck_[column] = std::min(struck_[column], contact.impact->meets); });
+    }
+    if (struck_.empty()) return;
+    for (Contact& contact : contacts_) {
+        const double gap = contact.resolved_gap();
+        if (!contact.along_normal || contact.impact || contact.pushed || !(gap > 0.0)) continue;
+        for_each_column(contact,
+                        [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
+        if (!(contact.struck < h_)) continue;
+        const double then = std::max(gap - contact.approach * contact.struck, 0.0);
+        contact.normal = then / std::max(h_ - contact.struck, shortest_rest * h_);
+    }
 }
 
 template <class Visit>
@@ -210,6 +239,31 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
                 momentum[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] +=
                     late * D.value[static_cast<std::size_t>(e)] * solution.lambda[row];
     });
+}
+
+// An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
+// impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s.
+double VelocityContacts::cut_between_impacts(const Solution& solution) const {
+    constexpr double faint = 1e-2, least_part = 1e-6;
+    double fastest = 0.0, cut = 0.0;
+    for_each_impact(solution, [&](std::size_t k, std::size_t, std::size_t) {
+        fastest = std::max(fastest, contacts_[k].impact->closing);
+    });
+    if (fastest == 0.0) return 0.0;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        const std::size_t row = first_row_ + contact.row;
+        const double gap = contact.resolved_gap(), closing = contact.change - contact.end_speed;
+        if (!(contact.struck < h_) || rows_.blocks()[k].restitution == 0.0 || !(solution.lambda[row] > 0.0) ||
+            !(closing > faint * fastest))
+            continue;
+        const double struck = contact.struck;
+        const double meets = struck + std::max(gap - contact.approach * struck, 0.0) / closing;
+        if (!(meets < h_) || meets - struck < least_part * h_) continue;
+        const double between = 0.5 * (struck + meets);
+        if (cut == 0.0 || between < cut) cut = between;
+    }
+    return cut;
 }
 
 void VelocityContacts::mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {

@@ -151,9 +151,63 @@ void Simulation::advance_ahead(State& state, double end, StepReport& report) {
     report.multipliers.clear();
 }
 
+// A step in which an impact leads to another one is cut between them, as often as it has to be: the second one then has
+// the speed with which its bodies meet. Restitution gives back no more than there was: else the step stays whole.
 void Simulation::take_step(State& state, double h, StepReport& report) {
-    if (!shared_) return timestepper_->step(state, h, *solver_, report);
-    shared_->step(state, h, *timestepper_, *solver_, report);
+    if (shared_) return shared_->step(state, h, *timestepper_, *solver_, report);
+    if (!restitutes_) return timestepper_->step(state, h, *solver_, report);
+    const State begin = state;
+    const std::vector<double> memory = timestepper_->save();
+    timestepper_->step(state, h, *solver_, report);
+    if (report.cut == 0.0) return;
+    constexpr double rounding = 1e-6;
+    const MultibodySystem& mechanics = *system_->system;
+    const auto energy = [&](const State& at) { return mechanics.energy(bodies_at(at, next_bodies_)); };
+    const double kinetic = mechanics.kinetic_energy(bodies_at(begin, next_bodies_));
+    const double most = std::max(energy(begin), energy(state)) + rounding * kinetic;
+    State whole = std::move(state);
+    StepReport of_whole = std::move(report);
+    const std::vector<double> after = timestepper_->save();
+    state = begin;
+    bool kept = false;
+    try {
+        step_between_impacts(state, h, of_whole.cut, memory, report);
+        kept = energy(state) <= most;
+    } catch (const StepFailure&) {
+        // The whole step could be taken.
+    }
+    timestepper_->follow_impacts(false);
+    if (kept) return;
+    state = std::move(whole);
+    report = std::move(of_whole);
+    timestepper_->restart();
+    timestepper_->load(after);
+}
+
+/// memory: the timestepper's at `state`; the first part has this length.
+void Simulation::step_between_impacts(State& state, double h, double first, std::vector<double> memory,
+                                      StepReport& report) {
+    const double end = state.t + h;
+    double part = first;
+    StepReport before;
+    timestepper_->follow_impacts(true);
+    for (std::int64_t cuts = 1; part > shortest_part * h;) {
+        const State begin = state;
+        timestepper_->restart();
+        timestepper_->load(memory);
+        timestepper_->step(state, part, *solver_, report);
+        if (report.cut > 0.0 && cuts < most_parts) {
+            ++cuts;
+            part = report.cut;
+            state = begin;
+            continue;
+        }
+        memory = timestepper_->save();
+        report.follow(before);
+        before = report;
+        part = end - state.t;
+    }
+    state.t = end;
 }
 
 }  // namespace delassus
