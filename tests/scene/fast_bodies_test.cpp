@@ -63,8 +63,8 @@ TEST(FastBodies, ABallStopsOnAThinPlateAtAnyPhase) {
     }
 }
 
-// Methods of order 2 that take impacts at the end of a step move on with half of the old velocity after them. Where that
-// would be through the plate, a step of fixed size is taken in parts, and a tolerance finds the impact.
+// Methods of order 2 that take impacts at the end of a step move on with half of the old velocity after them. Where
+// that would be through the plate, a step of fixed size is taken in parts, and a tolerance finds the impact.
 // linearly_implicit_trapezoidal takes impacts at their own time.
 TEST(FastBodies, MethodsOfOrderTwoNeverGoThroughAPlate) {
     for (const std::string method : {"moreau_jean", "linearly_implicit_trapezoidal", "nonsmooth_generalized_alpha"}) {

@@ -515,7 +515,9 @@ public:
     [[nodiscard]] std::array<Vector3, 2> velocities(const State& state, BodyIndex index) const;
     /// Of bodies; the spheres of nodes are not among them.
     [[nodiscard]] const std::vector<Shape>& shapes() const;
-    /// m, since finish(): how near shapes must be for a contact, and their median size; 0 where none can touch.
+    /// What set_envelope() was given, m.
+    [[nodiscard]] std::optional<double> given_envelope() const;
+    /// m, since finish(): how near shapes must be for a contact at most, and their median size; 0 where none can touch.
     [[nodiscard]] double envelope() const;
     [[nodiscard]] double size_of_shapes() const;
     /// m: the largest extent of a body's shapes, of planes and terrains apart; 0 if it has no others.

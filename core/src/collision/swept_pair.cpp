@@ -25,7 +25,7 @@ Turning turning(const Placed& placed, const Sweep& sweep, double t, Placed& move
     const double angle = sweep.rotation.norm(), reach = sweep.arm.norm() + placed.solid->reach;
     if (angle == 0.0) return {0.0, 0.0};
     if (placed.solid->core.vertices.empty()) return {angle * reach, 0.0};
-    moved.rotate_core();
+    if (!placed.solid->core.is_large()) moved.rotate_core();
     const Vector3d fastest = direction.cross(sweep.rotation);
     const Vector3d arm = moved.position - (placed.position - sweep.arm + t * sweep.straight);
     return {fastest.dot(arm + moved.support(fastest)), angle * angle * reach};

@@ -15,12 +15,11 @@
 //           hardly turn.
 //   far     the shapes are advanced conservatively (Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems,
 //           1996, section 2.3) until they are in the envelope. From the distance g and the normal n they cannot meet
-//           before g = s τ + ½ c τ²: s is the largest speed along n of two of their points, n·(d_a − d_b) + max
-//           p·(n×θ_a)
-//           + max p·(θ_b×n) over the points p of the cores about the origins of their bodies, whose translations are d,
-//           and c = |θ_a|² r_a + |θ_b|² r_b bounds how it grows. So what turns past a surface takes few advances. The
-//           points of that place are carried back to the beginning with their bodies, and their gap is n·(p_b − p_a)
-//           there. So shapes that pass each other get no contact, as they would with the normal of the beginning.
+//           before g = s τ + ½ c τ². There s = n·(d_a − d_b) + max p·(n×θ_a) + max p·(θ_b×n) is the largest speed along
+//           n of two of their points: p are those of the cores, about the origins of their bodies, whose translations
+//           are d; and c = |θ_a|² r_a + |θ_b|² r_b bounds how s grows. So what turns past a surface takes few advances.
+//           The points of that place are carried back to the beginning with their bodies, and their gap is n·(p_b −
+//           p_a) there. So shapes that pass each other get no contact, as they would with the normal of the beginning.
 // Of the points of a pair where it is, or near, one may be closer than its bodies move towards it at first, as the
 // bound has it, while none touches yet. Then the shapes are advanced in the same way, to a thousandth of their
 // distance: those that pass get no contact, and where the normal has turned till then those of that place count.

@@ -320,6 +320,7 @@ void MultibodySystem::set_envelope(double envelope) {
     if (!(envelope > 0.0) || !std::isfinite(envelope))
         throw InputError(fmt::format("the contact envelope is {} m; it must be positive", envelope));
     implementation_->envelope = envelope;
+    implementation_->wanted_envelope = envelope;
 }
 
 void MultibodySystem::keep_apart(BodyIndex first, BodyIndex second) {

@@ -189,6 +189,10 @@ void MultibodySystem::be_part_of(const MultibodySystem& whole, PartNumbers numbe
     self.numbers = std::move(numbers);
 }
 
+std::optional<double> MultibodySystem::given_envelope() const {
+    return implementation_->wanted_envelope;
+}
+
 double MultibodySystem::envelope() const {
     return implementation_->envelope;
 }

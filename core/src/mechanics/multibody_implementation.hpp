@@ -54,6 +54,7 @@ struct MultibodySystem::Implementation {
     std::map<std::pair<std::int32_t, std::int32_t>, ContactMaterial> material_pairs;
     std::set<std::pair<BodyIndex, BodyIndex>> apart;
     double envelope = 0.0;  // 0: chosen by finish()
+    std::optional<double> wanted_envelope;
     bool finished = false;
 
     // ---- Since finish() ----

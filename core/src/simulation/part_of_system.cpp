@@ -27,6 +27,7 @@ public:
         for (const auto& [first, second] : whole_.apart)
             if (has(first) && has(second)) part_.system->keep_apart(local(first), local(second));
         if (!whole_.leave_out) part_.system->leave_nothing_out();
+        if (const auto given = mechanics_.given_envelope()) part_.system->set_envelope(*given);
         part_.system->finish();
     }
 
