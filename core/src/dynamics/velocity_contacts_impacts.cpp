@@ -243,20 +243,18 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
 
 // An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
 // impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s.
-double VelocityContacts::cut_between_impacts(const Solution& solution) const {
+double VelocityContacts::cut_between_impacts(const Solution& solution, double kinetic) const {
     constexpr double faint = 1e-2, least_part = 1e-6;
-    double fastest = 0.0, cut = 0.0;
-    for_each_impact(solution, [&](std::size_t k, std::size_t, std::size_t) {
-        fastest = std::max(fastest, contacts_[k].impact->closing);
-    });
-    if (fastest == 0.0) return 0.0;
+    double cut = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const std::size_t row = first_row_ + contact.row;
         const double gap = contact.resolved_gap(), closing = contact.change - contact.end_speed;
         if (!(contact.struck < h_) || rows_.blocks()[k].restitution == 0.0 || !(solution.lambda[row] > 0.0) ||
-            !(closing > faint * fastest))
+            !(closing > 0.0))
             continue;
+        const double e = rows_.blocks()[k].restitution, mobility = contact.change / solution.lambda[row];
+        if (0.5 * e * e * closing * closing <= faint * mobility * kinetic) continue;
         const double struck = contact.struck;
         const double meets = struck + std::max(gap - contact.approach * struck, 0.0) / closing;
         if (!(meets < h_) || meets - struck < least_part * h_) continue;
