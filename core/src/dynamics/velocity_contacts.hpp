@@ -87,7 +87,7 @@ public:
     [[nodiscard]] bool follows_impacts() const { return follows_; }
     /// StepReport::cut, after weigh_impacts(), where more than a hundredth of the kinetic energy (J) is to be given
     /// back. solution: of the whole problem.
-    [[nodiscard]] double cut_between_impacts(const Solution& solution, double kinetic) const;
+    [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution, double kinetic) const;
     /// Sets the marks of the velocities that impacts changed at once, n.
     void mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
 

@@ -242,9 +242,33 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
 }
 
 // An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
-// impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s.
-double VelocityContacts::cut_between_impacts(const Solution& solution, double kinetic) const {
+// impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s. Bodies that rest on
+// others are not among them: there impacts have no order.
+double VelocityContacts::cut_between_impacts(const Problem& problem, const Solution& solution, double kinetic) const {
     constexpr double faint = 1e-2, least_part = 1e-6;
+    const auto& D = problem.D;
+    // D_row diag(H)⁻¹ D_otherᵀ; columns ascend.
+    const auto coupling = [&](std::size_t row, std::size_t other) {
+        double sum = 0.0;
+        auto e = D.row_start[row], f = D.row_start[other];
+        while (e < D.row_start[row + 1] && f < D.row_start[other + 1]) {
+            const auto i = static_cast<std::size_t>(e), j = static_cast<std::size_t>(f);
+            if (D.column[i] == D.column[j])
+                sum += D.value[i] * D.value[j] / diagonal_[static_cast<std::size_t>(D.column[i])];
+            const bool next = D.column[i] <= D.column[j], next_other = D.column[j] <= D.column[i];
+            if (next) ++e;
+            if (next_other) ++f;
+        }
+        return sum;
+    };
+    const auto is_loaded = [&](std::size_t row) {
+        constexpr double share = 1e-6;
+        return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
+            const std::size_t number = first_row_ + other.row;
+            return number != row && other.along_normal && !other.impact && solution.lambda[number] > 0.0 &&
+                   other.pushed && std::abs(coupling(row, number)) > share * coupling(row, row);
+        });
+    };
     double cut = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
@@ -254,7 +278,7 @@ double VelocityContacts::cut_between_impacts(const Solution& solution, double ki
             !(closing > 0.0))
             continue;
         const double e = rows_.blocks()[k].restitution, mobility = contact.change / solution.lambda[row];
-        if (0.5 * e * e * closing * closing <= faint * mobility * kinetic) continue;
+        if (0.5 * e * e * closing * closing <= faint * mobility * kinetic || is_loaded(row)) continue;
         const double struck = contact.struck;
         const double meets = struck + std::max(gap - contact.approach * struck, 0.0) / closing;
         if (!(meets < h_) || meets - struck < least_part * h_) continue;
