@@ -246,6 +246,7 @@ private:
     void share(const Registry& registry);
     /// A step of the timestepper, with the other processes if need be.
     void take_step(State& state, double h, StepReport& report);
+    /// A step in parts that end between its impacts, the first of this length. memory: the timestepper's at `state`.
     void step_between_impacts(State& state, double h, double first, std::vector<double> memory, StepReport& report);
     [[nodiscard]] std::vector<double> memory_of_method() const;
     /// Has the system choose anew which rows to keep where it must; the method then starts anew. steps: so far. Returns

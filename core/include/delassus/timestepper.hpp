@@ -117,8 +117,8 @@ public:
 
     /// By what factor a step multiplies errors of the reactions of joints; below 1 they decay. Default: 0.
     [[nodiscard]] virtual double reaction_growth() const { return 0.0; }
-    /// Says that the next steps are parts of one that was cut (StepReport::cut), or no longer: open contacts of bodies
-    /// that something strikes close by what comes after that. Default: nothing.
+    /// Says that the next steps are parts of one that was cut (StepReport::cut), or no longer: what velocities change
+    /// by in so short a time says nothing of accelerations. Default: nothing.
     virtual void follow_impacts(bool /*follow*/) {}
     /// Says, before the first step, that steps of sizes follow that a tolerance chooses (StepControl::absolute): what
     /// the method lets depend on h besides its error, as the height at which a sliding contact of the associated law

@@ -112,9 +112,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
         contacts_.weigh_impacts(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
         late_.resize(static_cast<std::size_t>(n_));
         contacts_.add_late_impulse(problem_, solution_, late_);
-        linear_.setZero(n_);
-        problem_.H.multiply_add(1.0, result_.data(), linear_.data());
-        report.cut = contacts_.cut_between_impacts(problem_, solution_, 0.5 * linear_.dot(result_));
+        report.cut = contacts_.cut_between_impacts(problem_, solution_);
     }
     if (!settings_.linearly_implicit || !late_.empty() || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name, late_);

@@ -498,17 +498,6 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
     }
 }
 
-// A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.
-void VelocityContacts::report_closing(const Contact& contact, StepReport& report) const {
-    const double begin = -contact.approach, end = contact.end_speed;
-    if (!(contact.gap > 0.0) || contact.gap + 0.5 * h_ * (begin + end) >= -contact.resolution) return;
-    const double curvature = (end - begin) / h_;
-    const double root = std::sqrt(std::max(begin * begin - 2.0 * curvature * contact.gap, 0.0));
-    if (root <= report.impact_speed) return;
-    report.impact_speed = root;
-    report.impact_time = std::min(2.0 * contact.gap / (root - begin), h_);
-}
-
 bool VelocityContacts::landed(const Solution& solution) const {
     return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& contact) {
         if (!contact.along_normal || !(solution.lambda[first_row_ + contact.row] > 0.0) || contact.forced())
@@ -579,15 +568,6 @@ OptionInfo recovery_speed_option() {
             .doc =
                 "largest speed with which penetration that a step finds is undone; negative: a hundredth of the speed "
                 "that a fall through the size of the shapes gives"};
-}
-
-void note_impact(const UnilateralRows::Block& block, double gap, double approach, bool pushed, double h,
-                 double restitution_speed, StepReport& report) {
-    const double speed = std::max(std::abs(approach), gap / h), e = block.restitution;
-    const bool comes_back = e > 0.0 && -approach > e * restitution_speed;
-    if ((pushed && !comes_back) || speed <= report.impact_speed) return;
-    report.impact_speed = speed;
-    report.impact_time = approach < 0.0 ? h : gap / speed;
 }
 
 OptionInfo restitution_speed_option() {

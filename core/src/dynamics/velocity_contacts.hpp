@@ -85,9 +85,9 @@ public:
     /// Timestepper::follow_impacts().
     void follow_impacts(bool follow) { follows_ = follow; }
     [[nodiscard]] bool follows_impacts() const { return follows_; }
-    /// StepReport::cut, after weigh_impacts(), where more than a hundredth of the kinetic energy (J) is to be given
+    /// StepReport::cut, after weigh_impacts(), where more than a hundredth of the kinetic energy is to be given
     /// back. solution: of the whole problem.
-    [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution, double kinetic) const;
+    [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution) const;
     /// Sets the marks of the velocities that impacts changed at once, n.
     void mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
 
@@ -166,6 +166,7 @@ private:
     bool take_rows_at(double time, std::size_t block, Problem& problem);
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
+    /// Contact::struck, and what follows for b.
     void find_struck(const Problem& problem);
     template <class Visit>
     void for_each_impact(const Solution& solution, const Visit& visit) const;

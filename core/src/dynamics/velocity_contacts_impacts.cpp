@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 #include <vector>
 
 #include "dynamics/velocity_contacts.hpp"
@@ -24,6 +26,27 @@ Eigen::MatrixXd part_of(const SparseMatrix& H, const std::vector<std::int32_t>& 
         }
     }
     return part;
+}
+
+/// act(row, column, value) for the entries of so many rows of D from the first on.
+template <class Act>
+void for_each_entry(const SparseMatrix& D, std::size_t first, std::size_t rows, const Act& act) {
+    for (std::size_t row = first; row < first + rows; ++row)
+        for (auto e = static_cast<std::size_t>(D.row_start[row]); e < static_cast<std::size_t>(D.row_start[row + 1]);
+             ++e)
+            act(row, static_cast<std::size_t>(D.column[e]), D.value[e]);
+}
+
+/// A row of D diag(H)⁻¹ Dᵀ at a column. diagonal: of H; columns of D ascend.
+double coupling(const SparseMatrix& D, const std::vector<double>& diagonal, std::size_t row, std::size_t other) {
+    const auto begin = D.column.begin() + D.row_start[other], end = D.column.begin() + D.row_start[other + 1];
+    double sum = 0.0;
+    for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double value) {
+        const auto found = std::lower_bound(begin, end, static_cast<std::int32_t>(column));
+        if (found != end && *found == static_cast<std::int32_t>(column))
+            sum += value * D.value[static_cast<std::size_t>(found - D.column.begin())] / diagonal[column];
+    });
+    return sum;
 }
 
 }  // namespace
@@ -141,9 +164,7 @@ void VelocityContacts::find_struck(const Problem& problem) {
     const auto& D = problem.D;
     struck_.clear();
     const auto for_each_column = [&](const Contact& contact, const auto& act) {
-        const std::size_t row = first_row_ + contact.row;
-        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
-            act(static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]));
+        for_each_entry(D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) { act(column); });
     };
     for (const Contact& contact : contacts_) {
         if (!contact.impact || contact.impact->closing <= 0.25 * contact.impact->change) continue;
@@ -183,22 +204,17 @@ bool VelocityContacts::weigh_impacts(const Problem& problem, const Solution& sol
     const auto& D = problem.D;
     std::vector<std::int32_t> columns, next;
     std::vector<std::size_t> pair;
-    const auto for_each_entry = [&](std::size_t first, std::size_t rows, const auto& act) {
-        for (std::size_t row = first; row < first + rows; ++row)
-            for (auto e = static_cast<std::size_t>(D.row_start[row]);
-                 e < static_cast<std::size_t>(D.row_start[row + 1]); ++e)
-                act(row, D.column[e], D.value[e]);
-    };
     const auto weigh_pair = [&] {
         if (pair.empty()) return;
         const auto count = static_cast<Eigen::Index>(columns.size());
         Eigen::VectorXd push = Eigen::VectorXd::Zero(count), normal = push, change(count);
         for (const std::size_t k : pair) {
             const std::size_t first = first_row_ + contacts_[k].row;
-            for_each_entry(first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
-                           [&](std::size_t row, std::int32_t column, double value) {
+            for_each_entry(D, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
+                           [&](std::size_t row, std::size_t column, double value) {
                                const auto i =
-                                   std::lower_bound(columns.begin(), columns.end(), column) - columns.begin();
+                                   std::lower_bound(columns.begin(), columns.end(), static_cast<std::int32_t>(column)) -
+                                   columns.begin();
                                push[i] += value * solution.lambda[row];
                                if (row == first) normal[i] += value * solution.lambda[row];
                            });
@@ -216,7 +232,9 @@ bool VelocityContacts::weigh_impacts(const Problem& problem, const Solution& sol
     for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
         any = true;
         next.clear();
-        for_each_entry(first, rows, [&](std::size_t, std::int32_t column, double) { next.push_back(column); });
+        for_each_entry(D, first, rows, [&](std::size_t, std::size_t column, double) {
+            next.push_back(static_cast<std::int32_t>(column));
+        });
         std::sort(next.begin(), next.end());
         next.erase(std::unique(next.begin(), next.end()), next.end());
         if (next != columns) {
@@ -234,40 +252,34 @@ void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& 
     const auto& D = problem.D;
     for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
         const double late = contacts_[k].share * (1.0 - theta_ - contacts_[k].impact->acts / h_);
-        for (std::size_t row = first; row < first + rows; ++row)
-            for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
-                momentum[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] +=
-                    late * D.value[static_cast<std::size_t>(e)] * solution.lambda[row];
+        for_each_entry(D, first, rows, [&](std::size_t row, std::size_t column, double value) {
+            momentum[column] += late * value * solution.lambda[row];
+        });
     });
 }
 
 // An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
 // impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s. Bodies that rest on
 // others are not among them: there impacts have no order.
-double VelocityContacts::cut_between_impacts(const Problem& problem, const Solution& solution, double kinetic) const {
+double VelocityContacts::cut_between_impacts(const Problem& problem, const Solution& solution) const {
     constexpr double faint = 1e-2, least_part = 1e-6;
-    const auto& D = problem.D;
-    // D_row diag(H)⁻¹ D_otherᵀ; columns ascend.
-    const auto coupling = [&](std::size_t row, std::size_t other) {
-        double sum = 0.0;
-        auto e = D.row_start[row], f = D.row_start[other];
-        while (e < D.row_start[row + 1] && f < D.row_start[other + 1]) {
-            const auto i = static_cast<std::size_t>(e), j = static_cast<std::size_t>(f);
-            if (D.column[i] == D.column[j])
-                sum += D.value[i] * D.value[j] / diagonal_[static_cast<std::size_t>(D.column[i])];
-            const bool next = D.column[i] <= D.column[j], next_other = D.column[j] <= D.column[i];
-            if (next) ++e;
-            if (next_other) ++f;
-        }
-        return sum;
-    };
     const auto is_loaded = [&](std::size_t row) {
         constexpr double share = 1e-6;
+        const double own = coupling(problem.D, diagonal_, row, row);
         return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
             const std::size_t number = first_row_ + other.row;
-            return number != row && other.along_normal && !other.impact && solution.lambda[number] > 0.0 &&
-                   other.pushed && std::abs(coupling(row, number)) > share * coupling(row, row);
+            return other.along_normal && other.pushed && !other.impact && number != row &&
+                   solution.lambda[number] > 0.0 && std::abs(coupling(problem.D, diagonal_, row, number)) > share * own;
         });
+    };
+    std::optional<double> known;
+    const auto kinetic = [&] {
+        if (!known) {
+            std::vector<double> momentum(solution.x.size(), 0.0);
+            problem.H.multiply_add(1.0, solution.x.data(), momentum.data());
+            known = 0.5 * std::inner_product(momentum.begin(), momentum.end(), solution.x.begin(), 0.0);
+        }
+        return *known;
     };
     double cut = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -278,7 +290,7 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
             !(closing > 0.0))
             continue;
         const double e = rows_.blocks()[k].restitution, mobility = contact.change / solution.lambda[row];
-        if (0.5 * e * e * closing * closing <= faint * mobility * kinetic || is_loaded(row)) continue;
+        if (0.5 * e * e * closing * closing <= faint * mobility * kinetic() || is_loaded(row)) continue;
         const double struck = contact.struck;
         const double meets = struck + std::max(gap - contact.approach * struck, 0.0) / closing;
         if (!(meets < h_) || meets - struck < least_part * h_) continue;
@@ -292,9 +304,28 @@ void VelocityContacts::mark_struck(const Problem& problem, const Solution& solut
     const auto& D = problem.D;
     for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
         if (contacts_[k].share < 0.5) return;  // most of it is a load, which the next step has as well
-        for (auto e = D.row_start[first]; e < D.row_start[first + rows]; ++e)
-            marks[static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)])] = 1;
+        for_each_entry(D, first, rows, [&](std::size_t, std::size_t column, double) { marks[column] = 1; });
     });
+}
+
+// A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.
+void VelocityContacts::report_closing(const Contact& contact, StepReport& report) const {
+    const double begin = -contact.approach, end = contact.end_speed;
+    if (!(contact.gap > 0.0) || contact.gap + 0.5 * h_ * (begin + end) >= -contact.resolution) return;
+    const double curvature = (end - begin) / h_;
+    const double root = std::sqrt(std::max(begin * begin - 2.0 * curvature * contact.gap, 0.0));
+    if (root <= report.impact_speed) return;
+    report.impact_speed = root;
+    report.impact_time = std::min(2.0 * contact.gap / (root - begin), h_);
+}
+
+void note_impact(const UnilateralRows::Block& block, double gap, double approach, bool pushed, double h,
+                 double restitution_speed, StepReport& report) {
+    const double speed = std::max(std::abs(approach), gap / h), e = block.restitution;
+    const bool comes_back = e > 0.0 && -approach > e * restitution_speed;
+    if ((pushed && !comes_back) || speed <= report.impact_speed) return;
+    report.impact_speed = speed;
+    report.impact_time = approach < 0.0 ? h : gap / speed;
 }
 
 }  // namespace delassus

@@ -2,6 +2,8 @@
 // How a simulation comes to the next state that is shown: by one step, by parts of it, or by what lies ahead.
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "delassus/error.hpp"
 #include "delassus/simulation.hpp"
@@ -157,7 +159,7 @@ void Simulation::take_step(State& state, double h, StepReport& report) {
     if (shared_) return shared_->step(state, h, *timestepper_, *solver_, report);
     if (!restitutes_) return timestepper_->step(state, h, *solver_, report);
     const State begin = state;
-    const std::vector<double> memory = timestepper_->save();
+    std::vector<double> memory = timestepper_->save();
     timestepper_->step(state, h, *solver_, report);
     if (report.cut == 0.0) return;
     constexpr double rounding = 1e-6;
@@ -171,7 +173,7 @@ void Simulation::take_step(State& state, double h, StepReport& report) {
     state = begin;
     bool kept = false;
     try {
-        step_between_impacts(state, h, of_whole.cut, memory, report);
+        step_between_impacts(state, h, of_whole.cut, std::move(memory), report);
         kept = energy(state) <= most;
     } catch (const StepFailure&) {
         // The whole step could be taken.
@@ -184,7 +186,6 @@ void Simulation::take_step(State& state, double h, StepReport& report) {
     timestepper_->load(after);
 }
 
-/// memory: the timestepper's at `state`; the first part has this length.
 void Simulation::step_between_impacts(State& state, double h, double first, std::vector<double> memory,
                                       StepReport& report) {
     const double end = state.t + h;

@@ -28,8 +28,7 @@ std::string beyond_stops(const MultibodySystem& system, const State& bodies) {
         worst = share;
         sentence = fmt::format(
             "the joint \"{}\" starts at {:.4g} {}, beyond its stop at {:.4g}, to which it is pushed back slowly; give "
-            "it "
-            "a \"start\" within its stops",
+            "it a \"start\" within its stops",
             joint.name, value, slides ? "m" : "rad", value < joint.lower ? joint.lower : joint.upper);
     }
     return sentence;
