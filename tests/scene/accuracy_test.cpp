@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "support/scenes.hpp"
 
@@ -174,6 +175,30 @@ TEST(Accuracy, ABoxOnASpringStopsWhereFrictionHoldsIt) {
                         frame.length({0.0, 0.0, 0.05}), frame.length({rest + x0, 0.0, 0.05}), rest * frame.unit, k)};
     };
     expect_right(make, {rest + x, 0.0, 0.05}, 0.15, 10.0);
+}
+
+// Friction in a guide turns round with the speed: half swings about ±F/k, each shorter by 2 F/k. It ends within one.
+TEST(Accuracy, FrictionInAGuideTurnsRoundWhereTheSpeedDoes) {
+    const double m = 1.0, k = 60.0, F = 3.0, w = std::sqrt(k / m), shift = F / k;
+    for (const auto& [end, step] : {std::pair{1.0, 0.1}, {1.0, 0.0371}, {1.9, 0.01}}) {
+        SCOPED_TRACE(fmt::format("until {} by {}", end, step));
+        double x = 0.5, left = end;
+        for (; left > std::numbers::pi / w; left -= std::numbers::pi / w) x = -(x - std::copysign(2.0 * shift, x));
+        const double middle = std::copysign(shift, x);
+        const double right = middle + (x - middle) * std::cos(w * left);
+        const auto make = [&](const Frame& frame) {
+            return Case{end,
+                        step,
+                        0.0,
+                        0.0,
+                        fmt::format("- {{name: b, mass: {}, inertia: {{xx: 1, yy: 1, zz: 1}}, position: {}}}\n", m,
+                                    frame.length({0.5, 0.0, 0.0})),
+                        fmt::format("joints:\n- {{name: j, kind: prismatic, second: b, axis: {}, friction: {}, spring: "
+                                    "{{stiffness: {}, rest: {:.17g}}}}}\n",
+                                    frame.vector({1.0, 0.0, 0.0}, 1.0), F * frame.unit, k, -0.5 * frame.unit)};
+        };
+        expect_right(make, {right, 0.0, 0.0}, 0.25, 10.0);
+    }
 }
 
 /// The sentence with which a scene of one body is refused.

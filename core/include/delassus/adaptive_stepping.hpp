@@ -63,6 +63,7 @@ private:
     /// A step as two halves, compared with the whole.
     struct Trial {
         State end;
+        std::vector<double> middle;  ///< velocities between the halves
         StepReport whole, first, second;
         std::vector<double> memory;  ///< of the stepper at the end
         double error = 0.0;          ///< over the tolerance
@@ -78,7 +79,9 @@ private:
     /// When the first impact comes, after the beginning of a trial of size h; infinity if none does.
     [[nodiscard]] double impact_in(const Trial& trial, double h);
     /// Contacts at the ends of a trial of size h: which closes next, and by which it errs.
-    void look_at_contacts(Trial& trial, double h);
+    void look_at_contacts(const State& begin, Trial& trial, double h, StepSolver& solver);
+    /// By which a trial errs where sliding turns round in it.
+    void note_turns(const State& begin, Trial& trial, double h, StepSolver& solver);
     /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
     [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
     [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h,

@@ -69,6 +69,19 @@ void for_each_normal(const UnilateralRows& rows, const std::vector<double>& v, A
     }
 }
 
+/// act(block, first row, rows) for what dry friction holds: the tangential rows of contacts, and friction in joints.
+template <class Act>
+void for_each_sliding(const UnilateralRows& rows, Act act) {
+    std::size_t row = 0;
+    for (const auto& block : rows.blocks()) {
+        const auto size = static_cast<std::size_t>(block.cone.rows);
+        const bool dry = block.cone.kind == ConeKind::Box && block.compliance == 0.0;
+        if (dry) act(block, row, size);
+        if (block.along_normal() && size > 1) act(block, row + 1, size - 1);
+        row += size;
+    }
+}
+
 }  // namespace
 
 AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control,
@@ -169,13 +182,14 @@ AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, Ste
     restore(memory_);
     trial.first = stepper_.step(trial.end, 0.5 * h, solver);
     count(trial.first);
+    if (unilateral_) trial.middle = trial.end.v;
     trial.second = stepper_.step(trial.end, 0.5 * h, solver);
     count(trial.second);
     solver.require_usable();
     trial.memory = stepper_.save();
     trial.touches = trial.whole.active_blocks + trial.first.active_blocks + trial.second.active_blocks > 0;
     trial.error = error_of(begin, whole, trial.end, h, trial.touches);
-    if (unilateral_) look_at_contacts(trial, h);
+    if (unilateral_) look_at_contacts(begin, trial, h, solver);
     if (extrapolates_ && !trial.touches) extrapolate(whole, trial.end);
     return trial;
 }
@@ -202,6 +216,14 @@ void AdaptiveStepping::count(const StepReport& report) {
 // must not be gone through. Where there is no edge these speeds are O(h²) for what pushes, and the second comes once,
 // where bodies part. An edge is passed once, so that what a short step errs by may be what a hundredth of the longest
 // step may.
+//
+// ---- Where dry friction turns round ----
+//
+// A method takes friction by the speed at the end of a step: where the sliding turns round within it, after u₋/|a₋|,
+// the friction has its new direction over all of the step. If that is the first half, the whole and both halves do the
+// same, and their difference is 0. The end is off by (a₋ − a₊) u₋/|a₋|, at most by the speed before, and at most by
+// that after where the turn is in the second half. Or friction stops the sliding at the end of a step, and it goes back
+// in the next one: what stops is followed for half a step more.
 
 double AdaptiveStepping::impact_step() const {
     constexpr double patience = 8.0;
@@ -212,7 +234,7 @@ double AdaptiveStepping::moment() const {
     return std::max(control_.smallest, moment_of_step * control_.largest);
 }
 
-void AdaptiveStepping::look_at_contacts(Trial& trial, double h) {
+void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double h, StepSolver& solver) {
     const std::vector<double>& v = trial.end.v;
     double fastest = 0.0;
     for (std::size_t i = 0; i < v.size(); ++i) fastest = std::max(fastest, std::abs(v[i]) / size(i));
@@ -239,8 +261,41 @@ void AdaptiveStepping::look_at_contacts(Trial& trial, double h) {
         }
     });
     if (!steady || trial.first.impact_speed > 0.0) return;
+    note_turns(begin, trial, h, solver);
     for_each_normal(begin_rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
         if (std::abs(gap) <= system_.gap_resolution() && !pushed(block)) note(-speed);
+    });
+}
+
+void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, StepSolver& solver) {
+    constexpr double at_rest = 1e-3;
+    std::vector<double> after;
+    const auto go_on = [&] {
+        State state = trial.end;
+        count(stepper_.step(state, 0.5 * h, solver));
+        after = std::move(state.v);
+    };
+    for_each_sliding(begin_rows_, [&](const UnilateralRows::Block& block, std::size_t first, std::size_t rows) {
+        if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) return;
+        const auto product = [&](const std::vector<double>& v, const std::vector<double>& w) {
+            double sum = 0.0;
+            for (std::size_t row = first; row < first + rows; ++row)
+                sum += begin_rows_.speed(row, v.data()) * begin_rows_.speed(row, w.data());
+            return sum;
+        };
+        const auto turned = [&](const std::vector<double>& v, const std::vector<double>& w) {
+            return product(v, w) < 0.0 ? std::sqrt(std::min(product(v, v), product(w, w))) : 0.0;
+        };
+        const auto& middle = trial.middle;
+        const auto& end = trial.end.v;
+        double speed = product(begin.v, middle) < 0.0 ? std::sqrt(product(begin.v, begin.v)) : 0.0;
+        speed = std::max({speed, turned(middle, end), turned(begin.v, end)});
+        const double before = std::sqrt(product(middle, middle));
+        if (before > trial.slow && std::sqrt(product(end, end)) < at_rest * before) {
+            if (after.empty()) go_on();
+            speed = std::max(speed, turned(middle, after));
+        }
+        trial.error = std::max(trial.error, speed / trial.slow);
     });
 }
 

@@ -93,6 +93,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     require_step(system_, state, h, settings_.name);
     note_error(state, h);
     find_spins(state, h);
+    timed_ = false;
     if (settings_.linearly_implicit) extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
     if (settings_.linearly_implicit) {
@@ -108,8 +109,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     require_finite(state, end_, h, settings_.name);
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
     late_.clear();
-    if (settings_.linearly_implicit && contacts_.any() &&
-        contacts_.weigh_impacts(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
+    if (timed_ && contacts_.weigh_impacts(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
         late_.resize(static_cast<std::size_t>(n_));
         contacts_.add_late_impulse(problem_, solution_, late_);
         report.cut = contacts_.cut_between_impacts(problem_, solution_);
@@ -320,6 +320,7 @@ bool ThetaMethod::unchanged() const {
 }
 
 void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    if (contacts_.any() && contacts_.may_strike()) time_meetings(begin, h, solver, report);
     scale();
     const bool before = report.solved;
     bool taking = false;
@@ -351,23 +352,23 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     }
 }
 
-/// The velocities at the end of the step about the guess if nothing touched: for the first step, where no history tells
-/// them.
-Vector ThetaMethod::without_contacts(const State& begin, double h, StepSolver& solver, StepReport& report) {
+/// The velocities at the end of the step about the guess if nothing met.
+Vector ThetaMethod::without_impacts(const State& begin, double h, StepSolver& solver, StepReport& report) {
     linearize(begin, h);
+    set_b_of_contacts(0, report);
     Problem problem = problem_;
-    const auto rows = static_cast<std::size_t>(m_);
-    problem.cones.resize(cones_.size());
-    problem.b.resize(rows);
-    problem.E = {};
-    problem.D.rows = m_;
-    problem.D.row_start.resize(rows + 1);
-    problem.D.column.resize(static_cast<std::size_t>(problem.D.row_start.back()));
-    problem.D.value.resize(problem.D.column.size());
-    Solution solution{.x = {guess_.begin(), guess_.end()}, .lambda = std::vector<double>(rows, 0.0)};
+    contacts_.take_out_open(problem);
+    Solution solution{.x = {guess_.begin(), guess_.end()}, .lambda = std::vector<double>(problem.b.size(), 0.0)};
     ++report.newton_iterations;
     report.take(solver.solve(std::move(problem), solution, {}));
     return Eigen::Map<const Vector>(solution.x.data(), n_);
+}
+
+void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    const bool known = settings_.linearly_implicit && !changes_[0].empty();
+    smooth_ = known || !contacts_.may_strike() ? guess_ : without_impacts(begin, h, solver, report);
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
+    timed_ = true;
 }
 
 // One problem. Two in the first step, which has no history to extrapolate from; a few where a contact strikes with
@@ -384,14 +385,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
         return guess_.allFinite();
     };
-    if (contacts_.any()) {
-        if (changes_[0].empty() && contacts_.may_strike()) {
-            smooth_ = without_contacts(begin, h, solver, report);
-        } else {
-            smooth_ = guess_;
-        }
-        contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
-    }
+    if (contacts_.any()) time_meetings(begin, h, solver, report);
     linearize_at_guess();
     if (!found()) return;
     if (changes_[0].empty()) {

@@ -62,7 +62,8 @@ private:
     void scale();
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
-    [[nodiscard]] Vector without_contacts(const State& begin, double h, StepSolver& solver, StepReport& report);
+    [[nodiscard]] Vector without_impacts(const State& begin, double h, StepSolver& solver, StepReport& report);
+    void time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
@@ -95,6 +96,7 @@ private:
     /// implicit.
     std::array<std::vector<double>, 2> changes_;
     std::vector<char> struck_;                   ///< by velocity, in this step
+    bool timed_ = false;                         // whether contacts got the times of their meetings in this step
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem

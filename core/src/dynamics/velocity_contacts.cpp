@@ -53,9 +53,10 @@ namespace delassus {
 //
 // Gaps nearer to 0 than the resolution are 0.
 //
-// `once` knows the acceleration of a row besides impulses, a = D̄ (ṽ⁺ − v)/h with the guess of a smooth motion. So with
-// u⁻ = D̄ v a contact meets when g + u⁻ τ + ½ a τ² = 0, strikes with the speed that it has then, and has moved on at the
-// end of the step, or stays (impact.cpp): b = −u⁺ of that. Speeds before and after are those of one D̄, so that e ≤ 1
+// A method that knows the velocities ṽ⁺ at the end of a step in which nothing meets knows the acceleration of a row
+// besides impulses, a = D̄ (ṽ⁺ − v)/h (time_meetings()). So with u⁻ = D̄ v a contact meets when g + u⁻ τ + ½ a τ² = 0,
+// strikes with the speed that it has then, and has moved on at the end of the step, or stays (impact.cpp): b = −u⁺ of
+// that. Speeds before and after are those of one D̄, so that e ≤ 1
 // gains no energy. The impulse acts from τ on, by which
 //
 //     M x = (1 − θ − τ/h) h Dᵀ P
@@ -85,11 +86,12 @@ namespace delassus {
 //
 // ---- Energy ----
 //
-// What contacts do in a step is P·u_θ. For θ = ½ a contact that bounces has P_n (u⁻ + u⁺)/2 ≤ 0, and so have all
-// without friction. With friction Newton's law may ask for an impulse that gains energy (Kane and Levinson 1985,
-// Dynamics, section 5.8), without a bound where a mechanism is nearly jammed between contacts; and rows that turn far
-// in a step are not those of its end. A step whose contacts gain more than a hundredth of the kinetic energy is solved
-// again without restitution and with D̄ for both sides: then u⁺ = 0 where P_n > 0.
+// What contacts do in a step is P·u_θ; at an impact within it, P times the mean of its speeds before and after. For θ =
+// ½ a contact that bounces has P_n (u⁻ + u⁺)/2 ≤ 0, and so have all without friction. With friction Newton's law may
+// ask for an impulse that gains energy (Kane and Levinson 1985, Dynamics, section 5.8), without a bound where a
+// mechanism is nearly jammed between contacts; and rows that turn far in a step are not those of its end. A step whose
+// contacts gain more than a hundredth of the kinetic energy is solved again without restitution and with D̄ for both
+// sides: then u⁺ = 0 where P_n > 0.
 //
 // ---- Friction ----
 //
@@ -464,7 +466,9 @@ double VelocityContacts::work(const Problem& problem, const Solution& solution, 
             const double impulse = solution.lambda[first_row_ + row];
             if (impulse == 0.0) continue;
             const auto row_of_problem = static_cast<std::int32_t>(first_row_ + row);
-            sum += impulse * (problem.D.row_times(row_of_problem, mean.data()) + rows_.rows()[row].rate);
+            sum += impulse * (contact.impact && row == contact.row
+                                  ? 0.5 * contact.impact->change - contact.impact->closing
+                                  : problem.D.row_times(row_of_problem, mean.data()) + rows_.rows()[row].rate);
         }
     }
     return sum;
@@ -477,6 +481,7 @@ bool VelocityContacts::only_take() {
         if (!contact.along_normal) continue;
         changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
         contact.turns = contact.strikes = false;
+        contact.impact.reset();
         contact.moved = contact.wanted = 0.0;
         contact.sliding = -1.0;
         const double gap = contact.resolved_gap();

@@ -57,9 +57,11 @@ public:
     /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
     /// law, else De Saxcé's term stands in b. The rows of problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
-    /// `once`, after append_to(): whether an impact is possible in this step.
+    /// After append_to(): whether an impact is possible in this step.
     [[nodiscard]] bool may_strike() const;
-    /// `once`, before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
+    /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
+    void take_out_open(Problem& problem) const;
+    /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
     /// the velocities at the end of the step without impacts, n.
     void time_meetings(Problem& problem, std::span<const double> smooth);
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
@@ -76,7 +78,7 @@ public:
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
-    /// Whether a contact struck in this step at a time within it (`once`); if so, it is found out how far its impulse
+    /// Whether a contact struck in this step at a time within it; if so, it is found out how far its impulse
     /// is that of the impact. solution: of the whole problem; smooth: that of time_meetings().
     [[nodiscard]] bool weigh_impacts(const Problem& problem, const Solution& solution, std::span<const double> smooth);
     /// momentum += what positions at the end of the step lack where those of impacts act at their own times and not
@@ -91,7 +93,8 @@ public:
     /// Sets the marks of the velocities that impacts changed at once, n.
     void mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
 
-    /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n. solution: of the whole problem.
+    /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.
+    /// solution: of the whole problem.
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
     /// For the rest of the step nothing bounces, and rows stay as they are in the middle of it: such contacts take
     /// energy only. Whether that changes anything.
@@ -146,14 +149,19 @@ private:
         bool pushed = false;                         ///< in the step before
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool strikes = false;                        ///< b is that of an impact
-        std::optional<Impact> impact;                ///< `once`: it strikes at a time within the step
-        double struck = HUGE_VAL;  ///< `once`: when an impact first strikes one of the bodies of an open contact
+        std::optional<Impact> impact;                ///< it strikes at a time within the step
+        double struck = HUGE_VAL;  ///< when an impact first strikes one of the bodies of an open contact
         double share = 1.0;        ///< of its impulse, that of the impact
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
         [[nodiscard]] bool forced() const { return approach <= 0.25 * change; }
         [[nodiscard]] bool steady() const { return pushed && forced(); }
+        /// In a step that moves it by `way` at the speed that it has at the beginning: it corrects its gap, or stays
+        /// where that is resolved to.
+        [[nodiscard]] bool pushes_on(double way) const {
+            return pushed && std::abs(way) <= 2.0 * std::abs(resolved_gap()) + resolution;
+        }
         [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 

@@ -60,6 +60,41 @@ bool VelocityContacts::may_strike() const {
     return false;
 }
 
+void VelocityContacts::take_out_open(Problem& problem) const {
+    std::size_t row = first_row_, to = first_row_, cone = bilateral_cones_;
+    const auto move = [&](SparseMatrix& matrix) {
+        auto& start = matrix.row_start;
+        const auto first = start[row], last = start[row + 1], target = start[to];
+        std::copy(matrix.column.begin() + first, matrix.column.begin() + last, matrix.column.begin() + target);
+        std::copy(matrix.value.begin() + first, matrix.value.begin() + last, matrix.value.begin() + target);
+        start[to + 1] = target + last - first;
+    };
+    const auto cut = [&](SparseMatrix& matrix) {
+        matrix.rows = static_cast<std::int32_t>(to);
+        matrix.row_start.resize(to + 1);
+        matrix.column.resize(static_cast<std::size_t>(matrix.row_start.back()));
+        matrix.value.resize(matrix.column.size());
+    };
+    const bool compliant = problem.E.rows > 0;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        const bool keeps = !contact.along_normal || contact.pushes_on((1.0 - theta_) * h_ * contact.approach);
+        if (keeps) problem.cones[cone++] = problem.cones[bilateral_cones_ + k];
+        for (std::int32_t i = 0; i < rows_.blocks()[k].cone.rows; ++i, ++row) {
+            if (!keeps) continue;
+            problem.b[to] = problem.b[row];
+            move(problem.D);
+            if (compliant) move(problem.E);
+            ++to;
+        }
+    }
+    problem.cones.resize(cone);
+    problem.b.resize(to);
+    cut(problem.D);
+    if (compliant) cut(problem.E);
+    if (compliant) problem.E.columns = problem.E.rows;
+}
+
 // In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²),
 // and their rates likewise, which are means about h/2 and (1 + θ) h/2. What shapes meet on their way has rows of the
 // meeting at the beginning.
@@ -109,9 +144,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
                                                                      : rows_.rows()[contact.row].rate;
         const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
         double speed = -contact.approach - 0.5 * h_ * pull;
-        // It corrects, or moves by less than the gap is resolved to: what pushes on does not strike.
-        if (contact.pushed && (1.0 - theta_) * h_ * std::abs(speed) <= 2.0 * std::abs(gap) + contact.resolution)
-            continue;
+        if (contact.pushes_on((1.0 - theta_) * h_ * speed)) continue;
         const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
         const auto speed_of = [&](const double* v) {
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
@@ -158,7 +191,8 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
     find_struck(problem);
 }
 
-// An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ).
+// An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ), but no less
+// than u⁻: where the contact opens at first, its work P (u⁻ + u⁺)/2 would gain energy.
 void VelocityContacts::find_struck(const Problem& problem) {
     constexpr double shortest_rest = 1e-9;
     const auto& D = problem.D;
@@ -180,7 +214,7 @@ void VelocityContacts::find_struck(const Problem& problem) {
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
         if (!(contact.struck < h_)) continue;
         const double then = std::max(gap - contact.approach * contact.struck, 0.0);
-        contact.normal = then / std::max(h_ - contact.struck, shortest_rest * h_);
+        contact.normal = std::max(then / std::max(h_ - contact.struck, shortest_rest * h_), -contact.approach);
     }
 }
 
