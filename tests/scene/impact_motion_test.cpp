@@ -99,6 +99,30 @@ TEST(ImpactMotion, AShakenPlateGivesItsSpeedOfTheMeeting) {
     }
 }
 
+// What holds against an impact holds at its time: a plate that lies on the floor stays there when a ball falls onto it.
+TEST(ImpactMotion, APlateThatIsStruckStaysOnTheFloor) {
+    for (const char* method : {"linearly_implicit_trapezoidal", "moreau_jean"})
+        for (const double e : {0.0, 0.5})
+            for (const double height : {0.5, 0.5143, 0.5286, 0.5429, 0.5571, 0.5714, 0.6}) {
+                SCOPED_TRACE(fmt::format("{} {} {}", method, e, height));
+                auto run = run_of(fmt::format(
+                    "step: 0.01\nend: 0.9\nintegrator: {}\ngravity: [0, 0, -9.81]\nmaterials: {{m: {{friction: 0.3, "
+                    "restitution: {}}}}}\nbodies:\n"
+                    "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                    "- {{name: plate, mass: 1, position: [0, 0, 0.1], shapes: [{{box: {{size: [0.5, 0.5, 0.2]}}, "
+                    "material: m}}]}}\n"
+                    "- {{name: ball, mass: 5, position: [0, 0, {:.17g}], shapes: [{{sphere: {{radius: 0.1}}, material: "
+                    "m}}]}}\n",
+                    method, e, 0.3 + height));
+                double highest = 0.0;
+                while (!run.simulation.finished()) {
+                    run.simulation.step();
+                    highest = std::max(highest, run.pose("plate").position[2]);
+                }
+                EXPECT_LT(highest, 0.1 + 1e-9);
+            }
+}
+
 // A pendulum meets its stop within a step and loses its speed there. It then swings back by the time that is left.
 // J = 1.1 kg m² about the hinge, m g l = 9.81 Nm; by Runge and Kutta's method of order 4, with the time of the stop.
 TEST(ImpactMotion, AJointMeetsItsStopAtItsTime) {

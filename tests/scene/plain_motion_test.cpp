@@ -39,7 +39,7 @@ TEST(PlainMotion, ADiscThatRollsKeepsItsTilt) {
 // The method gains energy there, by h² of it a second: parts of steps keep it within the accuracy of the run.
 TEST(PlainMotion, ADiscThatRollsGainsNoEnergy) {
     const std::string disc =
-        "step: 0.0013\nend: {}\nmaterials: {{m: {{friction: 0.8}}}}\nbodies:\n"
+        "step: {}\nend: {}\nmaterials: {{m: {{friction: 0.8}}}}\nbodies:\n"
         "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
         "- {{name: disc, mass: 0.1, position: [0, 0, 0.02179947027021298], orientation: {{axis: [0, 1, 0], angle: "
         "20}}, "
@@ -47,7 +47,7 @@ TEST(PlainMotion, ADiscThatRollsGainsNoEnergy) {
         "0.01}}, material: m}}]}}\n";
     for (const double end : {1.0, 5.0}) {
         SCOPED_TRACE(end);
-        auto run = run_of(fmt::format(fmt::runtime(disc), end));
+        auto run = run_of(fmt::format(fmt::runtime(disc), 0.0013, end));
         const double start = run.simulation.record().energy, moves = run.simulation.record().kinetic;
         run.finish();
         EXPECT_LT(run.simulation.totals().growth, 1e-3 * moves);
@@ -55,7 +55,7 @@ TEST(PlainMotion, ADiscThatRollsGainsNoEnergy) {
         EXPECT_EQ(run.simulation.warnings(), std::vector<std::string>());
     }
     // Whoever names a method has its steps, and is told.
-    auto named = run_of("integrator: linearly_implicit_trapezoidal\n" + fmt::format(fmt::runtime(disc), 5.0));
+    auto named = run_of("integrator: linearly_implicit_trapezoidal\n" + fmt::format(fmt::runtime(disc), 0.003, 5.0));
     named.finish();
     EXPECT_EQ(named.simulation.totals().divided_steps, 0);
     ASSERT_EQ(named.simulation.warnings().size(), 1);

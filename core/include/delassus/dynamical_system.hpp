@@ -164,6 +164,9 @@ public:
     [[nodiscard]] virtual std::int32_t n() const = 0;
     /// Length of q; n() unless the system says otherwise.
     [[nodiscard]] virtual std::int32_t position_size() const;
+    /// Of velocities that are the three components of one vector, the first columns, ascending: what a method guesses
+    /// of them does not depend on the axes. Default: none.
+    [[nodiscard]] virtual std::vector<std::int32_t> vectors() const;
     /// Rows of the bilateral constraints, by blocks that belong together (a joint); m() is their sum.
     [[nodiscard]] virtual std::vector<std::int32_t> constraint_blocks() const;
     [[nodiscard]] std::int32_t m() const;

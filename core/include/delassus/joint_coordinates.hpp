@@ -90,6 +90,7 @@ public:
     void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     /// Of bodies that nothing but a free joint holds and that carry none.
+    [[nodiscard]] std::vector<std::int32_t> vectors() const override;
     void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const override;
     void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
                                 MatrixAssembler& H) const override;

@@ -89,6 +89,10 @@ DynamicalSystem::~DynamicalSystem() = default;
 std::int32_t DynamicalSystem::position_size() const {
     return n();
 }
+std::vector<std::int32_t> DynamicalSystem::vectors() const {
+    return {};
+}
+
 std::vector<std::int32_t> DynamicalSystem::constraint_blocks() const {
     return {};
 }

@@ -5,10 +5,9 @@
 //     H x − Dᵀ ν = 0,      C + C_q x = 0,      g + D_n x ≥ g_least  ⊥  ν ≥ 0
 //
 // at the end of the step, without friction: the part on positions of Brüls, Acary and Cardona (CMAME 281, 2014), of
-// which Gear, Gupta and Leimkuhler's is the one without contacts. Where impulses p act late in the step, p stands on
-// the right-hand side, so that x is the motion they lack, kept from what else it would run into. H contains the
-// stiffness, so that elastic bodies move as a whole. What is solved for is the speed x/h. g_least bounds how fast a
-// penetration is undone that the step began with. The energy that it gives is −f·x.
+// which Gear, Gupta and Leimkuhler's is the one without contacts. H contains the stiffness, so that elastic bodies move
+// as a whole. What is solved for is the speed x/h. g_least bounds how fast a penetration is undone that the step began
+// with. The energy that it gives is −f·x.
 //
 // A mechanism may start with bodies that overlap and that its joints do not let apart: then no x is there. And where
 // they let them apart by a long way only, that way is no answer either. So where a step begins with a penetration its
@@ -34,8 +33,8 @@ PositionProjection::PositionProjection(DynamicalSystem& system)
       resolution_(system.gap_resolution()),
       constraint_(static_cast<std::size_t>(m_)) {}
 
-/// The problem; whether there is anything to undo. late: positions lack more.
-bool PositionProjection::assemble(const State& end, double h, const VelocityContacts& contacts, bool late) {
+/// The problem; whether there is anything to undo.
+bool PositionProjection::assemble(const State& end, double h, const VelocityContacts& contacts) {
     double off = 0.0, least = 0.0;
     if (m_ > 0) system_.constraint(end, constraint_.data());
     for (const double C : constraint_) off = std::max(off, std::abs(C));
@@ -50,14 +49,14 @@ bool PositionProjection::assemble(const State& end, double h, const VelocityCont
             row += static_cast<std::size_t>(block.cone.rows);
         }
     }
-    if (off <= resolution_ && least <= resolution_ && !late) return false;
+    if (off <= resolution_ && least <= resolution_) return false;
     const auto m = static_cast<std::size_t>(m_);
     std::int32_t count = 0;
     problem_.b.assign(constraint_.begin(), constraint_.end());
     problem_.cones.clear();
     for (const std::int32_t rows : blocks_) problem_.cones.push_back(Cone::free(rows));
     // Gaps wider than this are out of reach of what moves by about `off` and `least`.
-    const double reach = late ? HUGE_VAL : 10.0 * std::max(off, least) + resolution_;
+    const double reach = 10.0 * std::max(off, least) + resolution_;
     const auto for_each_near = [&](const auto& visit) {
         std::size_t row = 0;
         for (const auto& block : rows_.blocks()) {
@@ -77,7 +76,7 @@ bool PositionProjection::assemble(const State& end, double h, const VelocityCont
     });
     for (std::size_t i = 0; i < problem_.b.size(); ++i) problem_.b[i] /= h;
     D_.finish_into(problem_.D);
-    return problem_.b.size() > m || off > resolution_ || late;
+    return problem_.b.size() > m || off > resolution_;
 }
 
 /// E of the gaps, behind rows without one.
@@ -114,8 +113,8 @@ void PositionProjection::solve(StepSolver& solver, StepReport& report) {
 
 void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
                                  const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
-                                 std::string_view method, std::span<const double> late) {
-    if (n_ == 0 || !assemble(end, h, contacts, !late.empty())) return;
+                                 std::string_view method) {
+    if (n_ == 0 || !assemble(end, h, contacts)) return;
     problem_.name = "position";
     problem_.law = Law::Associated;
     problem_.H = H;
@@ -124,13 +123,12 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     } else if (problem_.E.rows > 0) {
         problem_.E = {};
     }
-    problem_.a.assign(late.begin(), late.end());
-    problem_.a.resize(static_cast<std::size_t>(n_));
+    problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
     solve(solver, report);
     delta_ = solution_.x;
     for (double& entry : delta_) entry *= h;
     const auto pushed = [](double impulse) { return impulse > 0.0; };
-    if (late.empty() && std::any_of(solution_.lambda.begin() + m_, solution_.lambda.end(), pushed)) {
+    if (std::any_of(solution_.lambda.begin() + m_, solution_.lambda.end(), pushed)) {
         force_.assign(static_cast<std::size_t>(n_), 0.0);
         system_.add_force(end, 1.0, force_.data());
         double work = 0.0;
@@ -139,7 +137,7 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     }
     system_.increment(end.q.data(), delta_.data(), end.q.data());
     require_finite(begin, end, h, method);
-    if (late.empty()) require_nearer(begin, end, h, method);
+    require_nearer(begin, end, h, method);
 }
 
 void PositionProjection::project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report) {

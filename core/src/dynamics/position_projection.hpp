@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -21,16 +20,15 @@ public:
     explicit PositionProjection(DynamicalSystem& system);
 
     /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
-    /// contacts gave by it to report.recovered. late: impulses that positions lack besides, divided by h, n or empty
-    /// (VelocityContacts::add_late_impulse). Throws StepFailure if the motion is not finite or does not bring the
+    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite or does not bring the
     /// constraints nearer to 0.
     void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
-                 StepSolver& solver, StepReport& report, std::string_view method, std::span<const double> late = {});
+                 StepSolver& solver, StepReport& report, std::string_view method);
     /// Changes end.v by the least, in the norm of H, to where the constraints stay: C_q v + C_t = 0.
     void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 
 private:
-    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts, bool late);
+    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
     void make_compliant();
     void solve(StepSolver& solver, StepReport& report);
     void require_nearer(const State& begin, const State& end, double h, std::string_view method);

@@ -40,12 +40,27 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
       cones_(free_cones(system)),
       n_(system.n()),
       m_(system.m()),
-      error_(order()) {}
+      error_(order()) {
+    std::int32_t next = 0;
+    for (const std::int32_t first : system.vectors()) {
+        for (; next < first; ++next) vectors_.push_back({next, 1});
+        vectors_.push_back({first, 3});
+        next = first + 3;
+    }
+    for (; next < n_; ++next) vectors_.push_back({next, 1});
+}
+
+/// act(first, size) for the velocities that are components of one vector, and for each other one.
+template <class Act>
+void ThetaMethod::for_each_vector(const Act& act) const {
+    for (const auto& [first, size] : vectors_) act(first, size);
+}
 
 void ThetaMethod::restart() {
     multipliers_.clear();
     contacts_.restart();
     for (auto& change : changes_) change.clear();
+    unsure_.clear();
     error_.forget();
     left_.clear();
     last_h_ = 0.0;
@@ -53,16 +68,18 @@ void ThetaMethod::restart() {
 
 void ThetaMethod::forces_jumped() {
     for (auto& change : changes_) change.clear();
+    unsure_.clear();
     error_.forget();
 }
 
-// h; the changes of the last steps, their errors and what the last solve left; the multipliers.
+// h; the changes of the last steps, their errors, what the last solve left and what an impact changed; the multipliers.
 StepMemory ThetaMethod::memory() const {
     StepMemory memory;
     memory.numbers = {last_h_};
     memory.of_columns.assign(changes_.begin(), changes_.end());
     for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
     memory.of_columns.push_back(left_);
+    memory.of_columns.push_back(unsure_);
     memory.of_columns.push_back(contacts_.resolution().left());
     memory.of_rows = {multipliers_};
     memory.impulses = contacts_.kept();
@@ -74,8 +91,10 @@ void ThetaMethod::set_memory(StepMemory&& memory) {
     last_h_ = memory.numbers.at(0);
     for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] = std::move(memory.of_columns.at(k));
     error_.load(std::span(memory.of_columns).subspan(changes_.size(), error_.kept()));
-    left_ = std::move(memory.of_columns.at(changes_.size() + error_.kept()));
-    contacts_.resolution().load(std::move(memory.of_columns.at(changes_.size() + error_.kept() + 1)));
+    const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + error_.kept());
+    left_ = std::move(rest[0]);
+    unsure_ = std::move(rest[1]);
+    contacts_.resolution().load(std::move(rest[2]));
     multipliers_ = std::move(memory.of_rows.at(0));
     contacts_.keep(std::move(memory.impulses));
 }
@@ -105,23 +124,19 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
 
     result_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
     move(state, h, result_, 1.0, end_);
+    const bool struck = timed_ && contacts_.find_impacts(problem_, solution_);
+    if (struck) {
+        move_late(h);
+        report.cut = contacts_.cut_between_impacts(problem_, solution_);
+    }
     end_.v = solution_.x;
     require_finite(state, end_, h, settings_.name);
     if (linearization_.wanted()) judge_linearization(state, h, result_, report);
-    late_.clear();
-    if (timed_ && contacts_.weigh_impacts(problem_, solution_, {smooth_.data(), static_cast<std::size_t>(n_)})) {
-        late_.resize(static_cast<std::size_t>(n_));
-        contacts_.add_late_impulse(problem_, solution_, late_);
-        report.cut = contacts_.cut_between_impacts(problem_, solution_);
-    }
-    if (!settings_.linearly_implicit || !late_.empty() || contacts_.landed(solution_))
-        projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name, late_);
-    if (!late_.empty() && m_ > 0) {  // the motion that was lacking is no small one
+    if (!settings_.linearly_implicit || struck || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
-        projection_.project_velocities(end_, problem_.H, solver, report);
-    }
+    if (struck && m_ > 0) projection_.project_velocities(end_, problem_.H, solver, report);
     if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
-    if (settings_.linearly_implicit && !contacts_.follows_impacts()) remember_change(result_, h);
+    if (settings_.linearly_implicit && !contacts_.follows_impacts()) remember_change(result_, struck, h);
     last_h_ = h;
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;
@@ -167,31 +182,48 @@ void ThetaMethod::find_spins(const State& begin, double h) {
 // ---- The guess of the linearly implicit method ----
 //
 // The accelerations of the last two steps, less what spins by itself, say how velocities change in this one. Of each
-// entry the one nearer to 0 is taken, or 0 where their signs differ. In a smooth motion either is off by O(h), and the
-// guess by O(h²). Beside an impact the smooth one of the two is the smaller. Where a stiff mode changes its sign from
-// step to step, an extrapolation would double it: the guess then is that velocities stay.
+// vector, or velocity that is part of none, the one nearer to 0 is taken, or 0 where they oppose each other. In a
+// smooth motion either is off by O(h), and the guess by O(h²). Beside an impact the smooth one of the two is the
+// smaller. Where a stiff mode changes its sign from step to step, an extrapolation would double it: the guess then is
+// that velocities stay.
 void ThetaMethod::extrapolate(double h) {
     if (changes_[0].empty()) return;
-    const bool both = !changes_[1].empty();
-    for (std::int32_t i = 0; i < n_; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        const double last = changes_[0][k], before = both ? changes_[1][k] : last;
-        if (last * before > 0.0) guess_[i] += h * (std::abs(last) < std::abs(before) ? last : before);
-    }
+    const Eigen::Map<const Vector> last(changes_[0].data(), n_);
+    const Eigen::Map<const Vector> before(changes_[1].empty() ? changes_[0].data() : changes_[1].data(), n_);
+    for_each_vector([&](std::int32_t first, std::int32_t size) {
+        const auto one = last.segment(first, size), other = before.segment(first, size);
+        if (!(one.dot(other) > 0.0)) return;
+        guess_.segment(first, size) += h * (one.squaredNorm() < other.squaredNorm() ? one : other);
+    });
+}
+
+// What positions lack by impacts (VelocityContacts::find_impacts()), added to the end of the step. Of what moves after
+// an impact in the step before, the guess ṽ may not know what holds it since; v is what it would be then. The nearer
+// one to v⁺ counts, by which nothing moves too far.
+void ThetaMethod::move_late(double h) {
+    for_each_vector([&](std::int32_t first, std::int32_t size) {
+        const auto k = static_cast<std::size_t>(first);
+        auto change = delta_.segment(first, size);
+        change = result_.segment(first, size) - smooth_.segment(first, size);
+        const auto held = result_.segment(first, size) - free_.segment(first, size);
+        if (!unsure_.empty() && unsure_[k] != 0.0 && held.squaredNorm() < change.squaredNorm()) change = held;
+        change *= contacts_.on_velocities()[k].late * h;
+    });
+    system_.increment(end_.q.data(), delta_.data(), end_.q.data());
 }
 
 // What an impact changes at once is no acceleration: there the last ones stay.
-void ThetaMethod::remember_change(const Vector& result, double h) {
+void ThetaMethod::remember_change(const Vector& result, bool struck, double h) {
     const auto n = static_cast<std::size_t>(n_);
-    struck_.assign(n, 0);
-    contacts_.mark_struck(problem_, solution_, struck_);
     std::vector<double>& last = changes_[0];
     std::vector<double>& before = changes_[1];
     if (!last.empty()) before.resize(n);
     last.resize(n);
+    unsure_.resize(n);
     for (std::int32_t i = 0; i < n_; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        if (struck_[k]) continue;
+        unsure_[k] = struck && contacts_.on_velocities()[k].share > 0.5 ? 1.0 : 0.0;
+        if (unsure_[k] != 0.0) continue;
         if (!before.empty()) before[k] = last[k];
         last[k] = (result[i] - free_[i]) / h;
     }
@@ -360,13 +392,14 @@ Vector ThetaMethod::without_impacts(const State& begin, double h, StepSolver& so
     contacts_.take_out_open(problem);
     Solution solution{.x = {guess_.begin(), guess_.end()}, .lambda = std::vector<double>(problem.b.size(), 0.0)};
     ++report.newton_iterations;
-    report.take(solver.solve(std::move(problem), solution, {}));
+    report.take(solver.solve(std::move(problem), solution, request_));
     return Eigen::Map<const Vector>(solution.x.data(), n_);
 }
 
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     const bool known = settings_.linearly_implicit && !changes_[0].empty();
-    smooth_ = known || !contacts_.may_strike() ? guess_ : without_impacts(begin, h, solver, report);
+    smooth_ = guess_;
+    if (!known && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
     contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
     timed_ = true;
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "delassus/export.hpp"
@@ -52,7 +53,10 @@ private:
     void move(const State& begin, double h, const Vector& last, double part, State& to);
     void find_spins(const State& begin, double h);
     void extrapolate(double h);
-    void remember_change(const Vector& result, double h);
+    template <class Act>
+    void for_each_vector(const Act& act) const;
+    void move_late(double h);
+    void remember_change(const Vector& result, bool struck, double h);
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
     void set_constraint_rows(const State& begin, double h);
@@ -83,7 +87,8 @@ private:
     double last_h_ = 0.0;
     StepError error_;
     StepRequest request_{.warm_start = true};
-    std::vector<double> late_;    ///< impulses of impacts for the projection, n; empty where none was
+    std::vector<std::pair<std::int32_t, std::int32_t>> vectors_;  ///< first velocities and sizes, ascending
+    std::vector<double> unsure_;  ///< 1: of the velocity the last step says no acceleration; n, or empty
     std::vector<double> left_;    ///< by the last solve, in the norm of the masses, n, or empty
     bool chooses_steps_ = false;  ///< steps are chosen by their error
     MatrixAssembler H_, D_;
@@ -95,7 +100,6 @@ private:
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
     /// implicit.
     std::array<std::vector<double>, 2> changes_;
-    std::vector<char> struck_;                   ///< by velocity, in this step
     bool timed_ = false;                         // whether contacts got the times of their meetings in this step
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end

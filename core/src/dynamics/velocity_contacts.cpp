@@ -56,13 +56,8 @@ namespace delassus {
 // A method that knows the velocities ṽ⁺ at the end of a step in which nothing meets knows the acceleration of a row
 // besides impulses, a = D̄ (ṽ⁺ − v)/h (time_meetings()). So with u⁻ = D̄ v a contact meets when g + u⁻ τ + ½ a τ² = 0,
 // strikes with the speed that it has then, and has moved on at the end of the step, or stays (impact.cpp): b = −u⁺ of
-// that. Speeds before and after are those of one D̄, so that e ≤ 1
-// gains no energy. The impulse acts from τ on, by which
-//
-//     M x = (1 − θ − τ/h) h Dᵀ P
-//
-// is what positions lack, with the share of P that is the impact's (velocity_contacts_impacts.cpp), where the step
-// moves them by (1 − θ) v + θ v⁺. It is undone with what else is off at the end of the step (position_projection.cpp).
+// that. Speeds before and after are those of one D̄, so that e ≤ 1 gains no energy. What the velocities change by at τ
+// moves positions from then on (find_impacts()).
 //
 // A body that is struck at τ moves as it did until then, so that its open contacts close by what comes after: g + u⁻ τ
 // + (h − τ) u⁺ ≥ 0. One that is closed by this would bounce with a speed that the step does not know. A step with such
@@ -329,6 +324,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.along_normal = block.along_normal();
         const ContactPoint* point = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
         contact.pushed = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
+        contact.last = contact.pushed ? lambda[first_row_ + row] : 0.0;
         const Before* before = find_before(block.key);
         if (before && before_.blocks()[before->block].cone.rows != block.cone.rows) before = nullptr;
         if (before) {

@@ -78,20 +78,21 @@ public:
     /// What acted, into the report, and kept for the next step; hands the contacts to the report.
     void finish(const std::vector<double>& lambda, StepReport& report);
 
-    /// Whether a contact struck in this step at a time within it; if so, it is found out how far its impulse
-    /// is that of the impact. solution: of the whole problem; smooth: that of time_meetings().
-    [[nodiscard]] bool weigh_impacts(const Problem& problem, const Solution& solution, std::span<const double> smooth);
-    /// momentum += what positions at the end of the step lack where those of impacts act at their own times and not
-    /// over the whole step, divided by h; n. After weigh_impacts().
-    void add_late_impulse(const Problem& problem, const Solution& solution, std::vector<double>& momentum) const;
+    /// What impacts do to a velocity.
+    struct OnVelocity {
+        double share = -1.0;  ///< of its change against a motion without them; below 0 where none acts
+        double late = 0.0;  ///< how long before the middle of the step (1 − θ) they act, as a part of it; times share
+    };
+    /// Whether contacts struck in this step at times within it; on_velocities() then has what they do. solution: of the
+    /// whole problem.
+    [[nodiscard]] bool find_impacts(const Problem& problem, const Solution& solution);
+    [[nodiscard]] std::span<const OnVelocity> on_velocities() const { return on_velocities_; }  ///< n
     /// Timestepper::follow_impacts().
     void follow_impacts(bool follow) { follows_ = follow; }
     [[nodiscard]] bool follows_impacts() const { return follows_; }
-    /// StepReport::cut, after weigh_impacts(), where more than a hundredth of the kinetic energy is to be given
+    /// StepReport::cut, where more than a hundredth of the kinetic energy is to be given
     /// back. solution: of the whole problem.
     [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution) const;
-    /// Sets the marks of the velocities that impacts changed at once, n.
-    void mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const;
 
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.
     /// solution: of the whole problem.
@@ -151,7 +152,7 @@ private:
         bool strikes = false;                        ///< b is that of an impact
         std::optional<Impact> impact;                ///< it strikes at a time within the step
         double struck = HUGE_VAL;  ///< when an impact first strikes one of the bodies of an open contact
-        double share = 1.0;        ///< of its impulse, that of the impact
+        double last = 0.0;         ///< its impulse in the step before, where it pushed
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -176,8 +177,6 @@ private:
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b.
     void find_struck(const Problem& problem);
-    template <class Visit>
-    void for_each_impact(const Solution& solution, const Visit& visit) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;
@@ -193,7 +192,13 @@ private:
     std::vector<Contact> contacts_;
     State middle_;
     std::vector<double> delta_, diagonal_;
-    std::vector<double> struck_;  // of each velocity, when an impact first changes it; empty where there is none
+    std::vector<OnVelocity> on_velocities_;
+    struct Sum {
+        double weight = 0.0, share = 0.0, late = 0.0;
+    };
+    std::vector<Sum> sums_;           // of what acts on velocities, by weights
+    std::vector<std::size_t> found_;  // velocities
+    std::vector<double> struck_;      // of each velocity, when an impact first changes it; empty where there is none
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     std::size_t first_row_ = 0;             // in the problem

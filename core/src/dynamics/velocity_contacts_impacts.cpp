@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Impacts at their time within a step; the derivation is in velocity_contacts.cpp.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -12,21 +11,6 @@
 namespace delassus {
 
 namespace {
-
-/// The part of H in these rows and columns (ascending).
-Eigen::MatrixXd part_of(const SparseMatrix& H, const std::vector<std::int32_t>& columns) {
-    const auto count = static_cast<Eigen::Index>(columns.size());
-    Eigen::MatrixXd part = Eigen::MatrixXd::Zero(count, count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-        const auto row = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
-        for (auto e = static_cast<std::size_t>(H.row_start[row]); e < static_cast<std::size_t>(H.row_start[row + 1]);
-             ++e) {
-            const auto place = std::lower_bound(columns.begin(), columns.end(), H.column[e]);
-            if (place != columns.end() && *place == H.column[e]) part(i, place - columns.begin()) = H.value[e];
-        }
-    }
-    return part;
-}
 
 /// act(row, column, value) for the entries of so many rows of D from the first on.
 template <class Act>
@@ -218,78 +202,70 @@ void VelocityContacts::find_struck(const Problem& problem) {
     }
 }
 
-template <class Visit>
-void VelocityContacts::for_each_impact(const Solution& solution, const Visit& visit) const {
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const std::size_t first = first_row_ + contacts_[k].row;
-        if (contacts_[k].impact && solution.lambda[first] > 0.0)
-            visit(k, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
-    }
-}
-
-// The impulses p of two bodies on one another are those of an impact as far as they change how these move; what presses
-// the bodies together besides acts over the whole step. With the normal ones p_n, the share
+// An impact at τ changes the velocities by v⁺ − ṽ, with all that holds against it; what presses besides is in ṽ as
+// well. So positions, which the step moves by (1 − θ) v + θ v⁺, lack
 //
-//     p_nᵀ (v⁺ − ṽ) / p_nᵀ H⁻¹ p
+//     x = s (1 − θ − τ/h) h (v⁺ − ṽ)
 //
-// is 1 where nothing else acts, v⁺ − ṽ = H⁻¹ p, and 0 where p holds against other impulses, or goes on as before. H is
-// taken where p acts alone.
-bool VelocityContacts::weigh_impacts(const Problem& problem, const Solution& solution, std::span<const double> smooth) {
+// which is added before what else is off is undone (position_projection.cpp). τ is that of the impacts on a velocity,
+// weighed by their impulses. Of a contact that pushed in the step before as much goes on as it pushed with there: s is
+// the share of the rest. Masses, joints and contacts that push pass an impact on to velocities on which none acts, and
+// with it s and τ.
+bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solution) {
     const auto& D = problem.D;
-    std::vector<std::int32_t> columns, next;
-    std::vector<std::size_t> pair;
-    const auto weigh_pair = [&] {
-        if (pair.empty()) return;
-        const auto count = static_cast<Eigen::Index>(columns.size());
-        Eigen::VectorXd push = Eigen::VectorXd::Zero(count), normal = push, change(count);
-        for (const std::size_t k : pair) {
-            const std::size_t first = first_row_ + contacts_[k].row;
-            for_each_entry(D, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
-                           [&](std::size_t row, std::size_t column, double value) {
-                               const auto i =
-                                   std::lower_bound(columns.begin(), columns.end(), static_cast<std::int32_t>(column)) -
-                                   columns.begin();
-                               push[i] += value * solution.lambda[row];
-                               if (row == first) normal[i] += value * solution.lambda[row];
-                           });
-        }
-        for (Eigen::Index i = 0; i < count; ++i) {
-            const auto column = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
-            change[i] = solution.x[column] - smooth[column];
-        }
-        const double all = normal.dot(part_of(problem.H, columns).ldlt().solve(push));
-        const double share = all > 0.0 ? std::clamp(normal.dot(change) / all, 0.0, 1.0) : 0.0;
-        for (const std::size_t k : pair) contacts_[k].share = share;
-        pair.clear();
+    const auto n = static_cast<std::size_t>(D.columns);
+    on_velocities_.assign(n, {});
+    sums_.assign(n, {});
+    found_.clear();
+    const auto add = [&](std::size_t column, const OnVelocity& value, double weight) {
+        if (on_velocities_[column].share >= 0.0) return;
+        Sum& sum = sums_[column];
+        if (sum.weight == 0.0) found_.push_back(column);
+        sum.weight += weight;
+        sum.share += weight * value.share;
+        sum.late += weight * value.late;
     };
-    bool any = false;
-    for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
-        any = true;
-        next.clear();
-        for_each_entry(D, first, rows, [&](std::size_t, std::size_t column, double) {
-            next.push_back(static_cast<std::int32_t>(column));
-        });
-        std::sort(next.begin(), next.end());
-        next.erase(std::unique(next.begin(), next.end()), next.end());
-        if (next != columns) {
-            weigh_pair();
-            columns = next;
+    const auto settle = [&] {
+        const bool any = !found_.empty();
+        for (const std::size_t column : found_) {
+            const Sum& sum = sums_[column];
+            on_velocities_[column] = {sum.share / sum.weight, sum.late / sum.weight};
         }
-        pair.push_back(k);
-    });
-    weigh_pair();
-    return any;
-}
-
-void VelocityContacts::add_late_impulse(const Problem& problem, const Solution& solution,
-                                        std::vector<double>& momentum) const {
-    const auto& D = problem.D;
-    for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
-        const double late = contacts_[k].share * (1.0 - theta_ - contacts_[k].impact->acts / h_);
-        for_each_entry(D, first, rows, [&](std::size_t row, std::size_t column, double value) {
-            momentum[column] += late * value * solution.lambda[row];
+        found_.clear();
+        return any;
+    };
+    for (const Contact& contact : contacts_) {
+        const std::size_t first = first_row_ + contact.row;
+        if (!contact.impact || !(solution.lambda[first] > 0.0)) continue;
+        const double share = std::max(1.0 - contact.last / solution.lambda[first], 0.0);
+        const OnVelocity value{share, share * (1.0 - theta_ - contact.impact->acts / h_)};
+        for_each_entry(D, first, 1,
+                       [&](std::size_t, std::size_t column, double) { add(column, value, solution.lambda[first]); });
+    }
+    if (!settle()) return false;
+    const auto pass_on = [&](const SparseMatrix& matrix, std::size_t first, std::size_t rows) {
+        OnVelocity mean{.share = 0.0};
+        double known = 0.0, unknown = 0.0;
+        for_each_entry(matrix, first, rows, [&](std::size_t, std::size_t column, double) {
+            const OnVelocity& one = on_velocities_[column];
+            (one.share >= 0.0 ? known : unknown) += 1.0;
+            if (one.share < 0.0) return;
+            mean.share += one.share;
+            mean.late += one.late;
         });
-    });
+        if (known == 0.0 || unknown == 0.0) return;
+        mean.share /= known;
+        mean.late /= known;
+        for_each_entry(matrix, first, rows, [&](std::size_t, std::size_t column, double) { add(column, mean, 1.0); });
+    };
+    do {
+        for (std::size_t row = 0; row < n; ++row) pass_on(problem.H, row, 1);
+        for (std::size_t row = 0; row < first_row_; ++row) pass_on(D, row, 1);
+        for (std::size_t k = 0; k < contacts_.size(); ++k)
+            if (solution.lambda[first_row_ + contacts_[k].row] > 0.0)
+                pass_on(D, first_row_ + contacts_[k].row, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
+    } while (settle());
+    return true;
 }
 
 // An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
@@ -332,14 +308,6 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
         if (cut == 0.0 || between < cut) cut = between;
     }
     return cut;
-}
-
-void VelocityContacts::mark_struck(const Problem& problem, const Solution& solution, std::vector<char>& marks) const {
-    const auto& D = problem.D;
-    for_each_impact(solution, [&](std::size_t k, std::size_t first, std::size_t rows) {
-        if (contacts_[k].share < 0.5) return;  // most of it is a load, which the next step has as well
-        for_each_entry(D, first, rows, [&](std::size_t, std::size_t column, double) { marks[column] = 1; });
-    });
 }
 
 // A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.

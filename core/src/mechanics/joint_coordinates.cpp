@@ -530,6 +530,14 @@ void JointCoordinates::add_gyroscopic_damping(const State& state, double factor,
     }
 }
 
+std::vector<std::int32_t> JointCoordinates::vectors() const {
+    std::vector<std::int32_t> columns;
+    for (const Link& link : implementation_->tree.links())
+        if (link.freedoms == 6) columns.insert(columns.end(), {link.column, link.column + 3});
+    std::sort(columns.begin(), columns.end());
+    return columns;
+}
+
 void JointCoordinates::free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const {
     auto& self = *implementation_;
     spins.clear();

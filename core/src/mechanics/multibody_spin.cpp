@@ -42,6 +42,17 @@ Vector3d midpoint_speed(const Matrix3d& J, const Vector3d& omega, double h) {
 
 }  // namespace
 
+std::vector<std::int32_t> MultibodySystem::vectors() const {
+    const auto& self = *implementation_;
+    std::vector<std::int32_t> columns;
+    for (const auto& body : self.moving) columns.insert(columns.end(), {body.column, body.column + 3});
+    for (const auto& body : self.reduced) columns.insert(columns.end(), {body.column, body.column + 3});
+    for (std::int32_t node = 0; node < node_count(); ++node)
+        if (node_column(node) >= 0) columns.push_back(node_column(node));
+    std::sort(columns.begin(), columns.end());
+    return columns;
+}
+
 void MultibodySystem::free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const {
     const auto& self = *implementation_;
     spins.clear();
