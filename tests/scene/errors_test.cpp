@@ -45,6 +45,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"NoBodies", head,
              "s.yaml, line 1: system \"main\" lacks the key \"bodies\", e.g. bodies: [{name: ball, mass: 1, …}]"},
         Case{"NegativeStep", "step: -1\nend: 1\n" + bodies, "s.yaml, line 1: \"step\" is -1; it must be positive"},
+        Case{"StepWithoutEnd", "step: 1e-300\nend: 1\n" + bodies,
+             "s.yaml, line 1: \"step\" is 1e-300 s, of which a run until 1 s would take 1e+300; 1e+12 are the most"},
         Case{"UnknownBodyKey", head + "bodies:\n  - {name: b, mas: 1}\n",
              "s.yaml, line 4: a body has no key \"mas\"; did you mean \"mass\"?"},
         Case{"ZeroMass", head + "bodies:\n  - {name: b, mass: 0}\n",

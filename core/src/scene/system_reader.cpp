@@ -50,6 +50,12 @@ void SystemReader::build(const YAML::Node& place) {
     };
     if (!step_node_.IsDefined() && !tolerance_) missing("step", "step: 0.001");
     if (!end_) missing("end", "end: 10");
+    constexpr double most_steps = 1e12;  // beyond, the time of the last ones has no digits for them
+    if (step_ && *end_ > most_steps * *step_)
+        source_.refuse(step_node_,
+                       fmt::format("\"step\" is {:g} s, of which a run until {:g} s would take {:.1g}; {:g} are "
+                                   "the most",
+                                   *step_, *end_, *end_ / *step_, most_steps));
     build_step(place);
     result_.end = *end_;
     if (gravity_) result_.system->set_gravity(*gravity_);
