@@ -201,6 +201,31 @@ TEST(Accuracy, FrictionInAGuideTurnsRoundWhereTheSpeedDoes) {
     }
 }
 
+// Boxes fall into a pit: impacts follow one another closely, and the steps for them get longer until one is too long
+// for what comes next.
+TEST(Accuracy, APileInAPitComesToTheEnd) {
+    std::string scene =
+        "step: 0.005\nend: 0.5\naccuracy: 0.01\nmaterials: {m: {friction: 0.4, restitution: 0.2}}\nbodies:\n"
+        "- {name: floor, fixed: true, shapes: [{plane: {}, material: m}]}\n";
+    for (int k = 0; k < 4; ++k) {
+        const double side = k % 2 == 0 ? 0.4 : -0.4;
+        const bool along_x = k < 2;
+        scene += fmt::format(
+            "- {{name: wall{}, fixed: true, position: [{}, {}, 1], shapes: [{{box: {{size: [{}, {}, 4]}}, material: "
+            "m}}]}}\n",
+            k, along_x ? side : 0.0, along_x ? 0.0 : side, along_x ? 0.2 : 1.0, along_x ? 1.0 : 0.2);
+    }
+    for (int i = 0; i < 10; ++i)
+        scene += fmt::format(
+            "- {{name: b{}, density: 1000, position: [{:.3f}, {:.3f}, {:.3f}], orientation: {{axis: [{:.3f}, {:.3f}, "
+            "0.5], angle: {}}}, shapes: [{{box: {{size: [0.16, 0.12, 0.14]}}, material: m}}]}}\n",
+            i, 0.12 * std::sin(2.1 * i + 3.0), 0.12 * std::cos(1.3 * i + 3.0), 0.2 + 0.11 * i, std::sin(i + 3.0),
+            std::cos(2.0 * i + 3.0), 37 * i + 33);
+    Running run(parse_scene(scene, "test.yaml"));
+    run.finish();
+    EXPECT_NEAR(run.simulation.state().t, 0.5, 1e-12);
+}
+
 /// The sentence with which a scene of one body is refused.
 std::string refusal(const std::string& keys) {
     try {

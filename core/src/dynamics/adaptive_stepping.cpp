@@ -391,7 +391,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
                     return take_impact(state, h + impact_step(), end, solver);
             }
         } catch (const StepFailure& error) {
-            if (smallest) throw;
+            if (smallest && impact_step() <= control_.smallest) throw;
             failure = error.what();
             impacts_ = std::max(impacts_ - 2.0, 0.0);  // steps for impacts get shorter as well
             proposed = 0.25 * h;
