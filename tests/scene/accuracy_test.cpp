@@ -180,7 +180,8 @@ TEST(Accuracy, ABoxOnASpringStopsWhereFrictionHoldsIt) {
 // Friction in a guide turns round with the speed: half swings about ±F/k, each shorter by 2 F/k. It ends within one.
 TEST(Accuracy, FrictionInAGuideTurnsRoundWhereTheSpeedDoes) {
     const double m = 1.0, k = 60.0, F = 3.0, w = std::sqrt(k / m), shift = F / k;
-    for (const auto& [end, step] : {std::pair{1.0, 0.1}, {1.0, 0.0371}, {1.9, 0.01}}) {
+    for (const auto& run : {std::pair{1.0, 0.1}, {1.0, 0.0371}, {1.9, 0.01}}) {
+        const double end = run.first, step = run.second;
         SCOPED_TRACE(fmt::format("until {} by {}", end, step));
         double x = 0.5, left = end;
         for (; left > std::numbers::pi / w; left -= std::numbers::pi / w) x = -(x - std::copysign(2.0 * shift, x));
