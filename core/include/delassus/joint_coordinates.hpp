@@ -89,8 +89,9 @@ public:
     void add_stiffness(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
-    /// Of bodies that nothing but a free joint holds and that carry none.
+    /// Of bodies that a free joint holds.
     [[nodiscard]] std::vector<std::int32_t> vectors() const override;
+    /// Of bodies that nothing but a free joint holds and that carry none.
     void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const override;
     void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
                                 MatrixAssembler& H) const override;

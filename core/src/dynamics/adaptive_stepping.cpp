@@ -275,25 +275,33 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
         count(stepper_.step(state, 0.5 * h, solver));
         after = std::move(state.v);
     };
+    // Of two sliding speeds with these products: what the second may be off by where they oppose each other.
+    const auto turned = [](double product, double square, double other_square) {
+        return product < 0.0 ? std::sqrt(std::min(square, other_square)) : 0.0;
+    };
     for_each_sliding(begin_rows_, [&](const UnilateralRows::Block& block, std::size_t first, std::size_t rows) {
         if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) return;
-        const auto product = [&](const std::vector<double>& v, const std::vector<double>& w) {
-            double sum = 0.0;
-            for (std::size_t row = first; row < first + rows; ++row)
-                sum += begin_rows_.speed(row, v.data()) * begin_rows_.speed(row, w.data());
-            return sum;
-        };
-        const auto turned = [&](const std::vector<double>& v, const std::vector<double>& w) {
-            return product(v, w) < 0.0 ? std::sqrt(std::min(product(v, v), product(w, w))) : 0.0;
-        };
-        const auto& middle = trial.middle;
-        const auto& end = trial.end.v;
-        double speed = product(begin.v, middle) < 0.0 ? std::sqrt(product(begin.v, begin.v)) : 0.0;
-        speed = std::max({speed, turned(middle, end), turned(begin.v, end)});
-        const double before = std::sqrt(product(middle, middle));
-        if (before > trial.slow && std::sqrt(product(end, end)) < at_rest * before) {
+        double bb = 0.0, bm = 0.0, be = 0.0, mm = 0.0, me = 0.0, ee = 0.0;  // of begin, middle and end
+        for (std::size_t row = first; row < first + rows; ++row) {
+            const double b = begin_rows_.speed(row, begin.v.data()), m = begin_rows_.speed(row, trial.middle.data()),
+                         e = begin_rows_.speed(row, trial.end.v.data());
+            bb += b * b;
+            bm += b * m;
+            be += b * e;
+            mm += m * m;
+            me += m * e;
+            ee += e * e;
+        }
+        double speed = std::max({bm < 0.0 ? std::sqrt(bb) : 0.0, turned(me, mm, ee), turned(be, bb, ee)});
+        if (std::sqrt(mm) > trial.slow && std::sqrt(ee) < at_rest * std::sqrt(mm)) {
             if (after.empty()) go_on();
-            speed = std::max(speed, turned(middle, after));
+            double ma = 0.0, aa = 0.0;
+            for (std::size_t row = first; row < first + rows; ++row) {
+                const double a = begin_rows_.speed(row, after.data());
+                ma += a * begin_rows_.speed(row, trial.middle.data());
+                aa += a * a;
+            }
+            speed = std::max(speed, turned(ma, mm, aa));
         }
         trial.error = std::max(trial.error, speed / trial.slow);
     });

@@ -92,7 +92,6 @@ std::int32_t DynamicalSystem::position_size() const {
 std::vector<std::int32_t> DynamicalSystem::vectors() const {
     return {};
 }
-
 std::vector<std::int32_t> DynamicalSystem::constraint_blocks() const {
     return {};
 }

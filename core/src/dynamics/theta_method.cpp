@@ -397,9 +397,8 @@ Vector ThetaMethod::without_impacts(const State& begin, double h, StepSolver& so
 }
 
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
-    const bool known = settings_.linearly_implicit && !changes_[0].empty();
     smooth_ = guess_;
-    if (!known && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
+    if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
     contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
     timed_ = true;
 }

@@ -81,7 +81,7 @@ public:
     /// What impacts do to a velocity.
     struct OnVelocity {
         double share = -1.0;  ///< of its change against a motion without them; below 0 where none acts
-        double late = 0.0;  ///< how long before the middle of the step (1 − θ) they act, as a part of it; times share
+        double late = 0.0;  ///< share · (1 − θ − τ/h), for impacts at the time τ after the beginning of the step
     };
     /// Whether contacts struck in this step at times within it; on_velocities() then has what they do. solution: of the
     /// whole problem.
@@ -90,8 +90,8 @@ public:
     /// Timestepper::follow_impacts().
     void follow_impacts(bool follow) { follows_ = follow; }
     [[nodiscard]] bool follows_impacts() const { return follows_; }
-    /// StepReport::cut, where more than a hundredth of the kinetic energy is to be given
-    /// back. solution: of the whole problem.
+    /// StepReport::cut, where more than a hundredth of the kinetic energy is to be given back. solution: of the whole
+    /// problem.
     [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution) const;
 
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.

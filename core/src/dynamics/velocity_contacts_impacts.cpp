@@ -12,13 +12,13 @@ namespace delassus {
 
 namespace {
 
-/// act(row, column, value) for the entries of so many rows of D from the first on.
+/// act(row, column, value) for the entries of so many rows from the first on.
 template <class Act>
-void for_each_entry(const SparseMatrix& D, std::size_t first, std::size_t rows, const Act& act) {
+void for_each_entry(const SparseMatrix& matrix, std::size_t first, std::size_t rows, const Act& act) {
     for (std::size_t row = first; row < first + rows; ++row)
-        for (auto e = static_cast<std::size_t>(D.row_start[row]); e < static_cast<std::size_t>(D.row_start[row + 1]);
-             ++e)
-            act(row, static_cast<std::size_t>(D.column[e]), D.value[e]);
+        for (auto e = static_cast<std::size_t>(matrix.row_start[row]);
+             e < static_cast<std::size_t>(matrix.row_start[row + 1]); ++e)
+            act(row, static_cast<std::size_t>(matrix.column[e]), matrix.value[e]);
 }
 
 /// A row of D diag(H)⁻¹ Dᵀ at a column. diagonal: of H; columns of D ascend.
@@ -212,6 +212,10 @@ void VelocityContacts::find_struck(const Problem& problem) {
 // the share of the rest. Masses, joints and contacts that push pass an impact on to velocities on which none acts, and
 // with it s and τ.
 bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solution) {
+    const auto acts = [&](const Contact& contact) {
+        return contact.impact && solution.lambda[first_row_ + contact.row] > 0.0;
+    };
+    if (std::none_of(contacts_.begin(), contacts_.end(), acts)) return false;
     const auto& D = problem.D;
     const auto n = static_cast<std::size_t>(D.columns);
     on_velocities_.assign(n, {});
@@ -236,13 +240,12 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
     };
     for (const Contact& contact : contacts_) {
         const std::size_t first = first_row_ + contact.row;
-        if (!contact.impact || !(solution.lambda[first] > 0.0)) continue;
+        if (!acts(contact)) continue;
         const double share = std::max(1.0 - contact.last / solution.lambda[first], 0.0);
         const OnVelocity value{share, share * (1.0 - theta_ - contact.impact->acts / h_)};
         for_each_entry(D, first, 1,
                        [&](std::size_t, std::size_t column, double) { add(column, value, solution.lambda[first]); });
     }
-    if (!settle()) return false;
     const auto pass_on = [&](const SparseMatrix& matrix, std::size_t first, std::size_t rows) {
         OnVelocity mean{.share = 0.0};
         double known = 0.0, unknown = 0.0;
@@ -258,13 +261,13 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
         mean.late /= known;
         for_each_entry(matrix, first, rows, [&](std::size_t, std::size_t column, double) { add(column, mean, 1.0); });
     };
-    do {
+    while (settle()) {
         for (std::size_t row = 0; row < n; ++row) pass_on(problem.H, row, 1);
         for (std::size_t row = 0; row < first_row_; ++row) pass_on(D, row, 1);
         for (std::size_t k = 0; k < contacts_.size(); ++k)
             if (solution.lambda[first_row_ + contacts_[k].row] > 0.0)
                 pass_on(D, first_row_ + contacts_[k].row, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
-    } while (settle());
+    }
     return true;
 }
 
