@@ -17,7 +17,7 @@ from ._system import DynamicalSystem, _Asked
 from ._view import View
 from ._yaml import yaml_of
 
-_NO_END = 1e300  # for the reader of scenes, which wants finite times
+_NO_END, _MOST_STEPS = 1e300, 1e12  # for the reader of scenes, which wants finite times, and no more steps
 
 Named = Union[str, Mapping[str, Any]]  #: 'name', 'name(key=value, …)', or {'name': …, 'options': {…}, …} as in scenes
 
@@ -60,7 +60,7 @@ def _settings(integrator: Named, solver: Named, law: Optional[str], step: Option
               tolerance: Any) -> Scene:
     """A scene with nothing in it but how a system is to be run; its reader checks it all."""
     if end == np.inf:
-        end = _NO_END
+        end = _NO_END if step is None else _MOST_STEPS * step
     scene: dict = {"bodies": []}
     scene.update({key: value for key, value in (("step", step), ("end", end), ("tolerance", tolerance))
                   if value is not None})

@@ -73,8 +73,8 @@ TEST(Method, FollowsFromTheScene) {
               Chosen("switching", Coordinates::Joint))
         << "stiff";
     EXPECT_EQ(chosen_for(head + chain(6, ", spring: {stiffness: 1.0e+6}, friction: 0.1")),
-              Chosen("euler_implicit_linearized", Coordinates::Joint))
-        << "stiff, and friction acts all the time";
+              Chosen("moreau_jean", Coordinates::Joint))
+        << "friction acts all the time, and the method damps stiff springs";
     EXPECT_EQ(chosen_for(head + "solver: cholmod\n" + chain(6)), implicit);
     EXPECT_EQ(chosen_for(head + "leave_out: false\n" + chain(6)), implicit);
     EXPECT_EQ(chosen_for(head + "sleeping: true\n" + chain(6)), implicit);

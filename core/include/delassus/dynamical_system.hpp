@@ -206,6 +206,21 @@ public:
     /// Whether add_stiffness or add_damping ever adds anything: a step without them factorises nothing.
     [[nodiscard]] virtual bool has_stiffness() const;
 
+    // ---- Stiff forces: of f, those that a step does not resolve; none by default ----
+
+    /// stiff ← the numbers, the system's own, ascending, of forces −(k C + c Ċ) ∇C that at the start would, each by
+    /// itself, move the system at √(k/m) or brake it at c/m faster than this rate, 1/s.
+    virtual void find_stiff_forces(double rate, std::vector<std::int32_t>& stiff) const;
+    /// tensions ← k C + c Ċ of each.
+    virtual void stiff_tensions(const State& state, std::span<const std::int32_t> stiff,
+                                std::vector<double>& tensions) const;
+    /// result −= factor · Σ tension ∇C; n.
+    virtual void add_stiff_forces(const State& state, std::span<const std::int32_t> stiff,
+                                  std::span<const double> tensions, double factor, double* result) const;
+    /// H += Σ (of_stiffness k + of_damping c) ∇C ∇Cᵀ.
+    virtual void add_stiff_tangent(const State& state, std::span<const std::int32_t> stiff, double of_stiffness,
+                                   double of_damping, MatrixAssembler& H) const;
+
     // ---- Bilateral constraints; nothing by default. Timesteppers ask for them only where m() > 0. ----
 
     /// C(q, t); m.

@@ -96,6 +96,13 @@ public:
     void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
                                 MatrixAssembler& H) const override;
     [[nodiscard]] bool has_stiffness() const override;
+    void find_stiff_forces(double rate, std::vector<std::int32_t>& stiff) const override;
+    void stiff_tensions(const State& state, std::span<const std::int32_t> stiff,
+                        std::vector<double>& tensions) const override;
+    void add_stiff_forces(const State& state, std::span<const std::int32_t> stiff, std::span<const double> tensions,
+                          double factor, double* result) const override;
+    void add_stiff_tangent(const State& state, std::span<const std::int32_t> stiff, double of_stiffness,
+                           double of_damping, MatrixAssembler& H) const override;
     void constraint(const State& state, double* C) const override;
     void add_constraint_jacobian(const State& state, std::int32_t first_row, MatrixAssembler& D) const override;
     void constraint_rate(const State& state, double* C_t) const override;

@@ -132,6 +132,16 @@ void DynamicalSystem::add_inertial_stiffness(const State&, const double*, double
 bool DynamicalSystem::has_stiffness() const {
     return true;
 }
+void DynamicalSystem::find_stiff_forces(double, std::vector<std::int32_t>& stiff) const {
+    stiff.clear();
+}
+void DynamicalSystem::stiff_tensions(const State&, std::span<const std::int32_t>, std::vector<double>& tensions) const {
+    tensions.clear();
+}
+void DynamicalSystem::add_stiff_forces(const State&, std::span<const std::int32_t>, std::span<const double>, double,
+                                       double*) const {}
+void DynamicalSystem::add_stiff_tangent(const State&, std::span<const std::int32_t>, double, double,
+                                        MatrixAssembler&) const {}
 
 void DynamicalSystem::constraint(const State&, double*) const {}
 void DynamicalSystem::add_constraint_jacobian(const State&, std::int32_t, MatrixAssembler&) const {}

@@ -27,13 +27,32 @@ namespace delassus {
 // Constraints hold on the level of velocities, C_q(q⁺) v⁺ + C_t = 0, contacts likewise (dynamics/velocity_contacts.cpp,
 // which says where D is taken). λ is P/h, the mean over the step: as a value at its end it is of order 1.
 //
+// Stiff forces −T ∇C, T = k C + c Ċ, which the step does not resolve (DynamicalSystem::find_stiff_forces()): taken at
+// θ, what they excite would ring on, for θ = ½ for ever. As k grows they become constraints C = 0, and are taken as
+// those are: with their directions ∇C at θ, and with the tension T of the state
+//
+//     q⁺ ∘ exp((1 − θ) h v⁺),  v⁺,  t⁺ + (1 − θ) h
+//
+// For one body, k → ∞ makes C + h ((1 − θ) u + u⁺) = 0 with C⁺ = C + h ((1 − θ) u + θ u⁺): two steps lead from any C
+// and u to C = u = 0. H has h² k ∇C ∇Cᵀ and h c ∇C ∇Cᵀ of them in place of θ² h² k and θ h c.
+//
 // Gyroscopic torques: a body that spins by itself turns by a rule that keeps its energy and momentum
 // (DynamicalSystem::free_spins), and what the other motions of the step add to its torque is taken beside its impulse.
+
+namespace {
+
+/// h ω up to which the trapezoidal rule has a faint error of the fastest motion.
+constexpr double rate_of_faint_error = 2.0;
+/// The same where steps are divided until their error is small: what is faster is not what is asked for.
+constexpr double rate_that_errors_show = 100.0;
+
+}  // namespace
 
 ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
     : system_(system),
       settings_(std::move(settings)),
       theta_(settings_.theta),
+      resolved_rate_(settings_.divides_by_error ? rate_that_errors_show : rate_of_faint_error),
       contacts_(system, settings_.contacts),
       linearization_(system, settings_.linearization_limit),
       projection_(system),
@@ -48,6 +67,11 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
         next = first + 3;
     }
     for (; next < n_; ++next) vectors_.push_back({next, 1});
+}
+
+void ThetaMethod::choose_steps(double /*tolerance*/) {
+    chooses_steps_ = true;
+    resolved_rate_ = rate_that_errors_show;
 }
 
 /// act(first, size) for the velocities that are components of one vector, and for each other one.
@@ -240,6 +264,10 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     if (system_.has_stiffness()) {
         system_.add_damping(at_theta_, theta_ * h, Tangent::Symmetric, H_);
         system_.add_stiffness(at_theta_, theta_ * theta_ * h * h, Tangent::Symmetric, H_);
+        if (h != h_of_stiff_) system_.find_stiff_forces(resolved_rate_ / h, stiff_);
+        h_of_stiff_ = h;
+        if (!stiff_.empty())
+            system_.add_stiff_tangent(at_theta_, stiff_, (1.0 - theta_ * theta_) * h * h, (1.0 - theta_) * h, H_);
     }
     H_.finish_into(problem_.H);
     D_.begin(m_, n_);
@@ -259,8 +287,7 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
 /// a and the b of constraints for the guess; the impulse of its forces stays in force_.
 void ThetaMethod::linearize(const State& begin, double h) {
     const Eigen::Map<const Vector> v(begin.v.data(), n_);
-    move(begin, h, guess_, theta_, at_theta_);
-    impulse_of_forces(h);
+    impulse_of_forces(begin, h, guess_);
     back_ = v - guess_;
     problem_.a.assign(force_.begin(), force_.end());
     system_.multiply_mass(at_theta_, 1.0, back_.data(), problem_.a.data());
@@ -292,10 +319,23 @@ void ThetaMethod::set_constraint_rows(const State& begin, double h) {
         problem_.b[static_cast<std::size_t>(row)] = rate_[row] - problem_.D.row_times(row, guess_.data());
 }
 
-/// force_ ← h f at at_theta_, where spinning bodies have their own impulse instead of what they feel alone.
-void ThetaMethod::impulse_of_forces(double h) {
+/// force_ ← h f for the velocities `last` at the end, at at_theta_, where spinning bodies have their own impulse
+/// instead of what they feel alone.
+void ThetaMethod::impulse_of_forces(const State& begin, double h, const Vector& last) {
+    move(begin, h, last, theta_, at_theta_);
     force_.setZero(n_);
     system_.add_force(at_theta_, h, force_.data());
+    if (!stiff_.empty()) {
+        move(begin, h, last, 1.0, beyond_);
+        delta_ = (1.0 - theta_) * h * last;
+        system_.increment(beyond_.q.data(), delta_.data(), beyond_.q.data());
+        beyond_.v.assign(last.begin(), last.end());
+        beyond_.t += (1.0 - theta_) * h;
+        system_.stiff_tensions(beyond_, stiff_, tensions_);
+        system_.stiff_tensions(at_theta_, stiff_, tensions_at_theta_);
+        for (std::size_t i = 0; i < stiff_.size(); ++i) tensions_[i] -= tensions_at_theta_[i];
+        system_.add_stiff_forces(at_theta_, stiff_, tensions_, h, force_.data());
+    }
     for (std::size_t k = 0; k < spins_.size(); ++k)
         for (std::size_t i = 0; i < 3; ++i)
             force_[spins_[k].column + static_cast<std::int32_t>(i)] +=
@@ -355,11 +395,12 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     if (contacts_.any() && contacts_.may_strike()) time_meetings(begin, h, solver, report);
     scale();
     const bool before = report.solved;
-    bool taking = false;
+    bool taking = false, turns = false;
     for (int iteration = 0;; ++iteration) {
         linearize(begin, h);
         set_b_of_contacts(iteration, report);
-        if (iteration > 0 && (unchanged() || (iteration >= settings_.iterations && contacts_.settled()))) return;
+        if (iteration > (turns ? 1 : 0) && (unchanged() || (iteration >= settings_.iterations && contacts_.settled())))
+            return;
         if (iteration == most_iterations) {
             report.solved = false;
             report.message = "the speeds of sliding contacts did not settle";
@@ -372,6 +413,10 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
         solved_from_ = guess_;
         solved_force_ = force_;
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
+        if (iteration == 0 && !taking && solved && contacts_.any_turns_round(problem_, solution_)) {
+            time_turns(solver, report);
+            turns = true;
+        }
         if (guess_.allFinite() && !taking && contacts_gain(begin) && contacts_.only_take()) {
             taking = true;  // from the start, which is not where energy came from
             guess_ = free_;
@@ -396,6 +441,15 @@ Vector ThetaMethod::without_impacts(const State& begin, double h, StepSolver& so
     return Eigen::Map<const Vector>(solution.x.data(), n_);
 }
 
+/// Of a step that is solved: when what slides turns round.
+void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
+    Problem problem = problem_;
+    contacts_.let_slide_on(problem);
+    Solution solution = solution_;
+    ++report.newton_iterations;
+    if (report.take(solver.solve(std::move(problem), solution, request_))) contacts_.time_turns(problem_, solution.x);
+}
+
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
@@ -417,7 +471,10 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
         return guess_.allFinite();
     };
-    if (contacts_.any()) time_meetings(begin, h, solver, report);
+    if (contacts_.any()) {
+        time_meetings(begin, h, solver, report);
+        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)});
+    }
     linearize_at_guess();
     if (!found()) return;
     if (changes_[0].empty()) {
@@ -453,12 +510,11 @@ void ThetaMethod::note_error(const State& begin, double h) {
 
 // The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).
 void ThetaMethod::judge_linearization(const State& begin, double h, const Vector& result, StepReport& report) {
-    move(begin, h, result, theta_, at_theta_);
+    impulse_of_forces(begin, h, result);
     back_ = result - solved_from_;
     linear_ = solved_force_;
     problem_.H.multiply_add(-1.0, back_.data(), linear_.data());
     system_.multiply_mass(at_theta_, 1.0, back_.data(), linear_.data());
-    impulse_of_forces(h);
     const auto n = static_cast<std::size_t>(n_);
     linearization_.judge(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H, settings_.name, report);
 }

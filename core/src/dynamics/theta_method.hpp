@@ -26,8 +26,9 @@ struct ThetaSettings {
     /// Linearly implicit: one problem a step about an extrapolated guess, and constraints and gaps corrected by its
     /// rows. Otherwise Newton's method, and positions are projected afterwards.
     bool linearly_implicit = false;
-    int iterations = 2;        ///< of Newton's method, at least
-    double tolerance = 1e-10;  ///< no further iteration where right-hand sides change by less than this share
+    bool divides_by_error = false;  ///< whoever takes the steps divides them until their error is small
+    int iterations = 2;             ///< of Newton's method, at least
+    double tolerance = 1e-10;       ///< no further iteration where right-hand sides change by less than this share
     VelocityContactSettings contacts;
     double linearization_limit = 0.1;
 };
@@ -38,7 +39,7 @@ public:
     ThetaMethod(DynamicalSystem& system, ThetaSettings settings);
 
     [[nodiscard]] int order() const override { return settings_.theta == 0.5 ? 2 : 1; }
-    void choose_steps(double /*tolerance*/) override { chooses_steps_ = true; }
+    void choose_steps(double tolerance) override;
     void restart() override;
     void follow_impacts(bool follow) override { contacts_.follow_impacts(follow); }
     void forces_jumped() override;
@@ -60,13 +61,14 @@ private:
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
     void set_constraint_rows(const State& begin, double h);
-    void impulse_of_forces(double h);
+    void impulse_of_forces(const State& begin, double h, const Vector& last);
     void set_b_of_contacts(int iteration, const StepReport& report);
     [[nodiscard]] bool contacts_gain(const State& begin);
     void scale();
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
     [[nodiscard]] Vector without_impacts(const State& begin, double h, StepSolver& solver, StepReport& report);
+    void time_turns(StepSolver& solver, StepReport& report);
     void time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_error(const State& begin, double h);
@@ -79,6 +81,7 @@ private:
     DynamicalSystem& system_;
     ThetaSettings settings_;
     double theta_;
+    double resolved_rate_;  ///< h ω beyond which a force is stiff
     VelocityContacts contacts_;
     Linearization linearization_;
     PositionProjection projection_;
@@ -94,7 +97,10 @@ private:
     MatrixAssembler H_, D_;
     Problem problem_;
     Solution solution_;
-    State at_theta_, end_;
+    State at_theta_, end_, beyond_;
+    std::vector<std::int32_t> stiff_;  ///< forces that the step does not resolve
+    double h_of_stiff_ = 0.0;
+    std::vector<double> tensions_, tensions_at_theta_;
     std::vector<FreeSpin> spins_, theta_spins_;
     UntouchedSpins untouched_;
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly

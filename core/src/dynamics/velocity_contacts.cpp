@@ -88,6 +88,16 @@ namespace delassus {
 // contacts gain more than a hundredth of the kinetic energy is solved again without restitution and with D̄ for both
 // sides: then u⁺ = 0 where P_n > 0.
 //
+// ---- Friction in joints, motors at their limit ----
+//
+// A force between the bounds F₋ and F₊ is F₋ while the speed u of its row is above 0, and F₊ while it is below. Where u
+// passes 0 at the time τ of the step, the impulse is τ F₋ and that of a force between the bounds from then on:
+//
+//     P ∈ τ F₋ + (h − τ) [F₋, F₊],      τ = h u⁻/(u⁻ − ũ)
+//
+// with the speed ũ that the row would have at the end under F₋ alone; likewise for u⁻ < 0. Bounds of h [F₋, F₊] would
+// change the speed at the end by τ (F₊ − F₋)/m at every turn, which makes the method one of order 1.
+//
 // ---- Friction ----
 //
 // The associated law on the level of velocities would lift a sliding contact at the speed μ |u_t| in each step. So

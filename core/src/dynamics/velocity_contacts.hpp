@@ -64,6 +64,13 @@ public:
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
     /// the velocities at the end of the step without impacts, n.
     void time_meetings(Problem& problem, std::span<const double> smooth);
+    /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
+    [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
+    /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
+    void let_slide_on(Problem& problem) const;
+    /// What turns round within the step gets the bounds of that time. sliding: the velocities at the end of the step if
+    /// it slid on, n.
+    void time_turns(Problem& problem, std::span<const double> sliding) const;
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// solution: of the last iteration; natural_error: of the solves so far.
     void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
@@ -167,6 +174,8 @@ private:
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
+    /// The speed at the beginning of the step of a force between bounds that may turn round; 0 of all else.
+    [[nodiscard]] double sliding_speed(std::size_t block) const;
     [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);

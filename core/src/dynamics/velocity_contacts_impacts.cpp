@@ -333,4 +333,51 @@ void note_impact(const UnilateralRows::Block& block, double gap, double approach
     report.impact_time = approach < 0.0 ? h : gap / speed;
 }
 
+double VelocityContacts::sliding_speed(std::size_t block) const {
+    const Contact& contact = contacts_[block];
+    const UnilateralRows::Block& own = rows_.blocks()[block];
+    const bool bounded = own.cone.kind == ConeKind::Box && own.cone.rows == 1 && std::isfinite(own.cone.lo[0]) &&
+                         std::isfinite(own.cone.hi[0]);
+    if (!bounded || contact.servo || !contact.known) return 0.0;
+    return before_.speed(contact.before, begin_speeds_);
+}
+
+bool VelocityContacts::any_turns_round(const Problem& problem, const Solution& solution) const {
+    constexpr double share = 1e-3;  // of the bounds' distance, which a solver may leave
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const double before = sliding_speed(k);
+        if (before == 0.0) continue;
+        const std::size_t row = first_row_ + contacts_[k].row;
+        const Cone& cone = problem.cones[bilateral_cones_ + k];
+        const double faint = share * (cone.hi[0] - cone.lo[0]), own = before > 0.0 ? cone.lo[0] : cone.hi[0];
+        if (std::abs(before) > faint * coupling(problem.D, diagonal_, row, row) &&
+            std::abs(solution.lambda[row] - own) > faint)
+            return true;
+    }
+    return false;
+}
+
+void VelocityContacts::let_slide_on(Problem& problem) const {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const double before = sliding_speed(k);
+        Cone& cone = problem.cones[bilateral_cones_ + k];
+        if (before > 0.0) cone.hi = cone.lo;
+        if (before < 0.0) cone.lo = cone.hi;
+    }
+}
+
+void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding) const {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const double before = sliding_speed(k);
+        if (before == 0.0) continue;
+        const std::size_t row = contacts_[k].row;
+        const double after =
+            problem.D.row_times(static_cast<std::int32_t>(first_row_ + row), sliding.data()) + rows_.rows()[row].rate;
+        if (!(before * after < 0.0)) continue;
+        const double share = before / (before - after);  // τ/h
+        Cone& cone = problem.cones[bilateral_cones_ + k];
+        (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
+    }
+}
+
 }  // namespace delassus

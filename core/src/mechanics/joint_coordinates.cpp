@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "delassus/error.hpp"
 #include "mechanics/angle.hpp"
 #include "mechanics/kinematic_tree.hpp"
+#include "mechanics/model.hpp"
 #include "mechanics/tree_derivatives.hpp"
 
 namespace delassus {
@@ -92,6 +94,13 @@ struct JointCoordinates::Implementation {
 
     void place(const State& at) {
         tree.place(at.q.data(), at.v.data());
+        write(at.q.data(), state);
+        state.t = at.t;
+    }
+
+    /// The same with all velocities 0.
+    void place_at_rest(const State& at) {
+        tree.place(at.q.data(), nullptr);
         write(at.q.data(), state);
         state.t = at.t;
     }
@@ -509,6 +518,52 @@ void JointCoordinates::add_damping(const State& state, double factor, Tangent ta
     if (tangent != Tangent::Exact || !self.turns) return;
     self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
     self.derivatives.rates(self.adder(factor, H));
+}
+
+// Of what the bodies alone have for stiff, all that it is along the joints: the mass m of a spring there has
+// 1/m = ∇C M⁻¹ ∇Cᵀ ≤ that of its bodies without joints.
+void JointCoordinates::find_stiff_forces(double rate, std::vector<std::int32_t>& stiff) const {
+    auto& self = *implementation_;
+    self.bodies.find_stiff_forces(rate, stiff);
+    if (stiff.empty()) return;
+    self.place_at_rest(initial_state());
+    const auto n = static_cast<std::size_t>(self.tree.n());
+    std::vector<double> gradient(n), response(n);
+    std::erase_if(stiff, [&](std::int32_t number) {
+        std::fill(self.force.begin(), self.force.end(), 0.0);
+        std::fill(gradient.begin(), gradient.end(), 0.0);
+        self.bodies.add_stiff_forces(self.state, {&number, 1}, std::array{-1.0}, 1.0, self.force.data());
+        self.tree.project_with_bias(self.force.data(), 1.0, gradient.data());
+        self.tree.accelerate(self.force.data(), response.data());
+        const double weight = std::inner_product(gradient.begin(), gradient.end(), response.begin(), 0.0);
+        const auto [stiffness, damping] = self.bodies.stiff_force_constants(number);
+        return !mechanics::is_stiff(stiffness * weight, damping * weight, rate);
+    });
+}
+
+void JointCoordinates::stiff_tensions(const State& state, std::span<const std::int32_t> stiff,
+                                      std::vector<double>& tensions) const {
+    auto& self = *implementation_;
+    self.place(state);
+    self.bodies.stiff_tensions(self.state, stiff, tensions);
+}
+
+void JointCoordinates::add_stiff_forces(const State& state, std::span<const std::int32_t> stiff,
+                                        std::span<const double> tensions, double factor, double* result) const {
+    auto& self = *implementation_;
+    self.place_at_rest(state);
+    std::fill(self.force.begin(), self.force.end(), 0.0);
+    self.bodies.add_stiff_forces(self.state, stiff, tensions, 1.0, self.force.data());
+    self.tree.project_with_bias(self.force.data(), factor, result);
+}
+
+void JointCoordinates::add_stiff_tangent(const State& state, std::span<const std::int32_t> stiff, double of_stiffness,
+                                         double of_damping, MatrixAssembler& H) const {
+    auto& self = *implementation_;
+    self.place(state);
+    self.stiffness.begin(self.bodies.n(), self.bodies.n());
+    self.bodies.add_stiff_tangent(self.state, stiff, of_stiffness, of_damping, self.stiffness);
+    self.project_matrix(self.stiffness.finish(), 1.0, false, H);
 }
 
 void JointCoordinates::add_gyroscopic_damping(const State& state, double factor, Tangent tangent,

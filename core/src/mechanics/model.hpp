@@ -138,6 +138,11 @@ struct RowSpring {
     bool definite = false;  ///< its symmetric tangent is positive semidefinite: k ∇C ∇Cᵀ
 };
 
+/// Whether a spring with ω² = k/m, or its damper with c/m, is faster than a rate.
+inline bool is_stiff(double squared_rate, double damping_rate, double rate) {
+    return !(squared_rate <= rate * rate && damping_rate <= rate);
+}
+
 /// The torque −c (ω_second − ω_first) on the second body and its opposite on the first.
 struct TurnDamper {
     BodyIndex first = world_body, second = world_body;

@@ -70,6 +70,22 @@ RowVector velocities_of(const RowColumns& columns, const Placements& at) {
     return v;
 }
 
+/// k C + c Ċ of a spring; columns and gradient: its own.
+double tension(const mechanics::RowSpring& spring, const RowColumns& columns, const RowVector& gradient,
+               const Placements& at, double t) {
+    double result =
+        spring.stiffness * spring.row.value(at, t) + spring.damping * gradient.dot(velocities_of(columns, at));
+    if (spring.row.drive) result -= spring.damping * spring.row.drive->rate(t);
+    return result;
+}
+
+/// result (n) += factor · gradient, at the moving bodies.
+void scatter(const RowColumns& columns, const RowVector& gradient, double factor, double* result) {
+    for (int k = 0; k < columns.bodies; ++k)
+        if (const auto column = columns.column[static_cast<std::size_t>(k)]; column >= 0)
+            Eigen::Map<Eigen::Matrix<double, 6, 1>>(result + column) += factor * gradient.segment<6>(6 * k);
+}
+
 // In the frames of the bodies the torques are −c (ω̄_s − P ω̄_f) on the second and −c (ω̄_f − Pᵀ ω̄_s) on the first, with
 // P = A_sᵀ A_f. Along increments δ(P ω̄_f) = [P ω̄_f]× θ_s − P [ω̄_f]× θ_f, and the same with the bodies exchanged.
 /// H += factor c · blocks on a body's own turning and on the other's: own(P, ω̄_other) and other(P, ω̄_other).
@@ -190,13 +206,7 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
     for (const auto& spring : self.springs) {
         const auto columns = spring.row.columns(self.at, true);
         spring.row.gradient(self.at, columns, self.gradient);
-        double force = spring.stiffness * spring.row.value(self.at, state.t);
-        const RowVector v = velocities_of(columns, self.at);
-        for (int k = 0; k < 6 * columns.bodies; ++k) force += spring.damping * self.gradient[k] * v[k];
-        if (spring.row.drive) force -= spring.damping * spring.row.drive->rate(state.t);
-        for (int k = 0; k < columns.bodies; ++k)
-            if (const auto column = columns.column[static_cast<std::size_t>(k)]; column >= 0)
-                for (int i = 0; i < 6; ++i) result[column + i] -= factor * force * self.gradient[6 * k + i];
+        scatter(columns, self.gradient, -factor * tension(spring, columns, self.gradient, self.at, state.t), result);
     }
     for (const auto& damper : self.turn_dampers) {
         const auto &first = self.at[damper.first], &second = self.at[damper.second];
@@ -257,11 +267,9 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
             continue;
         }
         spring.row.hessian(self.at, columns, self.hessian);
-        const RowVector v = velocities_of(columns, self.at);
-        double force = spring.stiffness * spring.row.value(self.at, state.t) + spring.damping * self.gradient.dot(v);
-        if (spring.row.drive) force -= spring.damping * spring.row.drive->rate(state.t);
-        const RowVector turning = self.hessian.transpose() * v;
-        RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose() + force * self.hessian;
+        const RowVector turning = self.hessian.transpose() * velocities_of(columns, self.at);
+        RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose() +
+                      tension(spring, columns, self.gradient, self.at, state.t) * self.hessian;
         K += spring.damping * self.gradient * turning.transpose();
         add_local(columns, K, factor, tangent, H);
     }
@@ -339,6 +347,76 @@ bool MultibodySystem::has_stiffness() const {
     const auto& self = *implementation_;
     return !self.springs.empty() || !self.turn_dampers.empty() || !self.loads.empty() || !self.element_sides.empty() ||
            !self.cables.empty() || !self.beams.empty();
+}
+
+// ---- Stiff springs ----
+//
+// A spring by itself moves the bodies at its ends, which weigh m with 1/m = ∇C M⁻¹ ∇Cᵀ along it, at the rate ω =
+// √(k/m), and its damper brakes them at the rate c/m. Joints and other springs that hold these bodies are not seen.
+
+void MultibodySystem::find_stiff_forces(double rate, std::vector<std::int32_t>& stiff) const {
+    const auto& self = *implementation_;
+    stiff.clear();
+    if (self.springs.empty()) return;
+    self.place(initial_state());
+    for (std::size_t i = 0; i < self.springs.size(); ++i) {
+        const auto& spring = self.springs[i];
+        const auto columns = spring.row.columns(self.at);
+        spring.row.gradient(self.at, columns, self.gradient);
+        double weight = 0.0;  // 1/m
+        for (int k = 0; k < columns.bodies; ++k) {
+            if (columns.column[static_cast<std::size_t>(k)] < 0) continue;
+            const auto& body = self.bodies[static_cast<std::size_t>(columns.body[static_cast<std::size_t>(k)])];
+            const Vector3d push = self.gradient.segment<3>(6 * k), turn = self.gradient.segment<3>(6 * k + 3);
+            if (!push.isZero(0.0)) weight += push.squaredNorm() / body.metric_mass;
+            if (!turn.isZero(0.0)) weight += turn.dot(body.metric_inertia.ldlt().solve(turn));
+        }
+        if (mechanics::is_stiff(spring.stiffness * weight, spring.damping * weight, rate))
+            stiff.push_back(static_cast<std::int32_t>(i));
+    }
+}
+
+std::array<double, 2> MultibodySystem::stiff_force_constants(std::int32_t number) const {
+    const auto& spring = implementation_->springs[static_cast<std::size_t>(number)];
+    return {spring.stiffness, spring.damping};
+}
+
+void MultibodySystem::stiff_tensions(const State& state, std::span<const std::int32_t> stiff,
+                                     std::vector<double>& tensions) const {
+    const auto& self = *implementation_;
+    self.place(state);
+    tensions.clear();
+    for (const std::int32_t i : stiff) {
+        const auto& spring = self.springs[static_cast<std::size_t>(i)];
+        const auto columns = spring.row.columns(self.at, true);
+        spring.row.gradient(self.at, columns, self.gradient);
+        tensions.push_back(tension(spring, columns, self.gradient, self.at, state.t));
+    }
+}
+
+void MultibodySystem::add_stiff_forces(const State& state, std::span<const std::int32_t> stiff,
+                                       std::span<const double> tensions, double factor, double* result) const {
+    const auto& self = *implementation_;
+    self.place(state);
+    for (std::size_t i = 0; i < stiff.size(); ++i) {
+        const auto& spring = self.springs[static_cast<std::size_t>(stiff[i])];
+        const auto columns = spring.row.columns(self.at);
+        spring.row.gradient(self.at, columns, self.gradient);
+        scatter(columns, self.gradient, -factor * tensions[i], result);
+    }
+}
+
+void MultibodySystem::add_stiff_tangent(const State& state, std::span<const std::int32_t> stiff, double of_stiffness,
+                                        double of_damping, MatrixAssembler& H) const {
+    const auto& self = *implementation_;
+    self.place(state);
+    for (const std::int32_t i : stiff) {
+        const auto& spring = self.springs[static_cast<std::size_t>(i)];
+        const auto columns = spring.row.columns(self.at);
+        spring.row.gradient(self.at, columns, self.gradient);
+        const RowMatrix outer = self.gradient * self.gradient.transpose();
+        add_local(columns, outer, of_stiffness * spring.stiffness + of_damping * spring.damping, Tangent::Symmetric, H);
+    }
 }
 
 }  // namespace delassus

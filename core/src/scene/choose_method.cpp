@@ -28,8 +28,7 @@ constexpr double most_explicit_rate = 50.0;
 constexpr double most_explicit_rate_of_elements = 1.0;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
-/// The same where steps are divided until their error is small: beyond that it keeps no energy (docs/integrators.md),
-/// and what is damped as fast alternates in sign.
+/// The same where steps are divided until their error is small.
 constexpr double most_rate_of_chosen_steps = 100.0;
 /// Beside contacts, where the flights between them are taken in explicit parts and contacts in parts by their error
 /// (measured on servos of an arm).
@@ -192,13 +191,12 @@ std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
 }
 
 /// For bodies that may touch, in maximal coordinates. Between impacts a method of order 2 takes rolling, sliding and
-/// turning bodies for the price of the linearised Euler method, one problem a step, with errors smaller by orders. It
-/// damps nothing: what impacts excite in elements would rattle on.
+/// turning bodies for the price of the linearised Euler method, one problem a step, with errors smaller by orders. Of
+/// springs it damps the stiff ones alone, of elements none: what impacts excite there would rattle on.
 void choose_in_touch(SceneSystem& system, const std::string& reason) {
-    const std::string stiff =
-        has_elements(system) ? "elements vibrate" : why_stiff(system, {most_rate_of_order_2, most_rate_of_order_2});
-    if (stiff.empty()) system.integrator = "linearly_implicit_trapezoidal";
-    system.method_reason = reason + ", and " + (stiff.empty() ? "no force is stiff" : stiff);
+    const bool vibrates = has_elements(system);
+    if (!vibrates) system.integrator = "linearly_implicit_trapezoidal";
+    system.method_reason = reason + (vibrates ? ", and elements vibrate" : "");
 }
 
 /// For a system with contacts, stops or forces with limits.
@@ -224,8 +222,10 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         (touching ? "bodies with joints may touch, and "
                   : "nothing can touch, joints have stops, dry friction or forces with limits, and ") +
         (stiff.empty() ? "no force is stiff" : stiff);
-    if (!stiff.empty() && !flies) return;
-    if (chosen_steps || (!touching && stiff.empty())) {
+    // What beams vibrate with stays in a method of order 2. Of springs it damps the stiff ones alone.
+    if (!stiff.empty() && !flies && has_elements(system)) return;
+    const bool switches = flies ? touching || !stiff.empty() : touching && !chosen_steps && stiff.empty();
+    if (!switches) {
         system.integrator = "moreau_jean";
         return;
     }

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Springs that a step does not resolve, in plain scenes without options: they hold as joints do, and damp nothing but
+// what they vibrate with.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "support/scenes.hpp"
+
+namespace delassus::tests::stiff_springs_test {
+namespace {
+
+const std::string floor_and_ball =
+    "materials: {m: {friction: 0.5}}\nbodies:\n- {name: floor, fixed: true, shapes: [{plane: {}, material: m}]}\n";
+
+std::string ball(const std::string& name, const std::string& position, const std::string& more = "") {
+    return fmt::format(
+        "- {{name: {}, mass: 1.3, inertia: {{xx: 0.004, yy: 0.004, zz: 0.004}}, position: {}, shapes: [{{sphere: "
+        "{{radius: 0.1}}, material: m}}]{}}}\n",
+        name, position, more);
+}
+
+Running finished(const std::string& text) {
+    Running run(parse_scene(text, "test.yaml"));
+    run.finish();
+    return run;
+}
+
+// Two balls that a stiff spring lets vibrate damp a third one on a soft spring by nothing.
+TEST(StiffSprings, DampNothingElse) {
+    const double soft = 37.0, end = 4.7;
+    auto run =
+        finished(fmt::format("gravity: [0, 0, 0]\nstep: 0.006\nend: {}\n", end) + floor_and_ball +
+                 ball("a", "[0, 0, 1]", ", velocity: [0, 1, 0]") + ball("b", "[0, 1, 1]") + ball("c", "[5.4, 0, 1]") +
+                 fmt::format("springs:\n- {{name: stiff, first: a, second: b, stiffness: 3.0e+6}}\n"
+                             "- {{name: soft, second: c, first_point: [3, 0, 1], stiffness: {}, rest_length: "
+                             "2}}\n",
+                             soft));
+    EXPECT_EQ(run.scene.systems[0].integrator, "linearly_implicit_trapezoidal");
+    EXPECT_NEAR(run.pose("c").position[0], 5.0 + 0.4 * std::cos(std::sqrt(soft / 1.3) * end), 2e-3);
+    const auto a = run.velocities("a")[0], b = run.velocities("b")[0];
+    EXPECT_NEAR(a[1], 0.5, 1e-9) << "they have stopped vibrating";
+    EXPECT_NEAR(b[1], 0.5, 1e-9);
+    EXPECT_NEAR(run.pose("b").position[1] - run.pose("a").position[1], 1.0, 1e-9);
+}
+
+// A bob swings on a spring: whatever the stiffness, energy is kept; a very stiff one is a rod.
+TEST(StiffSprings, HoldAPendulum) {
+    for (const char* stiffness : {"1.0e+3", "2.0e+4", "3.0e+5", "1.0e+6", "1.0e+9"}) {
+        SCOPED_TRACE(stiffness);
+        const auto swing = [&](double step, const std::string& more) {
+            return finished(fmt::format("step: {}\nend: 2.9\n", step) + floor_and_ball + ball("bob", "[0.9, 0, 3]") +
+                            more);
+        };
+        const std::string spring =
+            fmt::format("springs: [{{name: rod, second: bob, first_point: [0, 0, 3.5], stiffness: {}}}]\n", stiffness);
+        auto run = swing(0.005, spring);
+        EXPECT_EQ(run.scene.systems[0].integrator, "linearly_implicit_trapezoidal");
+        const double start = run.system().energy(run.system().initial_state());
+        EXPECT_NEAR(run.system().energy(run.simulation.state()), start, 2e-3);
+        if (std::stod(stiffness) < 1e9) continue;
+        const auto exact =
+            swing(0.0005,
+                  "joints: [{name: rod, kind: distance, second: bob, point: [0, 0, 3.5], second_point: [0.9, 0, 3]}]\n")
+                .pose("bob");
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(run.pose("bob").position[i], exact.position[i], 1e-3) << i;
+    }
+}
+
+// What is thrown lands on both balls, turns and comes to rest.
+TEST(StiffSprings, ComeToRestOnAFloor) {
+    auto run = finished("step: 0.007\nend: 6\n" + floor_and_ball + ball("a", "[0, 0, 1]", ", velocity: [0.3, 1, 2]") +
+                        ball("b", "[0.7, 0, 1.3]", ", velocity: [0.3, -1, 2]") +
+                        "springs: [{name: rod, first: a, second: b, stiffness: 1.0e+6}]\n");
+    const auto a = run.pose("a").position, b = run.pose("b").position;
+    EXPECT_NEAR(a[2], 0.1, 1e-6);
+    EXPECT_NEAR(b[2], 0.1, 1e-6);
+    EXPECT_NEAR(std::hypot(b[0] - a[0], b[1] - a[1]), std::hypot(0.7, 0.3), 1e-4);
+}
+
+// A hinge with dry friction and a stiff spring, which a motor's target of a servo is: the arm that it carries is held.
+TEST(StiffSprings, HoldAJointWithFriction) {
+    const auto arm = [](double step) {
+        return finished(
+            fmt::format("step: {}\nend: 1.3\nbodies:\n"
+                        "- {{name: upper, mass: 2, inertia: {{xx: 0.01, yy: 0.03, zz: 0.03}}, position: [0.2, 0, 0]}}\n"
+                        "- {{name: lower, mass: 1, inertia: {{xx: 0.01, yy: 0.02, zz: 0.02}}, position: [0.6, 0, 0]}}\n"
+                        "joints:\n"
+                        "- {{name: shoulder, kind: revolute, second: upper, point: [0, 0, 0], axis: [0, 1, 0], "
+                        "friction: 0.4}}\n"
+                        "- {{name: elbow, kind: revolute, first: upper, second: lower, point: [0.4, 0, 0], axis: [0, "
+                        "1, 0], spring: {{stiffness: 3.0e+5}}}}\n",
+                        step));
+    };
+    auto run = arm(0.008);
+    EXPECT_EQ(run.scene.systems[0].integrator, "moreau_jean");
+    EXPECT_EQ(run.scene.systems[0].coordinates, Coordinates::Joint);
+    auto fine = arm(0.0005);
+    for (const char* body : {"upper", "lower"})
+        for (std::size_t i = 0; i < 3; ++i)
+            EXPECT_NEAR(run.pose(body).position[i], fine.pose(body).position[i], 2e-3) << body << i;
+}
+
+// Dry friction F turns round wherever the mass does: each swing is one about ±F/k (Den Hartog 1956, section 8.7).
+double with_dry_friction(double t, double mass, double stiffness, double force, double start) {
+    const double swing = std::acos(-1.0) / std::sqrt(stiffness / mass);
+    for (; stiffness * std::abs(start) > force; t -= swing) {
+        const double middle = std::copysign(force / stiffness, start);
+        if (t < swing) return middle + (start - middle) * std::cos(std::acos(-1.0) * t / swing);
+        start = 2.0 * middle - start;
+    }
+    return start;
+}
+
+TEST(JointFriction, TurnsRoundAtItsTimeInAStep) {
+    for (const bool bodies : {false, true}) {
+        double last = 0.0;
+        for (const double step : {0.02, 0.01, 0.005}) {
+            Running run(parse_scene(
+                fmt::format("step: {}\nend: 2.6\n{}bodies: [{{name: b, mass: 2, inertia: {{xx: 1, yy: 1, zz: 1}}, "
+                            "position: [0, 0, 0]}}]\njoints:\n- "
+                            "{{name: j, kind: prismatic, second: b, point: [0, 0, 0], axis: [1, 0, 0], friction: 3, "
+                            "spring: {{stiffness: 40}}, start: 1}}\n",
+                            step, bodies ? "integrator: linearly_implicit_trapezoidal\ncoordinates: maximal\n" : ""),
+                "test.yaml"));
+            double worst = 0.0;
+            while (!run.simulation.finished()) {
+                run.simulation.step();
+                const double t = run.simulation.state().t;
+                worst =
+                    std::max(worst, std::abs(run.pose("b").position[0] - with_dry_friction(t, 2.0, 40.0, 3.0, 1.0)));
+            }
+            EXPECT_LT(worst, 12.0 * step * step) << step;
+            if (last > 0.0) {
+                EXPECT_LT(worst, 0.35 * last) << step << ": of order 2";
+            }
+            last = worst;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace delassus::tests::stiff_springs_test
