@@ -52,7 +52,7 @@ public:
           flight_name_(values[0].text),
           limit_(values[1].real),
           contact_(system, ThetaSettings{.name = "switching",
-                                         .divides_by_error = true,
+                                         .holds_stiff = false,  // flights resolve what a step would leave in them
                                          .iterations = static_cast<int>(values[2].integer),
                                          .contacts = velocity_contact_settings(system, values[3], values[4]),
                                          .linearization_limit = values[5].real}),

@@ -19,8 +19,9 @@ struct Impact {
 };
 
 /// Nothing if the contact does not meet. gap ≥ 0, speed (negative: closing) and acceleration of the row at the
-/// beginning of the step of size h > 0; restitution in [0, 1].
+/// beginning of the step of size h > 0; restitution in [0, 1]; decay ≥ 0, 1/s: at what rate damping takes back a change
+/// of the row's speed.
 [[nodiscard]] DELASSUS_API std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration,
-                                                               double restitution);
+                                                               double restitution, double decay = 0.0);
 
 }  // namespace delassus

@@ -33,8 +33,12 @@ namespace delassus {
 //
 //     q⁺ ∘ exp((1 − θ) h v⁺),  v⁺,  t⁺ + (1 − θ) h
 //
+// What is stiff in a step of the longest h stays so in shorter ones: a step leaves C off by what the next one undoes,
+// which would be energy in a spring that is not stiff any more.
+//
 // For one body, k → ∞ makes C + h ((1 − θ) u + u⁺) = 0 with C⁺ = C + h ((1 − θ) u + θ u⁺): two steps lead from any C
-// and u to C = u = 0. H has h² k ∇C ∇Cᵀ and h c ∇C ∇Cᵀ of them in place of θ² h² k and θ h c.
+// and u to C = u = 0. From C = 0 the first one leaves C⁺ = (1 − θ)² h u, which only such a step may go on from. H has
+// h² k ∇C ∇Cᵀ and h c ∇C ∇Cᵀ of them in place of θ² h² k and θ h c.
 //
 // Gyroscopic torques: a body that spins by itself turns by a rule that keeps its energy and momentum
 // (DynamicalSystem::free_spins), and what the other motions of the step add to its torque is taken beside its impulse.
@@ -52,7 +56,7 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
     : system_(system),
       settings_(std::move(settings)),
       theta_(settings_.theta),
-      resolved_rate_(settings_.divides_by_error ? rate_that_errors_show : rate_of_faint_error),
+      resolved_rate_(rate_of_faint_error),
       contacts_(system, settings_.contacts),
       linearization_(system, settings_.linearization_limit),
       projection_(system),
@@ -72,6 +76,7 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
 void ThetaMethod::choose_steps(double /*tolerance*/) {
     chooses_steps_ = true;
     resolved_rate_ = rate_that_errors_show;
+    resolve_up_to(longest_h_);
 }
 
 /// act(first, size) for the velocities that are components of one vector, and for each other one.
@@ -99,7 +104,7 @@ void ThetaMethod::forces_jumped() {
 // h; the changes of the last steps, their errors, what the last solve left and what an impact changed; the multipliers.
 StepMemory ThetaMethod::memory() const {
     StepMemory memory;
-    memory.numbers = {last_h_};
+    memory.numbers = {last_h_, longest_h_};
     memory.of_columns.assign(changes_.begin(), changes_.end());
     for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
     memory.of_columns.push_back(left_);
@@ -113,6 +118,7 @@ StepMemory ThetaMethod::memory() const {
 void ThetaMethod::set_memory(StepMemory&& memory) {
     restart();
     last_h_ = memory.numbers.at(0);
+    resolve_up_to(std::max(longest_h_, memory.numbers.at(1)));
     for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] = std::move(memory.of_columns.at(k));
     error_.load(std::span(memory.of_columns).subspan(changes_.size(), error_.kept()));
     const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + error_.kept());
@@ -144,6 +150,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     } else {
         iterate(state, h, solver, report);
     }
+    contacts_.add_turned_impulses(solution_.lambda);
     contacts_.drop_negligible(problem_, solution_);
 
     result_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
@@ -253,6 +260,14 @@ void ThetaMethod::remember_change(const Vector& result, bool struck, double h) {
     }
 }
 
+/// What is stiff from now on, h being the longest step.
+void ThetaMethod::resolve_up_to(double h) {
+    longest_h_ = h;
+    stiff_.clear();
+    if (h > 0.0 && settings_.holds_stiff && system_.has_stiffness())
+        system_.find_stiff_forces(resolved_rate_ / h, stiff_);
+}
+
 /// H, D and the cones, which stay for the step.
 void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     problem_.name = "step";
@@ -264,8 +279,7 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     if (system_.has_stiffness()) {
         system_.add_damping(at_theta_, theta_ * h, Tangent::Symmetric, H_);
         system_.add_stiffness(at_theta_, theta_ * theta_ * h * h, Tangent::Symmetric, H_);
-        if (h != h_of_stiff_) system_.find_stiff_forces(resolved_rate_ / h, stiff_);
-        h_of_stiff_ = h;
+        if (h > longest_h_) resolve_up_to(h);
         if (!stiff_.empty())
             system_.add_stiff_tangent(at_theta_, stiff_, (1.0 - theta_ * theta_) * h * h, (1.0 - theta_) * h, H_);
     }
@@ -292,6 +306,7 @@ void ThetaMethod::linearize(const State& begin, double h) {
     problem_.a.assign(force_.begin(), force_.end());
     system_.multiply_mass(at_theta_, 1.0, back_.data(), problem_.a.data());
     problem_.H.multiply_add(1.0, guess_.data(), problem_.a.data());
+    contacts_.add_turned_impulses(problem_);
     if (m_ > 0) set_constraint_rows(begin, h);
 }
 
@@ -447,13 +462,20 @@ void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
     contacts_.let_slide_on(problem);
     Solution solution = solution_;
     ++report.newton_iterations;
-    if (report.take(solver.solve(std::move(problem), solution, request_))) contacts_.time_turns(problem_, solution.x);
+    if (report.take(solver.solve(std::move(problem), solution, request_)))
+        contacts_.time_turns(problem_, solution.x, 0.0, {});
 }
 
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
-    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
+    const SparseMatrix* damping = nullptr;
+    if (system_.has_stiffness() && contacts_.may_bounce()) {
+        R_.begin(n_, n_);
+        system_.add_damping(at_theta_, 1.0, Tangent::Symmetric, R_);
+        damping = &R_.finish();
+    }
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, damping);
     timed_ = true;
 }
 
@@ -473,7 +495,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     };
     if (contacts_.any()) {
         time_meetings(begin, h, solver, report);
-        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)});
+        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_, unsure_);
     }
     linearize_at_guess();
     if (!found()) return;

@@ -26,9 +26,9 @@ struct ThetaSettings {
     /// Linearly implicit: one problem a step about an extrapolated guess, and constraints and gaps corrected by its
     /// rows. Otherwise Newton's method, and positions are projected afterwards.
     bool linearly_implicit = false;
-    bool divides_by_error = false;  ///< whoever takes the steps divides them until their error is small
-    int iterations = 2;             ///< of Newton's method, at least
-    double tolerance = 1e-10;       ///< no further iteration where right-hand sides change by less than this share
+    bool holds_stiff = true;   ///< stiff springs are taken as joints
+    int iterations = 2;        ///< of Newton's method, at least
+    double tolerance = 1e-10;  ///< no further iteration where right-hand sides change by less than this share
     VelocityContactSettings contacts;
     double linearization_limit = 0.1;
 };
@@ -58,6 +58,7 @@ private:
     void for_each_vector(const Act& act) const;
     void move_late(double h);
     void remember_change(const Vector& result, bool struck, double h);
+    void resolve_up_to(double h);
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
     void set_constraint_rows(const State& begin, double h);
@@ -94,12 +95,12 @@ private:
     std::vector<double> unsure_;  ///< 1: of the velocity the last step says no acceleration; n, or empty
     std::vector<double> left_;    ///< by the last solve, in the norm of the masses, n, or empty
     bool chooses_steps_ = false;  ///< steps are chosen by their error
-    MatrixAssembler H_, D_;
+    MatrixAssembler H_, D_, R_;
     Problem problem_;
     Solution solution_;
     State at_theta_, end_, beyond_;
-    std::vector<std::int32_t> stiff_;  ///< forces that the step does not resolve
-    double h_of_stiff_ = 0.0;
+    std::vector<std::int32_t> stiff_;  ///< forces that the longest step does not resolve
+    double longest_h_ = 0.0;
     std::vector<double> tensions_, tensions_at_theta_;
     std::vector<FreeSpin> spins_, theta_spins_;
     UntouchedSpins untouched_;

@@ -96,7 +96,13 @@ namespace delassus {
 //     P ∈ τ F₋ + (h − τ) [F₋, F₊],      τ = h u⁻/(u⁻ − ũ)
 //
 // with the speed ũ that the row would have at the end under F₋ alone; likewise for u⁻ < 0. Bounds of h [F₋, F₊] would
-// change the speed at the end by τ (F₊ − F₋)/m at every turn, which makes the method one of order 1.
+// change the speed at the end by τ (F₊ − F₋)/m at every turn, which makes the method one of order 1. Where the row then
+// slides the other way under F₊, |u⁻ − ũ| is more than h (F₊ − F₋)/m. With less it rests from τ on, as it does by the
+// bounds h [F₋, F₊]: these stay.
+//
+// Friction in a contact that turns round against its sliding velocity u_t⁻ likewise (`once`, which knows ũ): until τ it
+// is −μ (τ/h) P_n u_t⁻/|u_t⁻|, with the P_n of the step before, unless an impact has changed that, a known impulse;
+// what is left has the cone of μ (1 − τ/h).
 //
 // ---- Friction ----
 //

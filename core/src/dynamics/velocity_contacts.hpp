@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -61,16 +62,23 @@ public:
     [[nodiscard]] bool may_strike() const;
     /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
     void take_out_open(Problem& problem) const;
+    /// After append_to(): whether something with restitution closes, or may.
+    [[nodiscard]] bool may_bounce() const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
-    /// the velocities at the end of the step without impacts, n.
-    void time_meetings(Problem& problem, std::span<const double> smooth);
+    /// the velocities at the end of the step without impacts, n. damping: R, n × n; null: none.
+    void time_meetings(Problem& problem, std::span<const double> smooth, const SparseMatrix* damping);
     /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
     [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
     void let_slide_on(Problem& problem) const;
     /// What turns round within the step gets the bounds of that time. sliding: the velocities at the end of the step if
-    /// it slid on, n.
-    void time_turns(Problem& problem, std::span<const double> sliding) const;
+    /// it slid on, n; last_h: the size of the step before; struck: not 0 of velocities that an impact changed in it, n
+    /// or empty.
+    void time_turns(Problem& problem, std::span<const double> sliding, double last_h, std::span<const double> struck);
+    /// problem.a += Dᵀ of what friction did until it turned round.
+    void add_turned_impulses(Problem& problem) const;
+    /// lambda of the whole problem += the same.
+    void add_turned_impulses(std::vector<double>& lambda) const;
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// solution: of the last iteration; natural_error: of the solves so far.
     void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
@@ -158,8 +166,9 @@ private:
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool strikes = false;                        ///< b is that of an impact
         std::optional<Impact> impact;                ///< it strikes at a time within the step
-        double struck = HUGE_VAL;  ///< when an impact first strikes one of the bodies of an open contact
-        double last = 0.0;         ///< its impulse in the step before, where it pushed
+        double struck = HUGE_VAL;        ///< when an impact first strikes one of the bodies of an open contact
+        double last = 0.0;               ///< its impulse in the step before, where it pushed
+        std::array<double, 2> turned{};  ///< of friction, until it turned round
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -174,11 +183,17 @@ private:
     };
 
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
+    /// Of rows in rows_ and before_, with the rates of these times, m/s or rad/s.
+    [[nodiscard]] double speed_at_begin(std::size_t row, std::size_t before) const;
+    [[nodiscard]] double speed_at_end(const Problem& problem, std::size_t row, std::size_t before,
+                                      const double* v) const;
     /// The speed at the beginning of the step of a force between bounds that may turn round; 0 of all else.
     [[nodiscard]] double sliding_speed(std::size_t block) const;
     [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);
+    /// At what rate damping takes back what the impulse of a row of the problem changes its speed by, 1/s.
+    [[nodiscard]] double decay(const Problem& problem, std::int32_t row, const SparseMatrix& damping) const;
     /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
     /// that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);

@@ -44,6 +44,24 @@ bool VelocityContacts::may_strike() const {
     return false;
 }
 
+bool VelocityContacts::may_bounce() const {
+    return std::ranges::any_of(rows_.blocks(), [](const auto& block) { return block.restitution > 0.0; });
+}
+
+// An impulse P of a row d changes the velocities by y P, y = H⁻¹ dᵀ (H by its diagonal), and its speed by d y P.
+// Damping takes −R y P a second of the momentum, which is −yᵀ R y P of that speed.
+double VelocityContacts::decay(const Problem& problem, std::int32_t row, const SparseMatrix& damping) const {
+    std::vector<double> change(diagonal_.size(), 0.0), braked(diagonal_.size(), 0.0);
+    double mobility = 0.0, rate = 0.0;
+    for_each_entry(problem.D, static_cast<std::size_t>(row), 1, [&](std::size_t, std::size_t column, double value) {
+        change[column] = value / diagonal_[column];
+        mobility += value * change[column];
+    });
+    damping.multiply_add(1.0, change.data(), braked.data());
+    for (std::size_t i = 0; i < change.size(); ++i) rate += change[i] * braked[i];
+    return mobility > 0.0 ? std::max(rate / mobility, 0.0) : 0.0;
+}
+
 void VelocityContacts::take_out_open(Problem& problem) const {
     std::size_t row = first_row_, to = first_row_, cone = bilateral_cones_;
     const auto move = [&](SparseMatrix& matrix) {
@@ -117,7 +135,7 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate,
 // whose means are those of times θ h/2 apart; the speed at the beginning is that with the rate of this instant. The row
 // of the meeting, which stays, meets at the same time from another gap.
-void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth) {
+void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth, const SparseMatrix* damping) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
@@ -143,7 +161,11 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             continue;
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
-            return impact_within(h_, from, begin, acceleration() + turning, block.restitution);
+            auto impact = impact_within(h_, from, begin, acceleration() + turning, block.restitution);
+            if (impact && bounces && damping != nullptr)
+                impact = impact_within(h_, from, begin, acceleration() + turning, block.restitution,
+                                       decay(problem, row, *damping));
+            return impact;
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
@@ -333,13 +355,26 @@ void note_impact(const UnilateralRows::Block& block, double gap, double approach
     report.impact_time = approach < 0.0 ? h : gap / speed;
 }
 
+// Rates are means about h/2 and (1 + θ) h/2.
+double VelocityContacts::speed_at_begin(std::size_t row, std::size_t before) const {
+    const double rate = before_.rows()[before].rate, change = rows_.rows()[row].rate - rate;
+    return before_.speed(before, begin_speeds_) - change / theta_;
+}
+
+double VelocityContacts::speed_at_end(const Problem& problem, std::size_t row, std::size_t before,
+                                      const double* v) const {
+    const double rate = rows_.rows()[row].rate, change = rate - before_.rows()[before].rate;
+    return problem.D.row_times(static_cast<std::int32_t>(first_row_ + row), v) + rate +
+           (1.0 - theta_) / theta_ * change;
+}
+
 double VelocityContacts::sliding_speed(std::size_t block) const {
     const Contact& contact = contacts_[block];
     const UnilateralRows::Block& own = rows_.blocks()[block];
     const bool bounded = own.cone.kind == ConeKind::Box && own.cone.rows == 1 && std::isfinite(own.cone.lo[0]) &&
                          std::isfinite(own.cone.hi[0]);
     if (!bounded || contact.servo || !contact.known) return 0.0;
-    return before_.speed(contact.before, begin_speeds_);
+    return speed_at_begin(contact.row, contact.before);
 }
 
 bool VelocityContacts::any_turns_round(const Problem& problem, const Solution& solution) const {
@@ -366,18 +401,64 @@ void VelocityContacts::let_slide_on(Problem& problem) const {
     }
 }
 
-void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding) const {
+void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding, double last_h,
+                                  std::span<const double> struck) {
+    const auto slides_back = [&](std::size_t row, double change, double both) {
+        return change > both * coupling(problem.D, diagonal_, first_row_ + row, first_row_ + row);
+    };
+    const auto was_struck = [&](const Contact& contact) {
+        bool found = false;
+        for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) {
+            found = found || (!struck.empty() && struck[column] != 0.0);
+        });
+        return found;
+    };
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const double before = sliding_speed(k);
-        if (before == 0.0) continue;
-        const std::size_t row = contacts_[k].row;
-        const double after =
-            problem.D.row_times(static_cast<std::int32_t>(first_row_ + row), sliding.data()) + rows_.rows()[row].rate;
-        if (!(before * after < 0.0)) continue;
-        const double share = before / (before - after);  // τ/h
+        Contact& contact = contacts_[k];
         Cone& cone = problem.cones[bilateral_cones_ + k];
-        (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
+        const auto end_speed = [&](std::size_t i) {
+            return speed_at_end(problem, contact.row + i, contact.before + i, sliding.data());
+        };
+        if (const double before = sliding_speed(k); before != 0.0) {
+            const double after = end_speed(0);
+            if (!(before * after < 0.0) || !slides_back(contact.row, std::abs(before - after), cone.hi[0] - cone.lo[0]))
+                continue;
+            const double share = before / (before - after);  // τ/h
+            (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
+            continue;
+        }
+        const bool stays = contact.pushed && contact.known && !contact.impact && last_h > 0.0;
+        if (cone.kind != ConeKind::Friction || !stays || was_struck(contact)) continue;
+        const auto axes = static_cast<std::size_t>(cone.rows) - 1;
+        std::array<double, 2> before{};
+        double squares = 0.0, along = 0.0;
+        for (std::size_t i = 0; i < axes; ++i) {
+            before[i] = speed_at_begin(contact.row + 1 + i, contact.before + 1 + i);
+            squares += before[i] * before[i];
+            along += before[i] * end_speed(1 + i);
+        }
+        const double size = std::sqrt(squares), force = cone.parameters[0] * contact.last * h_ / last_h;
+        if (!(along < 0.0) || !slides_back(contact.row + 1, size - along / size, 2.0 * force)) continue;
+        const double share = squares / (squares - along), mu = cone.parameters[0];
+        for (std::size_t i = 0; i < axes; ++i) contact.turned[i] = -share * force * before[i] / size;
+        cone.parameters[0] = (1.0 - share) * mu;
     }
+}
+
+void VelocityContacts::add_turned_impulses(Problem& problem) const {
+    for (const Contact& contact : contacts_)
+        for (std::size_t i = 0; i < contact.turned.size(); ++i)
+            if (contact.turned[i] != 0.0)
+                for_each_entry(problem.D, first_row_ + contact.row + 1 + i, 1,
+                               [&](std::size_t, std::size_t column, double value) {
+                                   problem.a[column] += value * contact.turned[i];
+                               });
+}
+
+void VelocityContacts::add_turned_impulses(std::vector<double>& lambda) const {
+    for (const Contact& contact : contacts_)
+        for (std::size_t i = 0; i < contact.turned.size(); ++i)
+            if (contact.turned[i] != 0.0) lambda[first_row_ + contact.row + 1 + i] += contact.turned[i];
 }
 
 }  // namespace delassus

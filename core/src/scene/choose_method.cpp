@@ -190,9 +190,10 @@ std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
     return fmt::format("forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
 }
 
-/// For bodies that may touch, in maximal coordinates. Between impacts a method of order 2 takes rolling, sliding and
-/// turning bodies for the price of the linearised Euler method, one problem a step, with errors smaller by orders. Of
-/// springs it damps the stiff ones alone, of elements none: what impacts excite there would rattle on.
+/// For bodies that may touch, stops and dry friction in maximal coordinates. Between impacts a method of order 2 takes
+/// rolling, sliding and turning bodies for the price of the linearised Euler method, one problem a step, with errors
+/// smaller by orders. Of springs it damps the stiff ones alone, of elements none: what impacts excite there would
+/// rattle on.
 void choose_in_touch(SceneSystem& system, const std::string& reason) {
     const bool vibrates = has_elements(system);
     if (!vibrates) system.integrator = "linearly_implicit_trapezoidal";
@@ -208,7 +209,9 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
     }
     const bool chosen_steps = system.control || system.steps_by_accuracy;
     if (!in_joints || (system.control && !touching)) {
-        system.method_reason = "joints have stops, dry friction or forces with limits";
+        const std::string reason = "joints have stops, dry friction or forces with limits";
+        system.method_reason = reason;
+        if (!system.control) choose_in_touch(system, reason);
         return;
     }
     const bool flies = !chosen_steps && !always_acts(system);
