@@ -83,5 +83,23 @@ TEST(TurnOfFriction, OnAShakingTableAddsUpToNoDrift) {
         }
 }
 
+// What rides on a turntable does not slide: its sliding velocity is rounding, whose direction says nothing.
+TEST(TurnOfFriction, IsNoneWhereNothingSlides) {
+    for (const double step : {1.0 / 60.0, 1.0 / 240.0}) {
+        Running run(parse_scene(
+            fmt::format(
+                "step: {:.17g}\nend: 4\nmaterials: {{m: {{friction: 0.5}}}}\nbodies:\n"
+                "- {{name: table, position: [0, 0, -0.05], motion: {{rotation: {{axis: [0, 0, 1], angle: "
+                "{{linear: {{rate: 2}}}}}}}}, shapes: [{{cylinder: {{radius: 2, length: 0.1}}, material: m}}]}}\n"
+                "- {{name: b, mass: 3, position: [1, 0, 0.15], velocity: [0, 2, 0], angular_velocity: [0, 0, "
+                "2], shapes: [{{box: {{size: [0.3, 0.3, 0.3]}}, material: m}}]}}\n",
+                step),
+            "test.yaml"));
+        run.finish();
+        const auto& at = run.pose("b").position;
+        EXPECT_NEAR(std::hypot(at[0], at[1]), 1.0, 1e-3) << step;
+    }
+}
+
 }  // namespace
 }  // namespace delassus::tests::friction_turns_test

@@ -74,37 +74,6 @@ TEST(ImpactMotion, BallsPartAlongTheLineOfTheirCentresAtTheMeeting) {
     EXPECT_LT(off[1], 1.5e-4 * way);
 }
 
-// A ball that bounces in what brakes it, v̇ = −g − r v: whatever an impact changes is braked from then on.
-TEST(ImpactMotion, WhatIsBrakedBouncesToTheRightHeight) {
-    const double e = 0.9, g = 9.81, r = 2.3, mass = 1.7, drop = 0.8, radius = 0.1, end = 1.9;
-    const auto speed = [&](double v, double t) { return (v + g / r) * std::exp(-r * t) - g / r; };
-    const auto height = [&](double z, double v, double t) {
-        return z + (v + g / r) * (1.0 - std::exp(-r * t)) / r - g * t / r;
-    };
-    double z = drop, v = 0.0, left = end;
-    while (true) {
-        double low = 1e-9, high = 1.0;  // the next meeting is between these
-        for (int i = 0; i < 100; ++i) (height(z, v, 0.5 * (low + high)) > 0.0 ? low : high) = 0.5 * (low + high);
-        if (low > left) break;
-        v = -e * speed(v, low);
-        z = 0.0;
-        left -= low;
-    }
-    std::array<double, 2> off{};
-    for (std::size_t k = 0; k < 2; ++k) {
-        auto run = run_of(fmt::format(
-            "step: {}\nend: {}\nmaterials: {{m: {{restitution: {}}}}}\nbodies:\n"
-            "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
-            "- {{name: ball, mass: {}, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}, material: m}}]}}\n"
-            "bushings: [{{name: air, second: ball, point: [0, 0, {}], damping: [{}, {}, {}]}}]\n",
-            k == 0 ? 0.01 : 0.005, end, e, mass, drop + radius, radius, drop + radius, r * mass, r * mass, r * mass));
-        run.finish();
-        off[k] = std::abs(run.pose("ball").position[2] - radius - height(z, v, left));
-    }
-    EXPECT_LT(off[0], 1e-3 * drop);
-    EXPECT_LT(off[1], 3e-4 * drop);
-}
-
 // A plate that swings meets a falling ball with the speed of that moment.
 TEST(ImpactMotion, AShakenPlateGivesItsSpeedOfTheMeeting) {
     const double e = 0.6, g = 9.81, amplitude = 0.08, rate = 2.0 * std::acos(-1.0) * 1.5, drop = 0.4, radius = 0.1;

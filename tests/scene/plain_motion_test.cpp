@@ -387,7 +387,8 @@ TEST(PlainMotion, WhatFliesPastAnEdgeGoesOnStraight) {
     for (const char* shape : {"sphere: {radius: 0.1}", "box: {size: [0.2, 0.2, 0.3]}",
                               "capsule: {radius: 0.1, length: 0.2}", "cylinder: {radius: 0.1, length: 0.3}"})
         for (const double gap : {1e-3, 1e-4})
-            for (const auto& [speed, step] : {std::pair(2.0, 0.01), std::pair(7.3, 0.0013), std::pair(0.9, 0.0071)}) {
+            for (const auto& [speed, step] : {std::pair(2.0, 0.01), std::pair(7.3, 0.0013), std::pair(0.9, 0.0071),
+                                              std::pair(20.0, 1.0 / 60.0), std::pair(53.0, 1.0 / 240.0)}) {
                 SCOPED_TRACE(fmt::format("{}, {} m, {} m/s, {} s", shape, gap, speed, step));
                 auto run = run_of(fmt::format(
                     "gravity: [0, 0, 0]\nstep: {}\nend: {}\nmaterials: {{m: {{friction: 0.3}}}}\nbodies:\n"
@@ -402,6 +403,25 @@ TEST(PlainMotion, WhatFliesPastAnEdgeGoesOnStraight) {
                 EXPECT_NEAR(std::hypot(v[1], v[2]), 0.0, 1e-9);
                 EXPECT_NEAR(std::hypot(omega[0], omega[1], omega[2]), 0.0, 1e-9);
             }
+}
+
+// Two bodies that pass each other within a step, faster than they are long.
+TEST(PlainMotion, WhatPassesAnotherOneGoesOnStraight) {
+    for (const char* shape : {"sphere: {radius: 0.1}", "box: {size: [0.2, 0.2, 0.2]}",
+                              "cylinder: {radius: 0.1, length: 0.2}", "capsule: {radius: 0.1, length: 0.2}"})
+        for (const double ahead : {1.0, 1.07, 1.29}) {
+            SCOPED_TRACE(fmt::format("{}, {} m", shape, ahead));
+            auto run = run_of(fmt::format(
+                "gravity: [0, 0, 0]\nstep: {:.17g}\nend: 0.25\nbodies:\n"
+                "- {{name: a, mass: 1, position: [{}, 0, 0.1005], velocity: [10, 0, 0], shapes: [{{{}, orientation: "
+                "{{axis: [0, 1, 0], angle: 90}}}}]}}\n"
+                "- {{name: b, mass: 1, position: [{}, 0, -0.1005], velocity: [-10, 0, 0], shapes: [{{{}, orientation: "
+                "{{axis: [0, 1, 0], angle: 90}}}}]}}\n",
+                1.0 / 60.0, -ahead, shape, ahead, shape));
+            run.finish();
+            EXPECT_NEAR(run.velocities("a")[0][0], 10.0, 1e-9);
+            EXPECT_NEAR(run.velocities("b")[0][0], -10.0, 1e-9);
+        }
 }
 
 // What meets the edge is held off all the same.

@@ -82,12 +82,11 @@ void SweptPair::collide(NarrowPhase& by, Placed& a, Placed& b, const Sweep& of_a
     const double bound = approach_bound(of_a, of_b), limit = near_limit(a, b);
     found_.clear();
     by.collide(a, b, bound <= envelope ? envelope : std::clamp(limit, envelope, bound), found_);
-    if (bound <= envelope || near(a, b, of_a, of_b, envelope)) {
-        keep_what_meets(by, a, b, of_a, of_b, envelope);
-    } else {
+    if (bound > envelope && !near(a, b, of_a, of_b, envelope)) {
         found_.clear();
         if (bound > limit) far(by, a, b, of_a, of_b, envelope, envelope);
     }
+    keep_what_meets(by, a, b, of_a, of_b, envelope);
     contacts.insert(contacts.end(), found_.begin(), found_.end());
 }
 
@@ -99,7 +98,7 @@ bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const 
 
 void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                                 double envelope) {
-    constexpr double touching = 1e-6, share = 1e-3, same_cosine = 0.9999;
+    constexpr double touching = 1e-6, share = 1e-3;
     const auto nearest = nearest_of(found_);
     const double reach = a.solid->reach > 0.0 && b.solid->reach > 0.0 ? std::min(a.solid->reach, b.solid->reach)
                                                                       : std::max(a.solid->reach, b.solid->reach);
@@ -107,11 +106,12 @@ void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& 
     if (std::none_of(found_.begin(), found_.end(),
                      [&](const ContactPoint& contact) { return closing(a, b, of_a, of_b, contact) > contact.gap; }))
         return;
-    const double gap = nearest->gap;
+    const double gap = std::min(nearest->gap, envelope);
     const Vector3d normal = vector(nearest->normal);
+    const double same_cosine = nearest->on_the_way ? -1.0 : 0.9999;
     begin_.swap(found_);
     far(by, a, b, of_a, of_b, envelope, share * gap);
-    if (!found_.empty() && vector(nearest_of(found_)->normal).dot(normal) > same_cosine) found_.swap(begin_);
+    if (!found_.empty() && vector(nearest_of(found_)->normal).dot(normal) >= same_cosine) found_.swap(begin_);
 }
 
 void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,

@@ -19,10 +19,11 @@
 //           n of two of their points: p are those of the cores, about the origins of their bodies, whose translations
 //           are d; and c = |θ_a|² r_a + |θ_b|² r_b bounds how s grows. So what turns past a surface takes few advances.
 //           The points of that place are carried back to the beginning with their bodies, and their gap is n·(p_b −
-//           p_a) there. So shapes that pass each other get no contact, as they would with the normal of the beginning.
-// Of the points of a pair where it is, or near, one may be closer than its bodies move towards it at first, as the
-// bound has it, while none touches yet. Then the shapes are advanced in the same way, to a thousandth of their
-// distance: those that pass get no contact, and where the normal has turned till then those of that place count.
+//           p_a) there.
+// Points of a pair where it is, or near, may be closer than its bodies move towards them at first, as the bound has it,
+// while none touches yet; and what comes into the envelope on the way may pass. Then the shapes are advanced in the
+// same way, to a thousandth of their gap or of the envelope: those that pass get no contact, and where the normal of
+// the beginning has turned till then those of that place count.
 #pragma once
 
 #include <vector>

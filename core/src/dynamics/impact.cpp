@@ -15,17 +15,12 @@ namespace delassus {
 // the last whole flight is t, and then u⁺ = eᵏ w + a t and g⁺ = eᵏ w t + ½ a t². All flights together take F/(1 − e):
 // if that is over within the step, the contact is at rest, u⁺ = g⁺ = 0.
 //
-// The acceleration is that of a motion without impacts, in which damping acts on other speeds. What an impact changes
-// the speed by, Δ = w + s after the first meeting, it takes back at the rate r: after the last whole flight for the
-// time t, u⁺ lacks Δ r t/(1 + r t), and g⁺ half of that times t.
-//
 // One impulse with the same effect changes the speed by u⁺ − u − a h, and acts at the time that leads to the same g⁺:
 //
 //     g + u h + ½ a h² + (h − τ*) (u⁺ − u − a h) = g⁺
 //
 // (τ* = τ for a single bounce; with e = 0 and a < 0 what then presses the bodies together is in it).
-std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration, double restitution,
-                                    double decay) {
+std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration, double restitution) {
     const double square = speed * speed - 2.0 * acceleration * gap;
     if (!(square > 0.0)) return std::nullopt;
     Impact impact;
@@ -56,9 +51,8 @@ std::optional<Impact> impact_within(double h, double gap, double speed, double a
             }
         }
     }
-    const double taken_back = (leaves + impact.closing) * decay * left / (1.0 + decay * left);
-    impact.end_speed = leaves + acceleration * left - taken_back;
-    const double end_gap = (leaves + 0.5 * (acceleration * left - taken_back)) * left;
+    impact.end_speed = leaves + acceleration * left;
+    const double end_gap = (leaves + 0.5 * acceleration * left) * left;
     impact.change = impact.end_speed - speed - acceleration * h;
     const double alone = gap + (speed + 0.5 * acceleration * h) * h;
     impact.acts = impact.change > 0.0 ? h - (end_gap - alone) / impact.change : impact.meets;

@@ -19,9 +19,8 @@ struct Impact {
 };
 
 /// Nothing if the contact does not meet. gap ≥ 0, speed (negative: closing) and acceleration of the row at the
-/// beginning of the step of size h > 0; restitution in [0, 1]; decay ≥ 0, 1/s: at what rate damping takes back a change
-/// of the row's speed.
+/// beginning of the step of size h > 0; restitution in [0, 1].
 [[nodiscard]] DELASSUS_API std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration,
-                                                               double restitution, double decay = 0.0);
+                                                               double restitution);
 
 }  // namespace delassus

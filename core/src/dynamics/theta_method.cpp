@@ -469,13 +469,7 @@ void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
-    const SparseMatrix* damping = nullptr;
-    if (system_.has_stiffness() && contacts_.may_bounce()) {
-        R_.begin(n_, n_);
-        system_.add_damping(at_theta_, 1.0, Tangent::Symmetric, R_);
-        damping = &R_.finish();
-    }
-    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, damping);
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
     timed_ = true;
 }
 

@@ -95,7 +95,7 @@ private:
     std::vector<double> unsure_;  ///< 1: of the velocity the last step says no acceleration; n, or empty
     std::vector<double> left_;    ///< by the last solve, in the norm of the masses, n, or empty
     bool chooses_steps_ = false;  ///< steps are chosen by their error
-    MatrixAssembler H_, D_, R_;
+    MatrixAssembler H_, D_;
     Problem problem_;
     Solution solution_;
     State at_theta_, end_, beyond_;

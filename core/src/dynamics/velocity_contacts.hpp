@@ -62,11 +62,9 @@ public:
     [[nodiscard]] bool may_strike() const;
     /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
     void take_out_open(Problem& problem) const;
-    /// After append_to(): whether something with restitution closes, or may.
-    [[nodiscard]] bool may_bounce() const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
-    /// the velocities at the end of the step without impacts, n. damping: R, n × n; null: none.
-    void time_meetings(Problem& problem, std::span<const double> smooth, const SparseMatrix* damping);
+    /// the velocities at the end of the step without impacts, n.
+    void time_meetings(Problem& problem, std::span<const double> smooth);
     /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
     [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
@@ -192,8 +190,6 @@ private:
     [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);
-    /// At what rate damping takes back what the impulse of a row of the problem changes its speed by, 1/s.
-    [[nodiscard]] double decay(const Problem& problem, std::int32_t row, const SparseMatrix& damping) const;
     /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
     /// that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);

@@ -44,24 +44,6 @@ bool VelocityContacts::may_strike() const {
     return false;
 }
 
-bool VelocityContacts::may_bounce() const {
-    return std::ranges::any_of(rows_.blocks(), [](const auto& block) { return block.restitution > 0.0; });
-}
-
-// An impulse P of a row d changes the velocities by y P, y = H⁻¹ dᵀ (H by its diagonal), and its speed by d y P.
-// Damping takes −R y P a second of the momentum, which is −yᵀ R y P of that speed.
-double VelocityContacts::decay(const Problem& problem, std::int32_t row, const SparseMatrix& damping) const {
-    std::vector<double> change(diagonal_.size(), 0.0), braked(diagonal_.size(), 0.0);
-    double mobility = 0.0, rate = 0.0;
-    for_each_entry(problem.D, static_cast<std::size_t>(row), 1, [&](std::size_t, std::size_t column, double value) {
-        change[column] = value / diagonal_[column];
-        mobility += value * change[column];
-    });
-    damping.multiply_add(1.0, change.data(), braked.data());
-    for (std::size_t i = 0; i < change.size(); ++i) rate += change[i] * braked[i];
-    return mobility > 0.0 ? std::max(rate / mobility, 0.0) : 0.0;
-}
-
 void VelocityContacts::take_out_open(Problem& problem) const {
     std::size_t row = first_row_, to = first_row_, cone = bilateral_cones_;
     const auto move = [&](SparseMatrix& matrix) {
@@ -135,7 +117,7 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate,
 // whose means are those of times θ h/2 apart; the speed at the beginning is that with the rate of this instant. The row
 // of the meeting, which stays, meets at the same time from another gap.
-void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth, const SparseMatrix* damping) {
+void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
@@ -161,11 +143,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             continue;
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
-            auto impact = impact_within(h_, from, begin, acceleration() + turning, block.restitution);
-            if (impact && bounces && damping != nullptr)
-                impact = impact_within(h_, from, begin, acceleration() + turning, block.restitution,
-                                       decay(problem, row, *damping));
-            return impact;
+            return impact_within(h_, from, begin, acceleration() + turning, block.restitution);
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
