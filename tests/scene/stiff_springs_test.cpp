@@ -12,7 +12,7 @@
 namespace delassus::tests::stiff_springs_test {
 namespace {
 
-const std::string floor_and_ball =
+const std::string floor_plane =
     "materials: {m: {friction: 0.5}}\nbodies:\n- {name: floor, fixed: true, shapes: [{plane: {}, material: m}]}\n";
 
 std::string ball(const std::string& name, const std::string& position, const std::string& more = "") {
@@ -32,7 +32,7 @@ Running finished(const std::string& text) {
 TEST(StiffSprings, DampNothingElse) {
     const double soft = 37.0, end = 4.7;
     auto run =
-        finished(fmt::format("gravity: [0, 0, 0]\nstep: 0.006\nend: {}\n", end) + floor_and_ball +
+        finished(fmt::format("gravity: [0, 0, 0]\nstep: 0.006\nend: {}\n", end) + floor_plane +
                  ball("a", "[0, 0, 1]", ", velocity: [0, 1, 0]") + ball("b", "[0, 1, 1]") + ball("c", "[5.4, 0, 1]") +
                  fmt::format("springs:\n- {{name: stiff, first: a, second: b, stiffness: 3.0e+6}}\n"
                              "- {{name: soft, second: c, first_point: [3, 0, 1], stiffness: {}, rest_length: "
@@ -51,7 +51,7 @@ TEST(StiffSprings, HoldAPendulum) {
     for (const char* stiffness : {"1.0e+3", "2.0e+4", "3.0e+5", "1.0e+6", "1.0e+9"}) {
         SCOPED_TRACE(stiffness);
         const auto swing = [&](double step, const std::string& more) {
-            return finished(fmt::format("step: {}\nend: 2.9\n", step) + floor_and_ball + ball("bob", "[0.9, 0, 3]") +
+            return finished(fmt::format("step: {}\nend: 2.9\n", step) + floor_plane + ball("bob", "[0.9, 0, 3]") +
                             more);
         };
         const std::string spring =
@@ -71,7 +71,7 @@ TEST(StiffSprings, HoldAPendulum) {
 
 // What is thrown lands on both balls, turns and comes to rest.
 TEST(StiffSprings, ComeToRestOnAFloor) {
-    auto run = finished("step: 0.007\nend: 6\n" + floor_and_ball + ball("a", "[0, 0, 1]", ", velocity: [0.3, 1, 2]") +
+    auto run = finished("step: 0.007\nend: 6\n" + floor_plane + ball("a", "[0, 0, 1]", ", velocity: [0.3, 1, 2]") +
                         ball("b", "[0.7, 0, 1.3]", ", velocity: [0.3, -1, 2]") +
                         "springs: [{name: rod, first: a, second: b, stiffness: 1.0e+6}]\n");
     const auto a = run.pose("a").position, b = run.pose("b").position;

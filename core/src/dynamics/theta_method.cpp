@@ -47,7 +47,7 @@ namespace {
 
 /// h ω up to which the trapezoidal rule has a faint error of the fastest motion.
 constexpr double rate_of_faint_error = 2.0;
-/// The same where steps are divided until their error is small: what is faster is not what is asked for.
+/// The same where steps are divided until their error is small; they resolve no faster vibrations.
 constexpr double rate_that_errors_show = 100.0;
 
 }  // namespace
@@ -118,7 +118,7 @@ StepMemory ThetaMethod::memory() const {
 void ThetaMethod::set_memory(StepMemory&& memory) {
     restart();
     last_h_ = memory.numbers.at(0);
-    resolve_up_to(std::max(longest_h_, memory.numbers.at(1)));
+    if (memory.numbers.at(1) > longest_h_) resolve_up_to(memory.numbers.at(1));
     for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] = std::move(memory.of_columns.at(k));
     error_.load(std::span(memory.of_columns).subspan(changes_.size(), error_.kept()));
     const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + error_.kept());

@@ -406,7 +406,7 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             continue;
         }
         const bool stays = contact.pushed && contact.known && !contact.impact && last_h > 0.0;
-        if (cone.kind != ConeKind::Friction || !stays || was_struck(contact)) continue;
+        if (cone.kind != ConeKind::Friction || !stays) continue;
         const auto axes = static_cast<std::size_t>(cone.rows) - 1;
         std::array<double, 2> before{};
         double squares = 0.0, along = 0.0;
@@ -415,11 +415,12 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             squares += before[i] * before[i];
             along += before[i] * end_speed(1 + i);
         }
+        if (!(along < 0.0) || was_struck(contact)) continue;
         const double size = std::sqrt(squares), force = cone.parameters[0] * contact.last * h_ / last_h;
-        if (!(along < 0.0) || !slides_back(contact.row + 1, size - along / size, 2.0 * force)) continue;
-        const double share = squares / (squares - along), mu = cone.parameters[0];
+        if (!slides_back(contact.row + 1, size - along / size, 2.0 * force)) continue;
+        const double share = squares / (squares - along);  // τ/h
         for (std::size_t i = 0; i < axes; ++i) contact.turned[i] = -share * force * before[i] / size;
-        cone.parameters[0] = (1.0 - share) * mu;
+        cone.parameters[0] *= 1.0 - share;
     }
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // M, f, K and R of a multibody system.
+#include <numeric>
+
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
@@ -84,6 +86,17 @@ void scatter(const RowColumns& columns, const RowVector& gradient, double factor
     for (int k = 0; k < columns.bodies; ++k)
         if (const auto column = columns.column[static_cast<std::size_t>(k)]; column >= 0)
             Eigen::Map<Eigen::Matrix<double, 6, 1>>(result + column) += factor * gradient.segment<6>(6 * k);
+}
+
+/// act(spring, its columns) for the springs of these numbers, with its gradient in self.gradient; after place().
+template <class Implementation, class Act>
+void for_each_spring(const Implementation& self, std::span<const std::int32_t> numbers, const Act& act) {
+    for (const std::int32_t number : numbers) {
+        const auto& spring = self.springs[static_cast<std::size_t>(number)];
+        const RowColumns columns = spring.row.columns(self.at, true);
+        spring.row.gradient(self.at, columns, self.gradient);
+        act(spring, columns);
+    }
 }
 
 // In the frames of the bodies the torques are −c (ω̄_s − P ω̄_f) on the second and −c (ω̄_f − Pᵀ ω̄_s) on the first, with
@@ -359,10 +372,10 @@ void MultibodySystem::find_stiff_forces(double rate, std::vector<std::int32_t>& 
     stiff.clear();
     if (self.springs.empty()) return;
     self.place(initial_state());
-    for (std::size_t i = 0; i < self.springs.size(); ++i) {
-        const auto& spring = self.springs[i];
-        const auto columns = spring.row.columns(self.at);
-        spring.row.gradient(self.at, columns, self.gradient);
+    std::vector<std::int32_t> all(self.springs.size());
+    std::iota(all.begin(), all.end(), 0);
+    std::int32_t number = 0;
+    for_each_spring(self, all, [&](const auto& spring, const RowColumns& columns) {
         double weight = 0.0;  // 1/m
         for (int k = 0; k < columns.bodies; ++k) {
             if (columns.column[static_cast<std::size_t>(k)] < 0) continue;
@@ -371,9 +384,9 @@ void MultibodySystem::find_stiff_forces(double rate, std::vector<std::int32_t>& 
             if (!push.isZero(0.0)) weight += push.squaredNorm() / body.metric_mass;
             if (!turn.isZero(0.0)) weight += turn.dot(body.metric_inertia.ldlt().solve(turn));
         }
-        if (mechanics::is_stiff(spring.stiffness * weight, spring.damping * weight, rate))
-            stiff.push_back(static_cast<std::int32_t>(i));
-    }
+        if (mechanics::is_stiff(spring.stiffness * weight, spring.damping * weight, rate)) stiff.push_back(number);
+        ++number;
+    });
 }
 
 std::array<double, 2> MultibodySystem::stiff_force_constants(std::int32_t number) const {
@@ -386,37 +399,29 @@ void MultibodySystem::stiff_tensions(const State& state, std::span<const std::in
     const auto& self = *implementation_;
     self.place(state);
     tensions.clear();
-    for (const std::int32_t i : stiff) {
-        const auto& spring = self.springs[static_cast<std::size_t>(i)];
-        const auto columns = spring.row.columns(self.at, true);
-        spring.row.gradient(self.at, columns, self.gradient);
+    for_each_spring(self, stiff, [&](const auto& spring, const RowColumns& columns) {
         tensions.push_back(tension(spring, columns, self.gradient, self.at, state.t));
-    }
+    });
 }
 
 void MultibodySystem::add_stiff_forces(const State& state, std::span<const std::int32_t> stiff,
                                        std::span<const double> tensions, double factor, double* result) const {
     const auto& self = *implementation_;
     self.place(state);
-    for (std::size_t i = 0; i < stiff.size(); ++i) {
-        const auto& spring = self.springs[static_cast<std::size_t>(stiff[i])];
-        const auto columns = spring.row.columns(self.at);
-        spring.row.gradient(self.at, columns, self.gradient);
-        scatter(columns, self.gradient, -factor * tensions[i], result);
-    }
+    auto next = tensions.begin();
+    for_each_spring(self, stiff, [&](const auto&, const RowColumns& columns) {
+        scatter(columns, self.gradient, -factor * *next++, result);
+    });
 }
 
 void MultibodySystem::add_stiff_tangent(const State& state, std::span<const std::int32_t> stiff, double of_stiffness,
                                         double of_damping, MatrixAssembler& H) const {
     const auto& self = *implementation_;
     self.place(state);
-    for (const std::int32_t i : stiff) {
-        const auto& spring = self.springs[static_cast<std::size_t>(i)];
-        const auto columns = spring.row.columns(self.at);
-        spring.row.gradient(self.at, columns, self.gradient);
+    for_each_spring(self, stiff, [&](const auto& spring, const RowColumns& columns) {
         const RowMatrix outer = self.gradient * self.gradient.transpose();
         add_local(columns, outer, of_stiffness * spring.stiffness + of_damping * spring.damping, Tangent::Symmetric, H);
-    }
+    });
 }
 
 }  // namespace delassus

@@ -209,9 +209,8 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
     }
     const bool chosen_steps = system.control || system.steps_by_accuracy;
     if (!in_joints || (system.control && !touching)) {
-        const std::string reason = "joints have stops, dry friction or forces with limits";
-        system.method_reason = reason;
-        if (!system.control) choose_in_touch(system, reason);
+        system.method_reason = "joints have stops, dry friction or forces with limits";
+        if (!system.control) choose_in_touch(system, system.method_reason);
         return;
     }
     const bool flies = !chosen_steps && !always_acts(system);
