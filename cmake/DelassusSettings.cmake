@@ -23,6 +23,8 @@ if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # In a batch of files none is the main one, whose types in unnamed namespaces g++ would let pass as members.
   target_compile_options(delassus_settings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
 endif()
+# Sources are named from the project's folder on (__FILE__), so that clones share compiled files.
+target_compile_options(delassus_settings INTERFACE "-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=")
 if(DELASSUS_WERROR)
   target_compile_options(delassus_settings INTERFACE -Werror)
 endif()

@@ -89,7 +89,11 @@ public:
         const auto append = [&](const std::vector<double>& values) {
             memory.insert(memory.end(), values.begin(), values.end());
         };
-        if (control_) append(control_->save());
+        if (control_) {
+            const std::vector<double> control = control_->save();
+            memory.push_back(static_cast<double>(control.size()));
+            append(control);
+        }
         const std::vector<double> flight = flight_->save();
         memory.push_back(static_cast<double>(flight.size()));
         append(flight);
@@ -112,7 +116,7 @@ public:
         if (const double longest = take(1)[0]; longest > 0.0) longest_ = longest;
         if (const double step = take(1)[0]; step > 0.0) {
             control(step);
-            control_->load(take(3));
+            control_->load(take(take(1)[0]));
         }
         flight_->load(take(take(1)[0]));
         const std::vector<double> keys = take(2.0 * take(1)[0]);
@@ -326,7 +330,8 @@ private:
                                                                       .initial = h,
                                                                       .smallest = smallest * h,
                                                                       .largest = largest * h,
-                                                                      .finds_impacts = false});
+                                                                      .finds_impacts = false,
+                                                                      .of_way = true});
         }
         return *control_;
     }

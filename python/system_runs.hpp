@@ -50,8 +50,10 @@ public:
         if (set_.control) {
             control_ = std::make_unique<AdaptiveStepping>(system_, *timestepper_, *set_.control);
         } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
+            StepControl control = control_within(limit, set_.step);
+            control.of_way = true;
             control_ = std::make_unique<AdaptiveStepping>(
-                system_, *timestepper_, control_within(limit, set_.step),
+                system_, *timestepper_, control,
                 fmt::format("{} cannot follow the motion there; take an implicit method, or euler_implicit_linearized, "
                             "which is less exact and may go on",
                             set_.integrator));

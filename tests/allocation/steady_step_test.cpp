@@ -7,6 +7,7 @@
 
 #include "delassus/multibody.hpp"
 #include "delassus/timestepper.hpp"
+#include "support/places.hpp"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define DELASSUS_COUNTS 0  // the sanitizer has a malloc of its own
@@ -57,7 +58,7 @@ long steady_allocations(MultibodySystem& system, const std::string& method, bool
     system.finish();
     const Registry registry;
     SolverConfig config;
-    config.name = DELASSUS_QUIET_PLUGIN;
+    config.name = std::string(tests::places::plugins) + "/quiet.so";
     config.law = Law::Associated;
     config.tolerance = 1e-8;
     StepSolver solver(registry, config);

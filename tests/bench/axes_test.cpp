@@ -12,6 +12,7 @@
 #include "bench/suite.hpp"
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test::axes_test {
 namespace {
@@ -21,7 +22,7 @@ using bench::Json;
 class Axes : public BenchTest {
 protected:
     [[nodiscard]] bench::Suite read(const std::string& text) const {
-        return bench::read_suite(suite(text), Registry({fs::path(DELASSUS_TEST_PLUGINS)}));
+        return bench::read_suite(suite(text), Registry({fs::path(tests::places::plugins)}));
     }
     void write_falling_body() const {
         std::ofstream(folder / "fall.yaml") << "step: 0.01\nend: 0.1\n"
@@ -263,7 +264,7 @@ TEST_F(Axes, ASmallSuiteRunsFromEndToEnd) {
 
     // What was done is not done again, and --only keeps one axis.
     const auto again = bench({"run", file.string(), "-o", (folder / "out").string(), "--only", "fall", "--plugin-path",
-                              DELASSUS_TEST_PLUGINS});
+                              tests::places::plugins});
     ASSERT_EQ(again.exit_code, 0) << again.errors;
     EXPECT_NE(again.errors.find("4 runs were done before"), std::string::npos) << again.errors;
     set = bench::read_results(folder / "out");

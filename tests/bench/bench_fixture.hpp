@@ -15,6 +15,7 @@
 #include "bench/measurement.hpp"
 #include "delassus/problem_files.hpp"
 #include "process/child_process.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test {
 
@@ -53,7 +54,9 @@ protected:
     /// The file that appears when the misbehaving solver is some iterations into its slow or hanging behaviour.
     [[nodiscard]] fs::path at_work() const { return folder / "at_work"; }
 
-    [[nodiscard]] bench::WorkerSettings worker() const { return {DELASSUS_COMMAND, {DELASSUS_TEST_PLUGINS}, 0, {}}; }
+    [[nodiscard]] bench::WorkerSettings worker() const {
+        return {tests::places::command, {tests::places::plugins}, 0, {}};
+    }
 
     [[nodiscard]] bench::Measurement measure(const std::string& behaviour, double time_limit = 20.0,
                                              const std::string& problem = "stops") const {
@@ -68,8 +71,8 @@ protected:
     /// Runs `delassus compare` on arguments, with the test's plugins and output folder.
     [[nodiscard]] ChildResult compare(std::vector<std::string> arguments) const {
         ChildSettings child;
-        child.program = DELASSUS_COMMAND;
-        child.arguments = {"compare", "--plugin-path", DELASSUS_TEST_PLUGINS, "-o", (folder / "out").string()};
+        child.program = tests::places::command;
+        child.arguments = {"compare", "--plugin-path", tests::places::plugins, "-o", (folder / "out").string()};
         child.arguments.insert(child.arguments.end(), arguments.begin(), arguments.end());
         child.timeout = 120.0;
         return run_child(child);
@@ -84,7 +87,7 @@ protected:
     /// Runs `delassus bench` on arguments, with references in the test's own folder.
     [[nodiscard]] ChildResult bench(std::vector<std::string> arguments) const {
         ChildSettings child;
-        child.program = DELASSUS_COMMAND;
+        child.program = tests::places::command;
         child.arguments = {"bench"};
         child.arguments.insert(child.arguments.end(), arguments.begin(), arguments.end());
         child.environment = {{"XDG_CACHE_HOME", (folder / "cache").string()}};
@@ -92,7 +95,7 @@ protected:
         return run_child(child);
     }
     [[nodiscard]] ChildResult run_suite(const fs::path& file, const std::string& output = "out") const {
-        return bench({"run", file.string(), "-o", (folder / output).string(), "--plugin-path", DELASSUS_TEST_PLUGINS});
+        return bench({"run", file.string(), "-o", (folder / output).string(), "--plugin-path", tests::places::plugins});
     }
 
     fs::path folder;

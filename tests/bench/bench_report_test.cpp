@@ -6,6 +6,7 @@
 #include "bench_fixture.hpp"
 #include "support/browser.hpp"
 #include "support/html_page.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test::bench_report_test {
 namespace {
@@ -17,7 +18,7 @@ protected:
         if (!fs::exists(page_parts() / "echarts.min.js"))
             GTEST_SKIP() << "built without the chart library, so no page is written";
         std::ofstream(folder / "pendulum.yaml")
-            << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/pendulum.yaml");
+            << content_of(fs::path(tests::places::source) / "examples/scenes/pendulum.yaml");
         const auto run = run_suite(suite(
             "title: <img src=x onerror=alert(1)>\n"
             "problems: [stops, {generate: sphere_pile, set: {contacts: [10, 30, 90]}}]\n"

@@ -12,6 +12,7 @@
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test::bench_run_test {
 namespace {
@@ -141,7 +142,7 @@ TEST_F(BenchRun, WhatFailedIsNotRunToATighterTolerance) {
 TEST_F(BenchRun, LeavingOutIsMeasured) {
     for (const char* scene : {"pendulum", "bouncing_ball"})
         std::ofstream(folder / (std::string(scene) + ".yaml"))
-            << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes" / (std::string(scene) + ".yaml"));
+            << content_of(fs::path(tests::places::source) / "examples/scenes" / (std::string(scene) + ".yaml"));
     const auto run =
         run_suite(suite("leaving_out:\n"
                         "  - {path: pendulum.yaml, end: 0.2}\n"
@@ -241,12 +242,12 @@ TEST_F(BenchRun, AnInterruptedRunGoesOn) {
 
 TEST_F(BenchRun, CtrlCEndsItWithWhatThereIs) {
     ChildSettings child;
-    child.program = DELASSUS_COMMAND;
+    child.program = tests::places::command;
     const auto file = suite(
         "problems: [stops]\nsolvers: [misbehaving, misbehaving(behaviour=slow)]\ntolerances: [1e-6]\ntime_limit: "
         "60\nrepeats: 1\n");
     child.arguments = {
-        "bench", "run", file.string(), "-o", (folder / "out").string(), "--plugin-path", DELASSUS_TEST_PLUGINS};
+        "bench", "run", file.string(), "-o", (folder / "out").string(), "--plugin-path", tests::places::plugins};
     child.timeout = 60.0;
     child.cancel_grace = 30.0;
     child.cancelled = [&] { return fs::exists(at_work()); };
@@ -288,7 +289,7 @@ TEST_F(BenchRun, ReferencesAreConfirmedAndCached) {
 
 TEST_F(BenchRun, TimesteppersConvergeAtTheirOrder) {
     std::ofstream(folder / "pendulum.yaml")
-        << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/pendulum.yaml");
+        << content_of(fs::path(tests::places::source) / "examples/scenes/pendulum.yaml");
     const auto run =
         run_suite(suite("scenes: [{path: pendulum.yaml, end: 0.5, steps: [0.02, 0.01, 0.005]}]\n"
                         "timesteppers: [euler_implicit_linearized, generalized_alpha, euler_explicit]\n"
@@ -311,7 +312,7 @@ TEST_F(BenchRun, TimesteppersConvergeAtTheirOrder) {
 
 TEST_F(BenchRun, StepsOfScenesAreProblems) {
     std::ofstream(folder / "incline.yaml")
-        << content_of(fs::path(DELASSUS_SOURCE_DIR) / "examples/scenes/box_on_incline.yaml");
+        << content_of(fs::path(tests::places::source) / "examples/scenes/box_on_incline.yaml");
     const auto run = run_suite(
         suite("problems: [{scene: incline.yaml, end: 0.01, every: 5}]\nsolvers: [pgs]\ntolerances: [1e-3]\nrepeats: 1\n"
               "references: none\n"));

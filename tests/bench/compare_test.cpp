@@ -8,6 +8,7 @@
 #include "bench/compare.hpp"
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test::compare_test {
 namespace {
@@ -117,11 +118,11 @@ TEST_F(BenchTest, BadInputIsRefusedBeforeAnythingRuns) {
 
 TEST_F(BenchTest, AnInterruptLeavesTableAndFiles) {
     ChildSettings child;
-    child.program = DELASSUS_COMMAND;
+    child.program = tests::places::command;
     child.arguments = {"compare",
                        (folder / "stops").string(),
                        "--plugin-path",
-                       DELASSUS_TEST_PLUGINS,
+                       tests::places::plugins,
                        "-o",
                        (folder / "out").string(),
                        "--solvers",

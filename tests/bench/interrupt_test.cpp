@@ -3,6 +3,7 @@
 #include <csignal>
 
 #include "bench_fixture.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::bench_test::interrupt_test {
@@ -14,9 +15,10 @@ protected:
     /// once the solver is at work ($! is the command's process). A command that ended before does not keep the test
     /// waiting.
     [[nodiscard]] tests::CommandResult solve_then(const std::string& arguments, const std::string& lines) const {
-        return tests::run_shell(DELASSUS_COMMAND " solve " + (folder / "stops").string() + " --solver " +
-                                DELASSUS_TEST_PLUGINS "/misbehaving.so " + arguments + " & until [ -e " +
-                                at_work().string() + " ] || ! kill -0 $!; do sleep 0.02; done; " + lines + "; wait $!");
+        return tests::run_shell(std::string(tests::places::command) + " solve " + (folder / "stops").string() +
+                                " --solver " + std::string(tests::places::plugins) + "/misbehaving.so " + arguments +
+                                " & until [ -e " + at_work().string() + " ] || ! kill -0 $!; do sleep 0.02; done; " +
+                                lines + "; wait $!");
     }
 };
 

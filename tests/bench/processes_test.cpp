@@ -12,6 +12,7 @@
 #include "bench/results_file.hpp"
 #include "bench_fixture.hpp"
 #include "delassus/registry.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test::processes_test {
 namespace {
@@ -123,7 +124,7 @@ TEST_F(ProcessesSuite, RunsPilesOnOneAndTwoProcesses) {
 TEST_F(ProcessesSuite, TakesFilesAndFolders) {
     if (const auto reason = missing(); !reason.empty()) GTEST_SKIP() << reason;
     ChildSettings convert;
-    convert.program = DELASSUS_COMMAND;
+    convert.program = tests::places::command;
     convert.arguments = {"generate", "pile", (folder / "pile.h5").string(), "--set", "contacts=200"};
     convert.timeout = 60.0;
     if (run_child(convert).exit_code != 0) GTEST_SKIP() << "no HDF5 in this build";
@@ -150,7 +151,7 @@ TEST_F(ProcessesSuite, RefusesBeforeAnythingRuns) {
     EXPECT_NE(sentence.find("there is no mpirun in PATH"), std::string::npos) << sentence;
 }
 
-#ifdef DELASSUS_PARTS_PLUGINS
+#ifdef DELASSUS_HAS_MPI
 // Process 1 waits for ever. All of the run is killed soon after its time, though mpirun puts its processes elsewhere.
 TEST_F(ProcessesSuite, ATimeOutEndsAllProcesses) {
     if (const auto reason = missing(); !reason.empty()) GTEST_SKIP() << reason;
@@ -158,7 +159,7 @@ TEST_F(ProcessesSuite, ATimeOutEndsAllProcesses) {
         "problems:\n  - {generate: box_stack}\nsolvers: ['parts_gradient(fault=wait)']\nprocesses: [2]\n"
         "tolerances: [1e-9]\ntime_limit: 4\nrepeats: 1\nreferences: none\n");
     const auto run =
-        bench({"run", file.string(), "-o", (folder / "out").string(), "--plugin-path", DELASSUS_PARTS_PLUGINS});
+        bench({"run", file.string(), "-o", (folder / "out").string(), "--plugin-path", tests::places::parts_plugins});
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const auto set = bench::read_results(folder / "out");
     ASSERT_EQ(set.solves.size(), 1U);

@@ -8,6 +8,7 @@
 
 #include "bench_fixture.hpp"
 #include "delassus/error.hpp"
+#include "support/places.hpp"
 
 namespace delassus::bench_test::suite_test {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 class SuiteTest : public BenchTest {
 protected:
     [[nodiscard]] bench::Suite read(const std::string& text) const {
-        return bench::read_suite(suite(text), Registry({fs::path(DELASSUS_TEST_PLUGINS)}));
+        return bench::read_suite(suite(text), Registry({fs::path(tests::places::plugins)}));
     }
 };
 

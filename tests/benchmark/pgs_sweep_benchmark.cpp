@@ -18,6 +18,7 @@
 #include "delassus/sdk/residual.hpp"
 #include "delassus/thread_team.hpp"
 #include "plugins/pgs/model.hpp"
+#include "support/places.hpp"
 
 namespace {
 
@@ -64,7 +65,7 @@ void time_sweeps(benchmark::State& state, delassus::Problem problem, const Way& 
 
 std::filesystem::path shared_problems() {
     const char* chosen = std::getenv("DELASSUS_SHARED_PROBLEMS");
-    return chosen != nullptr ? chosen : DELASSUS_SHARED_PROBLEMS_DEFAULT;
+    return chosen != nullptr ? chosen : delassus::tests::places::shared_problems;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <string>
 #include <vector>
+#include "support/places.hpp"
 
 extern char** environ;
 
@@ -38,7 +39,8 @@ void start_up(benchmark::State& state, const std::string& solver) {
     std::vector<double> empty, command;
     for (auto _ : state) {
         empty.push_back(seconds_of({"/bin/true"}));
-        command.push_back(seconds_of({DELASSUS_COMMAND, "solve", DELASSUS_SOURCE_DIR "/examples/problems/glued_pile",
+        command.push_back(seconds_of({delassus::tests::places::command, "solve",
+                                      std::string(delassus::tests::places::source) + "/examples/problems/glued_pile",
                                       "--solver", solver, "--max-iterations", "1", "--json"}));
         state.SetIterationTime(command.back());
     }

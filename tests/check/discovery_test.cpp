@@ -8,6 +8,7 @@
 #include "delassus/error.hpp"
 #include "delassus/registry.hpp"
 #include "helpers.hpp"
+#include "support/places.hpp"
 
 namespace delassus::discovery_test {
 namespace {
@@ -167,7 +168,7 @@ TEST(Discovery, SaysWhyAPluginThatIsNamedWasRejected) {
         std::ofstream(config) << "solver: " << name << "\nplugin_path: [" << path.string() << "]\n";
         std::ofstream(scene) << "step: 0.01\nend: 0.1\nsolver: " << name
                              << "\nbodies: [{name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1}}]\n";
-        const std::string problem = std::string(DELASSUS_SOURCE_DIR) + "/examples/problems/chain";
+        const std::string problem = std::string(tests::places::source) + "/examples/problems/chain";
         for (const std::vector<std::string>& arguments :
              {std::vector<std::string>{"solve", problem, "--solver", name, "--plugin-path", path},
               {"solve", problem, "--config", config},
@@ -201,7 +202,7 @@ TEST(Discovery, ShowsWhatWasBuiltWithoutOptimisation) {
               std::string::npos);
 
     // By name, by path without a sidecar, and as a stage of another solver.
-    const std::string problem = std::string(DELASSUS_SOURCE_DIR) + "/examples/problems/box_stack";
+    const std::string problem = std::string(tests::places::source) + "/examples/problems/box_stack";
     for (const std::string& solver : {std::string("unoptimized"), fixture("unoptimized").string(),
                                       std::string("apgd(finish=unoptimized,finish_at=1e-2)")}) {
         const auto out = folder.path() / "out";

@@ -16,12 +16,13 @@
 #include <vector>
 
 #include "check/known_problems.hpp"
+#include "support/places.hpp"
 
 namespace delassus::test {
 
 /// The shared library of tests/check/plugins/<name>.
 inline std::filesystem::path fixture(const std::string& name) {
-    return std::filesystem::path(DELASSUS_TEST_PLUGINS) / (name + ".so");
+    return std::filesystem::path(tests::places::plugins) / (name + ".so");
 }
 
 /// A new folder, removed with all its content at the end.
@@ -72,7 +73,7 @@ inline CommandResult run_command(const std::vector<std::string>& arguments,
     std::string line;
     if (!working_directory.empty()) line.append("cd ").append(quoted(working_directory.string())).append(" && ");
     for (const auto& [key, value] : environment) line.append(key).append("=").append(quoted(value)).append(" ");
-    line += quoted(DELASSUS_COMMAND);
+    line += quoted(tests::places::command);
     for (const auto& argument : arguments) line.append(" ").append(quoted(argument));
     line.append(" >").append(quoted((folder.path() / "out").string()));
     line.append(" 2>").append(quoted((folder.path() / "err").string()));

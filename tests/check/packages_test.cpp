@@ -9,6 +9,7 @@
 #include "delassus/plugin_info.hpp"
 #include "helpers.hpp"
 #include "support/library_location.hpp"
+#include "support/places.hpp"
 
 namespace delassus::packages_test {
 namespace {
@@ -70,7 +71,7 @@ protected:
 
     test::TemporaryFolder scratch_;
     std::map<std::string, std::string> environment_;
-    const std::string problem_ = std::string(DELASSUS_SOURCE_DIR) + "/examples/problems/box_stack";
+    const std::string problem_ = std::string(tests::places::source) + "/examples/problems/box_stack";
 };
 
 TEST_F(Packages, AreInstalledListedUsedAndRemoved) {

@@ -11,6 +11,7 @@
 
 #include "delassus/problem_files.hpp"
 #include "helpers.hpp"
+#include "support/places.hpp"
 
 namespace delassus::watch_test {
 namespace {
@@ -145,7 +146,7 @@ TEST_F(Watch, TwoInterruptsEndWhatIsDeaf) {
     ASSERT_GE(command, 0);
     if (command == 0) {
         setenv("DELASSUS_TEST_DEED", "solve deaf", 1);
-        execl(DELASSUS_COMMAND, "delassus", "solve", problem().c_str(), "--solver", fixture("misbehaves").c_str(),
+        execl(tests::places::command, "delassus", "solve", problem().c_str(), "--solver", fixture("misbehaves").c_str(),
               static_cast<char*>(nullptr));
         _exit(127);
     }

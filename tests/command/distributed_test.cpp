@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "delassus/problem_files.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::distributed_test {
@@ -25,7 +26,7 @@ TEST_P(DistributedCommand, GivesTheSerialAnswer) {
     ASSERT_EQ(serial.exit_code, 0) << serial.err;
     const auto both =
         run_shell("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
-                  std::string(DELASSUS_COMMAND) + line + (folder / "both").string());
+                  std::string(tests::places::command) + line + (folder / "both").string());
     ASSERT_EQ(both.exit_code, 0) << both.err;
     EXPECT_EQ(nlohmann::json::parse(both.out)["status"], "solved") << "one report, by the first process";
 
@@ -47,7 +48,7 @@ TEST_P(DistributedCommand, AloneNeedsNoSessionFolder) {
     const ScratchFolder folder;
     const std::string problem = (folder / "chain").string(), temporary = (folder / "tmp").string();
     ASSERT_EQ(run_command("generate chain " + problem + " --set bodies=5").exit_code, 0);
-    const std::string line = std::string(DELASSUS_COMMAND) + " solve " + problem + " --solver " + solver;
+    const std::string line = std::string(tests::places::command) + " solve " + problem + " --solver " + solver;
     const auto nowhere = run_shell("TMPDIR=/dev/null/none " + line);
     EXPECT_EQ(nowhere.exit_code, 0) << nowhere.err;
     std::filesystem::create_directory(temporary);
@@ -63,7 +64,7 @@ TEST_P(DistributedCommand, ManyStartAtOnce) {
     const std::string problem = (folder / "chain").string();
     ASSERT_EQ(run_command("generate chain " + problem + " --set bodies=5").exit_code, 0);
     const auto all =
-        run_shell("for round in 1 2 3 4 5; do for process in 1 2 3 4 5 6; do " + std::string(DELASSUS_COMMAND) +
+        run_shell("for round in 1 2 3 4 5; do for process in 1 2 3 4 5 6; do " + std::string(tests::places::command) +
                   " solve " + problem + " --solver " + solver + " >/dev/null || echo failed & done; wait; done");
     EXPECT_EQ(all.out, "") << all.err;
 }

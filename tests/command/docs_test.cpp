@@ -2,6 +2,7 @@
 // The generated parts of the documentation are what the plugins say now.
 #include <gtest/gtest.h>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::docs_test {
@@ -14,8 +15,8 @@ TEST(Docs, TablesAreUpToDate) {
     const auto listed = run_command("plugins list --json");
     if (listed.out.find("\"not_built\": []") == std::string::npos)
         GTEST_SKIP() << "the tables show all solvers; this build leaves some out";
-    const auto result = run_shell(std::string("DELASSUS_COMMAND=") + DELASSUS_COMMAND + " " + DELASSUS_SOURCE_DIR +
-                                  "/scripts/update-docs --check");
+    const auto result = run_shell(std::string("DELASSUS_COMMAND=") + tests::places::command + " " +
+                                  tests::places::source + "/scripts/update-docs --check");
     EXPECT_EQ(result.exit_code, 0) << "run scripts/update-docs\n" << result.out << result.err;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::documents_test {
@@ -87,7 +88,7 @@ protected:
 
     [[nodiscard]] std::string in_folder(const std::string& line) const {
         return "cd " + (scratch_ / "here").string() +
-               " && PATH=" + std::filesystem::path(DELASSUS_COMMAND).parent_path().string() + ":$PATH " + line;
+               " && PATH=" + std::filesystem::path(tests::places::command).parent_path().string() + ":$PATH " + line;
     }
 
     /// What bash offers for the last word of the line; one that ends with a space has an empty last word.
@@ -112,7 +113,7 @@ protected:
     [[nodiscard]] Words zsh(const std::string& line) const {
         const ScratchFolder own;
         const auto result =
-            run_shell(in_folder("zsh -f " DELASSUS_SOURCE_DIR "/tests/command/zsh-offers.zsh " +
+            run_shell(in_folder(std::string("zsh -f ") + tests::places::source + "/tests/command/zsh-offers.zsh " +
                                 (scratch_ / "zsh").string() + " " + own.path().string() + " 'delassus " + line + "'"));
         EXPECT_EQ(result.exit_code, 0) << line << "\n" << result.out << result.err;
         return words_of(result.out);
@@ -212,7 +213,7 @@ TEST(Documents, TheManualHasEveryOptionOfEveryCommand) {
 }
 
 TEST(Documents, APackageCanSayTheDayOfTheManual) {
-    const auto result = run_shell("SOURCE_DATE_EPOCH=86400 " DELASSUS_COMMAND " documents man");
+    const auto result = run_shell(std::string("SOURCE_DATE_EPOCH=86400 ") + tests::places::command + " documents man");
     EXPECT_EQ(result.out.rfind(".TH DELASSUS 1 \"1970-01-02\"", 0), 0U) << result.out.substr(0, 80);
 }
 

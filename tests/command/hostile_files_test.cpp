@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::hostile_files_test {
@@ -22,7 +23,7 @@ void write(const fs::path& file, const std::string& text) {
 
 /// The command, which has a minute.
 tests::CommandResult command(const std::string& arguments) {
-    return run_shell("timeout -s KILL 60 " + std::string(DELASSUS_COMMAND) + " " + arguments + " </dev/null");
+    return run_shell("timeout -s KILL 60 " + std::string(tests::places::command) + " " + arguments + " </dev/null");
 }
 
 constexpr const char* description =
@@ -146,8 +147,8 @@ TEST_F(HostileFiles, LittleMemoryIsASentence) {
     for (const char* solver : {"mumps", "siconos", "ipm", "cholmod", "auto"})
         for (const int mebibytes : {80, 120, 160, 200, 300, 400}) {
             const auto result =
-                run_shell("ulimit -v " + std::to_string(1024 * mebibytes) + "; timeout -s KILL 60 " + DELASSUS_COMMAND +
-                          " solve " + (folder_ / "problem").string() + " --solver " + solver);
+                run_shell("ulimit -v " + std::to_string(1024 * mebibytes) + "; timeout -s KILL 60 " +
+                          tests::places::command + " solve " + (folder_ / "problem").string() + " --solver " + solver);
             EXPECT_TRUE(result.exit_code >= 0 && result.exit_code <= 4)
                 << solver << ", " << mebibytes << " MiB: " << result.exit_code << result.err;
             EXPECT_TRUE(result.exit_code == 0 || !(result.err + result.out).empty()) << solver << ", " << mebibytes;

@@ -2,6 +2,7 @@
 // What a run does not need is not mapped into its process.
 #include <gtest/gtest.h>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::leave_out_test {
@@ -30,7 +31,7 @@ TEST(LeaveOut, FclibFilesAloneMapHdf5) {
 }
 
 std::string scene(const std::string& name) {
-    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / (name + ".yaml")).string();
+    return (std::filesystem::path(tests::places::source) / "examples" / "scenes" / (name + ".yaml")).string();
 }
 
 TEST(LeaveOut, ConvexShapesAloneMapQhull) {

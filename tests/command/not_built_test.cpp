@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::not_built_test {
@@ -13,13 +14,13 @@ namespace fs = std::filesystem;
 
 /// The command with a libdelassus of its own, beside which not-built.list has the text.
 std::string command_with(const ScratchFolder& scratch, const std::string& text) {
-    const auto listed =
-        run_shell("ldd " DELASSUS_COMMAND " | sed -n 's/.* => \\(.*libdelassus[.]so[^ ]*\\) .*/\\1/p' | tr -d '\\n'");
+    const auto listed = run_shell(std::string("ldd ") + tests::places::command +
+                                  " | sed -n 's/.* => \\(.*libdelassus[.]so[^ ]*\\) .*/\\1/p' | tr -d '\\n'");
     const fs::path library = listed.out;
     fs::create_directories(scratch / "delassus/plugins");
     fs::copy_file(library, scratch / library.filename().string());
     std::ofstream(scratch / "delassus/plugins/not-built.list") << text;
-    return "LD_LIBRARY_PATH=" + scratch.path().string() + " " + DELASSUS_COMMAND + " ";
+    return "LD_LIBRARY_PATH=" + scratch.path().string() + " " + tests::places::command + " ";
 }
 
 TEST(NotBuilt, IsListedWhole) {

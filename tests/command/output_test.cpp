@@ -13,6 +13,7 @@
 
 #include "simulation/step_columns.hpp"
 #include "support/html_page.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
@@ -27,7 +28,7 @@ std::string scene(const std::string& name) {
 }
 
 std::string example(const std::string& name) {
-    return std::string(DELASSUS_SOURCE_DIR) + "/examples/problems/" + name;
+    return std::string(tests::places::source) + "/examples/problems/" + name;
 }
 
 std::map<std::string, std::string> snapshot(const fs::path& folder) {
@@ -66,8 +67,8 @@ TEST(ClosedDescriptors, ReachNoFile) {
                   "  - {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n"
                   "  - {name: b, mass: 1, position: [0, 0, 0.101], shapes: [{sphere: {radius: 0.1}, material: m}]}\n");
     const auto run = [&](const std::string& folder, const std::string& closed) {
-        return run_shell("( exec " + closed + "; " + DELASSUS_COMMAND + " run " + (scratch / "bounce.yaml").string() +
-                         " -o " + (scratch / folder).string() + " )");
+        return run_shell("( exec " + closed + "; " + tests::places::command + " run " +
+                         (scratch / "bounce.yaml").string() + " -o " + (scratch / folder).string() + " )");
     };
     ASSERT_EQ(run("open", "</dev/null").exit_code, 0);
     const std::string expected = text_of(scratch / "open/trajectory.h5");
@@ -182,7 +183,8 @@ TEST(Output, ALaterCommandReplacesWhatIsItsOwn) {
 TEST(Output, OneProcessWritesIntoAFolder) {
     const ScratchFolder scratch;
     const fs::path folder = scratch / "run";
-    const std::string command = DELASSUS_COMMAND, endless = "run " + scene("sphere_pile") + " --end 1000 --every 100";
+    const std::string command = tests::places::command,
+                      endless = "run " + scene("sphere_pile") + " --end 1000 --every 100";
     const auto two =
         run_shell(command + " " + endless + " -o " + folder.string() + " >/dev/null 2>&1 & first=$!; " +
                   "while ! [ -e " + (folder / "checkpoint.json").string() + " ]; do sleep 0.05; done; " + command +
@@ -311,8 +313,8 @@ TEST(Resume, AfterAKillGivesTheSameBits) {
     expect_success(run + "--end 0.5 -o " + whole.string());
     for (int k = 0; k < 4; ++k) {
         const fs::path folder = scratch / "killed";
-        run_shell(std::string("timeout -s KILL ") + std::to_string(0.15 + 0.2 * k) + " " + DELASSUS_COMMAND + " " +
-                  run + "--end 0.5 -o " + folder.string());
+        run_shell(std::string("timeout -s KILL ") + std::to_string(0.15 + 0.2 * k) + " " + tests::places::command +
+                  " " + run + "--end 0.5 -o " + folder.string());
         if (fs::exists(folder / "checkpoint.json")) {
             expect_success("run " + scene("sphere_pile") + " --end 0.5 --resume " + folder.string());
             EXPECT_EQ(state_of(folder), state_of(whole));
@@ -340,7 +342,7 @@ TEST(Input, AnUnreadableFileIsSaidToBeUnreadable) {
     const ScratchFolder scratch;
     const auto reads = [&](const fs::path& file) {
         // root may read everything; nobody may not
-        const std::string command = std::string(DELASSUS_COMMAND) + " inspect " + file.string();
+        const std::string command = std::string(tests::places::command) + " inspect " + file.string();
         return run_shell(geteuid() == 0 ? "setpriv --reuid 65534 --clear-groups " + command : command);
     };
     fs::permissions(scratch.path(), fs::perms::all);

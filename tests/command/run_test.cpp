@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::run_test {
@@ -15,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 std::string scene(const std::string& name) {
-    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / (name + ".yaml")).string();
+    return (std::filesystem::path(tests::places::source) / "examples" / "scenes" / (name + ".yaml")).string();
 }
 
 Json json_of(const std::filesystem::path& file) {
@@ -220,7 +221,7 @@ TEST(Run, InterruptEndsAStepWithinASecond) {
     const std::string arguments =
         "run " + (scratch / "wall.yaml").string() +
         " --solver pgs --set solver.tolerance=1e-300 --set solver.max_iterations=1000000000000 -o " + folder.string();
-    const auto result = run_shell(std::string(DELASSUS_COMMAND) + " " + arguments +
+    const auto result = run_shell(std::string(tests::places::command) + " " + arguments +
                                   " & sleep 3; kill -INT $!; sleep 1.5; kill -0 $! 2>/dev/null && echo late; wait $!");
     EXPECT_EQ(result.exit_code, 3) << result.err;
     EXPECT_EQ(result.out.find("late"), std::string::npos);
@@ -262,8 +263,9 @@ TEST(Run, SolverThatCannotIsRefusedWithTheTime) {
 TEST(Run, InterruptKeepsWhatWasReached) {
     const ScratchFolder scratch;
     const auto folder = scratch / "run";
-    const auto result = run_shell("timeout -s INT 1 " + std::string(DELASSUS_COMMAND) + " run " + scene("sphere_pile") +
-                                  " --end 1000 --every 100 -o " + folder.string() + "; test $? = 124");
+    const auto result =
+        run_shell("timeout -s INT 1 " + std::string(tests::places::command) + " run " + scene("sphere_pile") +
+                  " --end 1000 --every 100 -o " + folder.string() + "; test $? = 124");
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_NE(result.err.find("--resume goes on from there"), std::string::npos) << result.err;
     EXPECT_EQ(json_of(folder / "report.json").at("status"), "interrupted");

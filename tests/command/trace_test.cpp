@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests::trace_test {
@@ -13,7 +14,7 @@ namespace {
 using Json = nlohmann::json;
 
 CommandResult run_traced(const std::filesystem::path& trace, const std::string& arguments) {
-    return run_shell("DELASSUS_TRACE=" + trace.string() + " " + DELASSUS_COMMAND + " " + arguments);
+    return run_shell("DELASSUS_TRACE=" + trace.string() + " " + tests::places::command + " " + arguments);
 }
 
 /// The spans of a trace, whose list has no end.

@@ -12,6 +12,7 @@
 #include "delassus/plan.hpp"
 #include "delassus/scene.hpp"
 #include "delassus/simulation.hpp"
+#include "support/places.hpp"
 
 namespace delassus::tests::mechanism_test {
 namespace {
@@ -287,7 +288,8 @@ TEST(ArticulatedChain, EndsWhereItsReferenceDoes) {
         SceneOverrides overrides;
         overrides.step = step;
         Registry registry;
-        Scene scene = read_scene(DELASSUS_SOURCE_DIR "/examples/scenes/articulated_chain.yaml", overrides);
+        Scene scene =
+            read_scene(std::string(tests::places::source) + "/examples/scenes/articulated_chain.yaml", overrides);
         Simulation simulation(scene.systems[0], registry);
         while (!simulation.finished()) simulation.step();
         const Vector3 x = scene.systems[0].system->pose(simulation.state(), 19).position;
@@ -307,7 +309,7 @@ TEST(ParcelLine, RunsInJointCoordinates) {
         overrides.end = 2.5;
         overrides.values = {{"coordinates", coordinates}};
         Registry registry;
-        Scene scene = read_scene(DELASSUS_SOURCE_DIR "/examples/scenes/parcel_line.yaml", overrides);
+        Scene scene = read_scene(std::string(tests::places::source) + "/examples/scenes/parcel_line.yaml", overrides);
         Simulation simulation(scene.systems[0], registry);
         while (!simulation.finished()) simulation.step();
         EXPECT_EQ(simulation.totals().unsolved_steps, 0) << coordinates;

@@ -14,11 +14,12 @@
 
 #include "delassus/scene.hpp"
 #include "delassus/simulation.hpp"
+#include "support/places.hpp"
 
 namespace delassus::tests::references_test {
 namespace {
 
-const std::filesystem::path root = DELASSUS_SOURCE_DIR;
+const std::filesystem::path root = tests::places::source;
 
 /// A file of docs/references.
 struct Reference {

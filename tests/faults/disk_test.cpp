@@ -7,6 +7,7 @@
 #include "fault_fixture.hpp"
 #include "support/full_disk.hpp"
 #include "support/html_page.hpp"
+#include "support/places.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::tests {
@@ -129,7 +130,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(FullDiskOf, StandardOutputIsNoSuccess) {
     for (const char* command : {"--help", "bench list", "plugins list --json"}) {
-        const auto result = run_shell(std::string(DELASSUS_COMMAND) + " " + command + " >/dev/full");
+        const auto result = run_shell(std::string(tests::places::command) + " " + command + " >/dev/full");
         EXPECT_EQ(result.exit_code, 2) << command;
         EXPECT_NE(result.err.find("No space left on device"), std::string::npos) << command << result.err;
     }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "process/child_process.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 namespace delassus::tests {
@@ -24,7 +25,7 @@ using Environment = std::vector<std::pair<std::string, std::string>>;
 /// Runs `delassus` with these words, as run_child() does: under a time limit, so that a fault that makes it hang shows.
 inline ChildResult run_words(std::vector<std::string> words, Environment environment = {}) {
     ChildSettings child;
-    child.program = DELASSUS_COMMAND;
+    child.program = tests::places::command;
     child.arguments = std::move(words);
     child.environment = std::move(environment);
     child.timeout = 60.0;

@@ -4,6 +4,7 @@
 #include <regex>
 
 #include "fault_fixture.hpp"
+#include "support/places.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::tests {
@@ -45,7 +46,7 @@ protected:
     /// memory is short (hdf5::require_memory), which the limits of size show.
     [[nodiscard]] ChildResult run(Environment environment) const {
         environment.emplace_back("DELASSUS_FAIL_NOT_IN", "libhdf5");
-        environment.emplace_back("LD_PRELOAD", DELASSUS_FAILING_MALLOC);
+        environment.emplace_back("LD_PRELOAD", tests::places::failing_malloc);
         if (GetParam().in != nullptr) environment.emplace_back("DELASSUS_FAIL_IN", GetParam().in);
         return run_words(words(GetParam().line), environment);
     }

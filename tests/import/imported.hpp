@@ -17,6 +17,7 @@
 #include "delassus/model_import.hpp"
 #include "delassus/scene.hpp"
 #include "support/dense.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 #ifdef DELASSUS_HAS_MUJOCO
@@ -26,7 +27,7 @@
 namespace delassus::tests {
 
 inline std::filesystem::path model_file(const std::string& name) {
-    return std::filesystem::path(DELASSUS_SOURCE_DIR) / "tests" / "import" / "models" / name;
+    return std::filesystem::path(tests::places::source) / "tests" / "import" / "models" / name;
 }
 
 /// The items of a list, by what they are.

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "delassus/error.hpp"
+#include "support/places.hpp"
 
 namespace delassus::mesh_files_test {
 namespace {
@@ -275,7 +276,8 @@ TEST_F(MeshFile, WrongTetrahedraAreToldInOneSentence) {
 
 #ifdef DELASSUS_HAS_ASSIMP
 TEST_F(MeshFile, SurfaceIsFilledWithTetrahedra) {
-    const auto file = std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / "meshes" / "icosahedron.obj";
+    const auto file =
+        std::filesystem::path(tests::places::source) / "examples" / "scenes" / "meshes" / "icosahedron.obj";
     const double exact = 5.0 * (3.0 + std::sqrt(5.0)) / 12.0 * 1e-3;
     const auto coarse = read_tetrahedral_mesh(file);
     EXPECT_NEAR(volume(coarse) / exact, 1.0, 1e-6);

@@ -19,6 +19,7 @@ TEST(MujocoStep, Adapter) {
 #include <fmt/format.h>
 
 #include "simulation.hpp"
+#include "support/places.hpp"
 
 namespace {
 
@@ -37,7 +38,7 @@ delassus_mujoco_options options(const char* contacts, const char* law = "coulomb
     return chosen;
 }
 std::string grip(const std::string& more) {
-    return std::string(DELASSUS_SOURCE_DIR) + "/examples/engines/mujoco/models/" + more;
+    return std::string(delassus::tests::places::source) + "/examples/engines/mujoco/models/" + more;
 }
 
 /// A block of 2 kg on a plane; gravity is turned by `slope`, towards `heading` in the plane.
@@ -208,7 +209,7 @@ TEST(MujocoStep, WithoutConstraintsNothingChanges) {
 // With MuJoCo's compliance and its convex law, elliptic cones of condim 3, limits, friction loss and equality make
 // MuJoCo's own problem: accelerations and forces are those of its Newton solver.
 TEST(MujocoStep, MujocosOwnProblemHasMujocosAnswer) {
-    const std::string model = std::string(DELASSUS_SOURCE_DIR) + "/tests/import/models/";
+    const std::string model = std::string(delassus::tests::places::source) + "/tests/import/models/";
     int compared = 0, contacts = 0;
     for (const std::string name : {"humanoid.xml", "quadruped.xml"}) {
         Simulation ours(model + name, options("mujoco", "associated")), newton(model + name);
@@ -302,7 +303,7 @@ TEST(MujocoStep, AMarginSeesContactsAhead) {
 }
 
 TEST(MujocoStep, RobotsRun) {
-    const std::string models = std::string(DELASSUS_SOURCE_DIR) + "/tests/import/models/";
+    const std::string models = std::string(delassus::tests::places::source) + "/tests/import/models/";
     for (const std::string name : {"humanoid.xml", "quadruped.xml"}) {
         for (const char* contacts : {"hard", "mujoco"}) {
             for (const int condim : {1, 3, 4, 6}) {

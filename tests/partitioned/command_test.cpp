@@ -13,9 +13,10 @@
 
 #include "delassus/distributed.hpp"
 #include "delassus/problem_files.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
-#ifdef DELASSUS_TEST_PLUGINS
+#ifdef DELASSUS_HAS_MPI
 
 namespace delassus::tests::parts_command_test {
 namespace {
@@ -32,8 +33,8 @@ protected:
         // Without what a solver with MPI in this process has left in the environment: mpirun would not start under it.
         return run_shell("env -i PATH=\"$PATH\" HOME=\"$HOME\" " + environment +
                          " OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n " +
-                         std::to_string(processes) + " --oversubscribe " + DELASSUS_COMMAND + " " + arguments +
-                         " --plugin-path " DELASSUS_TEST_PLUGINS);
+                         std::to_string(processes) + " --oversubscribe " + tests::places::command + " " + arguments +
+                         " --plugin-path " + tests::places::plugins);
     }
 
     ScratchFolder folder;
@@ -41,7 +42,7 @@ protected:
 
 TEST_F(PartsCommand, GivesTheSerialAnswer) {
     const std::string line = "solve " + problem() + " --solver parts_gradient --tolerance 1e-10 --json --solution ";
-    const auto serial = run_command(line + (folder / "one").string() + " --plugin-path " DELASSUS_TEST_PLUGINS);
+    const auto serial = run_command(line + (folder / "one").string() + " --plugin-path " + tests::places::plugins);
     ASSERT_EQ(serial.exit_code, 0) << serial.err;
     const auto parts = mpirun(3, line + (folder / "three").string());
     ASSERT_EQ(parts.exit_code, 0) << parts.err;

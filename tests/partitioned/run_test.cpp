@@ -17,13 +17,14 @@
 #include <vector>
 
 #include "delassus/distributed.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 
 #ifdef DELASSUS_HAS_HDF5
 #include <hdf5.h>
 #endif
 
-#ifdef DELASSUS_TEST_PLUGINS
+#ifdef DELASSUS_HAS_MPI
 
 namespace delassus::tests::shared_run_test {
 namespace {
@@ -118,7 +119,7 @@ protected:
         return run_shell(
             "env -i PATH=\"$PATH\" HOME=\"$HOME\" OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
             "mpirun -n " +
-            std::to_string(processes) + " --oversubscribe " + DELASSUS_COMMAND + " " + arguments);
+            std::to_string(processes) + " --oversubscribe " + tests::places::command + " " + arguments);
     }
     [[nodiscard]] Json report(const std::string& run) const {
         std::ifstream file(folder / run / "report.json");

@@ -10,9 +10,10 @@
 #include "delassus/generate.hpp"
 #include "delassus/prepared_part.hpp"
 #include "delassus/solver_config.hpp"
+#include "support/places.hpp"
 #include "support/small_problems.hpp"
 
-#ifdef DELASSUS_TEST_PLUGINS
+#ifdef DELASSUS_HAS_MPI
 
 namespace delassus::solve_in_parts_test {
 namespace {
@@ -26,7 +27,7 @@ protected:
     }
 
     std::shared_ptr<const Communicator> run = communicator_of_run();
-    Registry registry{{DELASSUS_TEST_PLUGINS}};
+    Registry registry{{tests::places::plugins}};
 };
 
 // Every process solves the problem by itself as well, as the only one of a run of one.

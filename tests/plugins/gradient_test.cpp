@@ -16,6 +16,7 @@
 #include "delassus/problem_files.hpp"
 #include "delassus/solver.hpp"
 #include "support/dense.hpp"
+#include "support/places.hpp"
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
@@ -284,7 +285,7 @@ INSTANTIATE_TEST_SUITE_P(Solvers, Gradient, testing::Values("spg", "apgd"),
 
 std::filesystem::path shared_problems() {
     const char* folder = std::getenv("DELASSUS_SHARED_PROBLEMS");
-    return folder ? folder : DELASSUS_SHARED_PROBLEMS_DEFAULT;
+    return folder ? folder : tests::places::shared_problems;
 }
 
 std::vector<std::string> shared_names() {

@@ -18,6 +18,7 @@
 #include "delassus/problem_files.hpp"
 #include "delassus/sdk/residual.hpp"
 #include "delassus/solver.hpp"
+#include "support/places.hpp"
 #include "support/small_problems.hpp"
 #include "support/solving.hpp"
 
@@ -526,7 +527,7 @@ TEST(Pgs, RefusesAFormThatTheProblemDoesNotHave) {
 
 std::filesystem::path shared_problems() {
     const char* chosen = std::getenv("DELASSUS_SHARED_PROBLEMS");
-    return chosen != nullptr ? chosen : DELASSUS_SHARED_PROBLEMS_DEFAULT;
+    return chosen != nullptr ? chosen : tests::places::shared_problems;
 }
 
 TEST(PgsShared, ReachesFourDigitsInBothLaws) {

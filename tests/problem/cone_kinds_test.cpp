@@ -10,6 +10,7 @@
 #include "delassus/needs.hpp"
 #include "delassus/problem_files.hpp"
 #include "problem/cone_kinds.hpp"
+#include "support/places.hpp"
 #include "support/problem_equality.hpp"
 #include "support/run_command.hpp"
 #include "support/small_problems.hpp"
@@ -96,7 +97,7 @@ TEST_P(EachKind, IsNeededAndNamed) {
 
 #ifndef DELASSUS_TEST_CONE  // which is no user's
 TEST_P(EachKind, StandsInTheDocumentation) {
-    const auto docs = std::filesystem::path(DELASSUS_SOURCE_DIR) / "docs";
+    const auto docs = std::filesystem::path(tests::places::source) / "docs";
     const std::string row =
         fmt::format("| `{}` | {} | {} | {} | {} |\n", kind.name, kind.allowed_rows, kind.set, kind.dual, kind.use);
     EXPECT_NE(text_of(docs / "problem.md").find(row), std::string::npos) << "docs/problem.md lacks\n" << row;

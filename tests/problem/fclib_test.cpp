@@ -4,6 +4,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/problem_files.hpp"
+#include "support/places.hpp"
 #include "support/problem_equality.hpp"
 #include "support/run_command.hpp"
 #include "support/shared_problems.hpp"
@@ -380,7 +381,7 @@ TEST(FclibRefuses, TruncationAnywhere) {
 
 TEST(FclibRefuses, WhatBreaksHdf5Itself) {
     // Found by a fuzzer: HDF5 1.10 reads beyond its memory here. Other versions may refuse it in words of their own.
-    const fs::path file = fs::path(DELASSUS_SOURCE_DIR) / "tests/problem/data/breaks-hdf5-1.10.hdf5";
+    const fs::path file = fs::path(tests::places::source) / "tests/problem/data/breaks-hdf5-1.10.hdf5";
     ASSERT_TRUE(fs::exists(file));
     testing::internal::CaptureStderr();
     expect_sentence(sentence_of<InputError>([&] { (void)read_problem(file); }), "breaks-hdf5-1.10.hdf5");

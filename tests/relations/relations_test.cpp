@@ -15,6 +15,7 @@
 #include "relations/random_scene.hpp"
 #include "relations/shrink.hpp"
 #include "relations/transform.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
@@ -29,7 +30,7 @@ std::map<std::string, relations::Outcome> judged(const Json& scene) {
     const tests::ScratchFolder scratch;
     relations::JudgeOrder order;
     order.scratch = scratch.path();
-    order.command = DELASSUS_COMMAND;
+    order.command = tests::places::command;
     std::map<std::string, relations::Outcome> outcomes;
     for (const auto& outcome : relations::judge_scene(scene, tests::registry(), order))
         outcomes[std::string(outcome.relation)] = outcome;

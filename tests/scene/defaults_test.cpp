@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "delassus/error.hpp"
+#include "support/places.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::tests::defaults_test {
@@ -137,7 +138,8 @@ TEST(Defaults, AHeavyBoxDoesNotShakeWhatCarriesIt) {
         SceneOverrides overrides;
         overrides.solver = solver;
         overrides.values = {{"bodies.top.mass", "1e8"}};
-        Running run(read_scene(DELASSUS_SOURCE_DIR "/examples/suites/stability/stack.yaml", overrides));
+        Running run(
+            read_scene(std::string(tests::places::source) + "/examples/suites/stability/stack.yaml", overrides));
         run.finish();
         for (const char* body : {"lower", "middle", "top"}) {
             const auto velocities = run.velocities(body);
@@ -150,7 +152,7 @@ TEST(Defaults, AHeavyBoxDoesNotShakeWhatCarriesIt) {
 TEST(Defaults, BouncesWithoutLossTakeNothing) {
     SceneOverrides overrides;
     overrides.end = 200.0;
-    Running run(read_scene(DELASSUS_SOURCE_DIR "/examples/suites/stability/bounces.yaml", overrides));
+    Running run(read_scene(std::string(tests::places::source) + "/examples/suites/stability/bounces.yaml", overrides));
     run.finish();
     EXPECT_EQ(run.simulation.totals().energy, 0.5);
     EXPECT_GT(run.simulation.totals().solver_iterations, 100);

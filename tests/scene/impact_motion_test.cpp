@@ -7,8 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "support/scenes.hpp"
 
@@ -202,6 +205,45 @@ bodies:
     }
     EXPECT_LT(least, first - 5.0);
     EXPECT_LT(gained, 5e-3 * (first - least));
+}
+
+// Housner (Bull. Seism. Soc. Am. 53, 1963): at each impact on the other edge a slender block keeps 1 − 3/2 sin² α of
+// its rate, tan α being its width by its height. Between two impacts its energy is m g r cos(α − θ) at the largest tilt
+// θ.
+TEST(ImpactMotion, ABlockRocksAsHousnerHasIt) {
+    struct Block {
+        double half_width, half_height, tilt;  // m, degrees
+    };
+    constexpr double degree = std::numbers::pi / 180.0;
+    for (const Block& block : {Block{0.1, 0.5, 5.0}, Block{0.07, 0.45, 3.0}})
+        for (const auto& [step, share] : {std::pair(1.0 / 60.0, 0.02), std::pair(0.0041, 0.004)}) {
+            SCOPED_TRACE(fmt::format("{} by {} m, step {}", 2.0 * block.half_width, 2.0 * block.half_height, step));
+            const double c = std::cos(block.tilt * degree), s = std::sin(block.tilt * degree);
+            auto run = run_of(fmt::format(
+                "step: {}\nend: 4\nmaterials: {{m: {{friction: 0.9}}}}\nbodies:\n"
+                "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                "- {{name: block, mass: 7, position: [{:.17g}, 0.3, {:.17g}], orientation: {{axis: [0, 1, 0], angle: "
+                "{}}}, "
+                "shapes: [{{box: {{size: [{}, 0.3, {}]}}, material: m}}]}}\n",
+                step, block.half_height * s - block.half_width * c, block.half_width * s + block.half_height * c,
+                block.tilt, 2.0 * block.half_width, 2.0 * block.half_height));
+            std::vector<double> tilts = {block.tilt * degree, block.tilt * degree}, peaks;
+            while (!run.simulation.finished()) {
+                run.simulation.step();
+                const auto orientation = run.pose("block").orientation;
+                tilts.push_back(std::abs(2.0 * std::atan2(orientation[2], orientation[0])));
+                const std::size_t k = tilts.size() - 2;
+                if (k > 1 && tilts[k] >= tilts[k - 1] && tilts[k] > tilts[k + 1]) peaks.push_back(tilts[k]);
+            }
+            ASSERT_GE(peaks.size(), 4U);
+            const double alpha = std::atan2(block.half_width, block.half_height);
+            const double kept = std::pow(1.0 - 1.5 * std::pow(std::sin(alpha), 2), 2);
+            double right = block.tilt * degree;
+            for (int k = 0; k < 4; ++k) {
+                right = alpha - std::acos(std::cos(alpha) + kept * (std::cos(alpha - right) - std::cos(alpha)));
+                EXPECT_NEAR(peaks[static_cast<std::size_t>(k)], right, share * right) << k;
+            }
+        }
 }
 
 }  // namespace

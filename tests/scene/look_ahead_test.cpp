@@ -65,7 +65,7 @@ struct Subject {
 
 std::vector<Subject> subjects() {
     return {{"chain_in_joints", chain(3), "dormand_prince", "joint", 0.00173, 0.8, 2.5},
-            {"chain_in_bodies", chain(3), "dormand_prince", "maximal", 0.00173, 0.8, 1.8},
+            {"chain_in_bodies", chain(3), "dormand_prince", "maximal", 0.00173, 0.8, 1.7},
             {"balls_in_joints", ball_joints, "dormand_prince", "joint", 0.00173, 0.8, 2.5},
             {"balls_in_bodies", ball_joints, "dormand_prince", "maximal", 0.00173, 0.8, 1.8},
             {"loop_in_joints", four_bar, "dormand_prince", "joint", 0.00173, 0.8, 1.8},

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <string>
@@ -46,6 +47,31 @@ const Chosen explicit_in_joints{"dormand_prince", Coordinates::Joint},
 const std::string bar =
     "elastic_blocks: [{name: bar, corner: [0, 0, 0.412345], edges: [0.212345, 0.041234, 0.041234], cells: [4, 1, 1], "
     "young: 1.0e+6, poisson: 0.45, density: 1100, fixed_faces: [x_min]}]\n";
+
+// A mass on a spring for 100 periods, in steps shown of a third of a period to two.
+TEST(Method, FollowsSmallMotionsAsWellAsLargeOnes) {
+    constexpr double pi = 3.14159265358979323846, f = 117.0;
+    for (const double amplitude : {2.3e-8, 1.7e-6, 1.1e-3, 0.9})
+        for (const double step : {0.35 / f, 1.9 / f}) {
+            SCOPED_TRACE(fmt::format("{} m, steps of {} periods", amplitude, step * f));
+            Running run(parse_scene(
+                fmt::format(
+                    "step: {:.17g}\nend: {:.17g}\ngravity: [0, 0, 0]\nbodies: [{{name: b, mass: 0.001, inertia: "
+                    "{{xx: 1e-9, yy: 1e-9, zz: 1e-9}}, position: [0.3, -1, 0.2]}}]\njoints: [{{name: j, kind: "
+                    "prismatic, second: b, point: [0.3, -1, 0.2], axis: [1, 0, 0], start: {}, spring: "
+                    "{{stiffness: {:.17g}}}}}]\n",
+                    step, 100.0 / f, amplitude, 0.001 * std::pow(2.0 * pi * f, 2)),
+                "test.yaml"));
+            double worst = 0.0;
+            while (!run.simulation.finished()) {
+                run.simulation.step();
+                const double t = run.simulation.state().t;
+                worst =
+                    std::max(worst, std::abs(run.pose("b").position[0] - 0.3 - amplitude * std::cos(2 * pi * f * t)));
+            }
+            EXPECT_LT(worst, (amplitude < 1e-7 ? 1e-3 : 5e-5) * amplitude);
+        }
+}
 
 TEST(Method, FollowsFromTheScene) {
     EXPECT_EQ(chosen_for(head + chain(6)), explicit_in_joints);

@@ -175,6 +175,28 @@ TEST(PlainMotion, ARowOfBallsHandsOnItsSpeed) {
         }
 }
 
+// The first ball is pushed as well: its work is all that the energy grows by.
+TEST(PlainMotion, ARowOfBallsThatIsPushedLosesNothing) {
+    const double push = 0.31, mass = 0.17, speed = 3.0;
+    for (const double gap : {1e-3, 1e-4})
+        for (const double step : {0.0013, 0.0047, 1.0 / 60.0}) {
+            SCOPED_TRACE(fmt::format("step {}, gap {}", step, gap));
+            auto run = run_of(fmt::format(
+                "step: {}\nend: 0.4\ngravity: [0, 0, 0]\nmaterials: {{m: {{restitution: 1}}}}\nbodies:\n"
+                "- {{name: cue, mass: {}, position: [-0.5, 0, 0], velocity: [{}, 0, 0], shapes: [{{sphere: {{radius: "
+                "0.03}}, material: m}}]}}\n"
+                "- {{name: 'ball_{{i}}', mass: {}, position: [0, 0, 0], shapes: [{{sphere: {{radius: 0.03}}, material: "
+                "m}}], repeat: {{count: 3, spacing: [{:.17g}, 0, 0]}}}}\n"
+                "loads: [{{name: push, body: cue, force: [{}, 0, 0]}}]\n",
+                step, mass, speed, mass, 0.06 + gap, push));
+            const double start = run.simulation.record().energy;
+            run.finish();
+            const double work = push * (run.pose("cue").position[0] + 0.5);
+            EXPECT_NEAR(run.simulation.record().energy, start + work, 1e-3 * start);
+            EXPECT_GT(run.velocities("ball_2")[0][0], speed);
+        }
+}
+
 TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     auto run = run_of(
         "step: 0.0017\nend: 6\nmaterials: {m: {friction: 1}}\nbodies:\n"
@@ -403,6 +425,36 @@ TEST(PlainMotion, WhatFliesPastAnEdgeGoesOnStraight) {
                 EXPECT_NEAR(std::hypot(v[1], v[2]), 0.0, 1e-9);
                 EXPECT_NEAR(std::hypot(omega[0], omega[1], omega[2]), 0.0, 1e-9);
             }
+}
+
+// A ball rolls from one box onto another that is tilted by half a degree, flush at the edge. It turns by almost a
+// radian in a step: the contact of the place where they meet has the arm of that place.
+TEST(PlainMotion, WhatRollsOverASlightEdgeStaysOnTheGround) {
+    const double radius = 0.1, angle = 0.5 * std::acos(-1.0) / 180.0, c = std::cos(angle), s = std::sin(angle);
+    for (const double speed : {2.0, 5.0, 11.0})
+        for (const double place : {0.0, 0.3, 0.5, 0.7, 0.9}) {
+            SCOPED_TRACE(fmt::format("{} m/s, {}", speed, place));
+            const double step = 1.0 / 60.0;
+            auto run = run_of(fmt::format(
+                "step: {}\nend: {}\nmaterials: {{m: {{friction: 0.5}}}}\nbodies:\n"
+                "- {{name: flat, fixed: true, position: [-2, 0, -0.05], shapes: [{{box: {{size: [4, 2, 0.1]}}, "
+                "material: m}}]}}\n"
+                "- {{name: ramp, fixed: true, position: [{:.17g}, 0, {:.17g}], orientation: {{axis: [0, 1, 0], angle: "
+                "-0.5}}, shapes: [{{box: {{size: [4, 2, 0.1]}}, material: m}}]}}\n"
+                "- {{name: ball, mass: 1, position: [{:.17g}, 0, {}], velocity: [{}, 0, 0], angular_velocity: [0, {}, "
+                "0], shapes: [{{sphere: {{radius: {}}}, material: m}}]}}\n",
+                step, 1.5 / speed, 2.0 * c + 0.05 * s, 2.0 * s - 0.05 * c, -0.5 - place * speed * step, radius, speed,
+                speed / radius, radius));
+            const double start = run.simulation.record().energy, moves = run.simulation.record().kinetic;
+            double highest = 0.0;
+            while (!run.simulation.finished()) {
+                run.simulation.step();
+                const Vector3 at = run.pose("ball").position;
+                highest = std::max(highest, std::min(at[2], c * at[2] - s * at[0]) - radius);
+            }
+            EXPECT_LT(highest, 1e-4);
+            EXPECT_NEAR(run.simulation.record().energy, start, 2e-3 * moves);
+        }
 }
 
 // Two bodies that pass each other within a step, faster than they are long.

@@ -10,6 +10,7 @@
 #include "delassus/scene.hpp"
 #include "delassus/scene_schema.hpp"
 #include "support/json_schema.hpp"
+#include "support/places.hpp"
 #include "support/run_command.hpp"
 #include "support/scenes.hpp"
 
@@ -177,7 +178,7 @@ TEST(SceneSchema, RefusesWhatIsWrong) {
 TEST(SceneSchema, IsPrintedByTheCommand) {
     const auto result = run_command("run --schema");
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_EQ(result.out, text_of(std::filesystem::path(DELASSUS_SOURCE_DIR) / "docs" / "scene.schema.json"));
+    EXPECT_EQ(result.out, text_of(std::filesystem::path(tests::places::source) / "docs" / "scene.schema.json"));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
+#include "support/places.hpp"
 #include "support/small_problems.hpp"
 
 namespace delassus::errors_test {
@@ -32,7 +33,7 @@ void expect_zero(const Errors& errors, double tolerance) {
 
 // docs/errors.md lists the measures of the table, row by row.
 TEST(Errors, AreDocumentedAsTheirTableSays) {
-    std::ifstream file(DELASSUS_SOURCE_DIR "/docs/errors.md");
+    std::ifstream file(std::string(tests::places::source) + "/docs/errors.md");
     std::stringstream text;
     text << file.rdbuf();
     std::set<std::string_view> names;

@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "process/child_process.hpp"
+#include "support/places.hpp"
 
 namespace delassus::tests {
 
 inline bool has_browser() {
-    return !std::string(DELASSUS_CHROMIUM).empty();
+    return !std::string(tests::places::chromium).empty();
 }
 
 struct Browsed {
@@ -28,7 +29,7 @@ struct Browsed {
 inline Browsed open_in_browser(const std::filesystem::path& page, const std::filesystem::path& profile,
                                const std::vector<std::string>& flags = {}) {
     ChildSettings child;
-    child.program = DELASSUS_CHROMIUM;
+    child.program = tests::places::chromium;
     child.arguments = {"--headless",
                        "--no-sandbox",
                        "--disable-quic",

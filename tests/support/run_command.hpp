@@ -13,6 +13,7 @@
 #include <string>
 
 #include <unistd.h>
+#include "support/places.hpp"
 
 namespace delassus::tests {
 
@@ -64,14 +65,14 @@ inline CommandResult run_shell(const std::string& line) {
 }
 
 inline CommandResult run_command(const std::string& arguments) {
-    return run_shell(std::string(DELASSUS_COMMAND) + " " + arguments);
+    return run_shell(std::string(tests::places::command) + " " + arguments);
 }
 
 /// What the dynamic loader says of the libraries that it maps while the command runs.
 inline std::string loader_log(const std::string& arguments) {
     const ScratchFolder scratch;
     const auto result = run_shell("LD_DEBUG=files LD_DEBUG_OUTPUT=" + (scratch / "log").string() + " " +
-                                  DELASSUS_COMMAND + " " + arguments);
+                                  tests::places::command + " " + arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     std::string log;
     for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) log += text_of(entry.path());
@@ -80,7 +81,7 @@ inline std::string loader_log(const std::string& arguments) {
 }
 
 inline std::string example(const std::string& name) {
-    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "problems" / name).string();
+    return (std::filesystem::path(tests::places::source) / "examples" / "problems" / name).string();
 }
 
 }  // namespace delassus::tests

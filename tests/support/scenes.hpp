@@ -6,11 +6,12 @@
 #include <string>
 
 #include "delassus/simulation.hpp"
+#include "support/places.hpp"
 
 namespace delassus::tests {
 
 inline std::string example_scene(const std::string& name) {
-    return (std::filesystem::path(DELASSUS_SOURCE_DIR) / "examples" / "scenes" / (name + ".yaml")).string();
+    return (std::filesystem::path(tests::places::source) / "examples" / "scenes" / (name + ".yaml")).string();
 }
 
 inline const Registry& registry() {

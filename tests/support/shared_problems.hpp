@@ -8,13 +8,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <vector>
+#include "support/places.hpp"
 
 namespace delassus::tests {
 
 /// $DELASSUS_SHARED_PROBLEMS, or ../shared/problems beside the source tree; it may not exist.
 inline std::filesystem::path shared_problems_root() {
     const char* given = std::getenv("DELASSUS_SHARED_PROBLEMS");
-    return given != nullptr ? given : DELASSUS_SHARED_PROBLEMS_DEFAULT;
+    return given != nullptr ? given : tests::places::shared_problems;
 }
 
 /// All problem folders in the order of their names; empty if the folder is absent.

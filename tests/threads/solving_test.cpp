@@ -9,6 +9,7 @@
 
 #include "delassus/generate.hpp"
 #include "delassus/solver.hpp"
+#include "support/places.hpp"
 #include "support/solving.hpp"
 
 namespace delassus::solving_in_threads_test {
@@ -24,7 +25,7 @@ constexpr double tolerance = 1e-5;
 #endif
 
 std::string path_of(const std::string& plugin) {
-    return std::string(DELASSUS_TEST_PLUGINS) + "/" + plugin + ".so";
+    return std::string(tests::places::plugins) + "/" + plugin + ".so";
 }
 
 Problem pile(std::int32_t contacts) {

@@ -11,12 +11,13 @@
 #include "delassus/error.hpp"
 #include "delassus/scene.hpp"
 #include "delassus/simulation.hpp"
+#include "support/places.hpp"
 
 namespace delassus::steps_in_threads_test {
 namespace {
 
 std::string head(const std::string& more) {
-    return "step: 0.004\nend: 10\nsolver: {name: " + std::string(DELASSUS_TEST_PLUGINS) +
+    return "step: 0.004\nend: 10\nsolver: {name: " + std::string(tests::places::plugins) +
            "/apgd.so, law: associated, tolerance: 1.0e-4}\nmaterials: {stone: {friction: 0.6}}\n" + more;
 }
 

@@ -23,6 +23,10 @@ struct StepControl {
     /// Of each velocity's coordinate, in its unit, > 0: what `absolute` is a share of. Empty: 1 each.
     std::vector<double> sizes{};
     double slow = 0.0;  ///< what closes at this speed at most is no impact; 0: at `absolute`
+    /// With a method that estimates its own error and does not damp at once: sizes are no longer than the longest way
+    /// that the coordinate has gone from where it began, so that small motions are as exact, for their size, as large
+    /// ones. Not in steps of the smallest size, which can pass a jump of velocities.
+    bool of_way = false;
 };
 
 /// What a step with a chosen size did.
@@ -86,7 +90,7 @@ private:
     [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
     [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h,
                                   bool touches) const;
-    [[nodiscard]] double error_of(const State& begin, const State& end, const EmbeddedError& error, double h) const;
+    [[nodiscard]] double error_of(const State& begin, const State& end, const EmbeddedError& error, double h);
     void extrapolate(const State& whole, State& halves) const;
     /// A step from the state in which a contact closes.
     [[nodiscard]] AdaptiveStepReport take_impact(State& state, double h, double end, StepSolver& solver);
@@ -95,6 +99,9 @@ private:
     [[nodiscard]] double size(std::size_t velocity) const {
         return control_.sizes.empty() ? 1.0 : control_.sizes[velocity];
     }
+    /// The longest way of a coordinate so far, if the step that is tried is taken.
+    [[nodiscard]] double longest_way(std::size_t velocity) const;
+    void go(const State& begin, const State& end);
     [[nodiscard]] double power() const;
     /// The factor for the step after one of size h with the estimate `error`, over the tolerance.
     [[nodiscard]] double growth(double error, double h, bool shrunk) const;
@@ -115,8 +122,11 @@ private:
     double next_;
     double last_error_ = 1.0;
     double impacts_ = 0.0;  // short steps for impacts since the last long one
+    // With of_way: how far each coordinate is from where it began, and was at most.
+    std::vector<double> gone_, longest_;
     // Of the step that is being taken:
     std::vector<double> memory_;
+    std::vector<double> way_;
     AdaptiveStepReport report_;
     UnilateralRows begin_rows_, rows_;
     std::vector<std::uint64_t> pushed_;

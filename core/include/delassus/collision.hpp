@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -95,6 +96,11 @@ struct CollisionSetup {
     /// Of shapes: a number, pairs of which never touch as `passing` says, the lesser first. Empty: all touch.
     std::vector<std::int32_t> material{};
     std::vector<std::pair<std::int32_t, std::int32_t>> passing{};
+    /// Of bodies, for messages. Beyond its end they have their numbers.
+    std::vector<std::string> names{};
+
+    /// "name" or the number of a body.
+    [[nodiscard]] DELASSUS_API std::string name_of(std::int32_t body) const;
 };
 
 /// Loads the collision module and makes a detector. Throws InputError where this build has no FCL, for sizes that are

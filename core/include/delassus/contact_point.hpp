@@ -16,7 +16,9 @@ struct ContactPoint {
     Vector3 normal{};                       ///< unit, from a to b
     double gap = 0.0;                       ///< normal · (point_b − point_a); negative in penetration, m
     std::uint32_t feature = 0;              ///< which point of several between the pair; stable while they slide little
-    bool on_the_way = false;                ///< the shapes meet later: the normal is that of the meeting
+    /// The shapes meet later in the step: the normal and the points' arms from the origins of their bodies are those of
+    /// the meeting, and the gap is what the speed along the normal takes until then.
+    bool on_the_way = false;
 };
 
 }  // namespace delassus

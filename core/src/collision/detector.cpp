@@ -184,7 +184,8 @@ void Detector::place(std::span<const Pose> poses) {
     for (std::size_t i = 0; i < poses.size(); ++i) {
         if (!rotation_of(poses[i].orientation, body_rotations_[i]) || !is_measurable(vector(poses[i].position)))
             throw InputError(
-                fmt::format("The pose of body {} is not finite or beyond 1e50 m, or its quaternion is zero.", i));
+                fmt::format("The pose of body {} is not finite or beyond 1e50 m, or its quaternion is zero.",
+                            setup_.name_of(static_cast<std::int32_t>(i))));
     }
     for (std::size_t i = 0; i < placed_.size(); ++i) {
         const Shape& shape = setup_.shapes[i];
@@ -212,7 +213,8 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
         if (body < 0) continue;
         const auto& [translation, rotation] = displacements[static_cast<std::size_t>(body)];
         if (!is_measurable(vector(translation)) || !is_measurable(vector(rotation)))
-            throw InputError(fmt::format("The motion of body {} in a step is not finite or beyond 1e50 m.", body));
+            throw InputError(
+                fmt::format("The motion of body {} in a step is not finite or beyond 1e50 m.", setup_.name_of(body)));
         Sweep& sweep = sweeps_[i];
         sweep.rotation = vector(rotation);
         sweep.straight = sweep.translation = vector(translation);

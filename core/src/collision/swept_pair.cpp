@@ -45,11 +45,6 @@ void advance(const Placed& placed, const Sweep& sweep, double t, Placed& moved) 
     }
 }
 
-/// Where a point of the moved solid was at the beginning.
-Vector3d carried_back(const Placed& placed, const Placed& moved, const Vector3& point) {
-    return placed.position + placed.rotation * (moved.rotation.transpose() * (vector(point) - moved.position));
-}
-
 /// With which a point moves from a to b along its normal over the step, m.
 double closing(const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, const ContactPoint& contact) {
     return vector(contact.normal).dot(displacement(a, of_a, contact.point_a) - displacement(b, of_b, contact.point_b));
@@ -84,7 +79,7 @@ void SweptPair::collide(NarrowPhase& by, Placed& a, Placed& b, const Sweep& of_a
     by.collide(a, b, bound <= envelope ? envelope : std::clamp(limit, envelope, bound), found_);
     if (bound > envelope && !near(a, b, of_a, of_b, envelope)) {
         found_.clear();
-        if (bound > limit) far(by, a, b, of_a, of_b, envelope, envelope);
+        if (bound > limit) advance_to(envelope, by, a, b, of_a, of_b, envelope);
     }
     keep_what_meets(by, a, b, of_a, of_b, envelope);
     contacts.insert(contacts.end(), found_.begin(), found_.end());
@@ -98,7 +93,7 @@ bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const 
 
 void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                                 double envelope) {
-    constexpr double touching = 1e-6, share = 1e-3;
+    constexpr double touching = 1e-6, meeting = 1e-3, same_cosine = 0.9999;
     const auto nearest = nearest_of(found_);
     const double reach = a.solid->reach > 0.0 && b.solid->reach > 0.0 ? std::min(a.solid->reach, b.solid->reach)
                                                                       : std::max(a.solid->reach, b.solid->reach);
@@ -108,14 +103,13 @@ void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& 
         return;
     const double gap = std::min(nearest->gap, envelope);
     const Vector3d normal = vector(nearest->normal);
-    const double same_cosine = nearest->on_the_way ? -1.0 : 0.9999;
     begin_.swap(found_);
-    far(by, a, b, of_a, of_b, envelope, share * gap);
+    advance_to(meeting * gap, by, a, b, of_a, of_b, envelope);
     if (!found_.empty() && vector(nearest_of(found_)->normal).dot(normal) >= same_cosine) found_.swap(begin_);
 }
 
-void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
-                    double envelope, double meeting) {
+void SweptPair::advance_to(double distance, NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a,
+                           const Sweep& of_b, double envelope) {
     constexpr int most_advances = 64;
     const double bound = approach_bound(of_a, of_b);
     double t = 0.0;
@@ -126,11 +120,11 @@ void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Swe
         by.collide(moved_a_, moved_b_, std::max((1.0 - t) * bound, envelope), found_);
         const auto nearest = nearest_of(found_);
         if (nearest == found_.end()) return;
-        if (nearest->gap < meeting) break;
+        if (nearest->gap < distance) break;
         const Vector3d normal = vector(nearest->normal);
         const Turning turns_a = turning(a, of_a, t, moved_a_, normal), turns_b = turning(b, of_b, t, moved_b_, -normal);
         const double speed = normal.dot(of_a.straight - of_b.straight) + turns_a.speed + turns_b.speed;
-        const double acceleration = turns_a.acceleration + turns_b.acceleration, way = nearest->gap - 0.5 * meeting;
+        const double acceleration = turns_a.acceleration + turns_b.acceleration, way = nearest->gap - 0.5 * distance;
         const double root = speed + std::sqrt(speed * speed + 2.0 * acceleration * way);
         if (root > 0.0) t += 2.0 * way / root;
         if (!(root > 0.0) || t >= 1.0) {
@@ -140,11 +134,9 @@ void SweptPair::far(NarrowPhase& by, const Placed& a, const Placed& b, const Swe
     }
     std::erase_if(found_, [&](const ContactPoint& contact) { return !(contact.gap < envelope); });
     for (ContactPoint& contact : found_) {
-        const Vector3d on_a = carried_back(a, moved_a_, contact.point_a);
-        const Vector3d on_b = carried_back(b, moved_b_, contact.point_b);
-        contact.point_a = array(on_a);
-        contact.point_b = array(on_b);
-        contact.gap = vector(contact.normal).dot(on_b - on_a);
+        contact.point_a = array(vector(contact.point_a) - t * of_a.straight);
+        contact.point_b = array(vector(contact.point_b) - t * of_b.straight);
+        contact.gap += t * closing(a, b, of_a, of_b, contact);
         contact.on_the_way = true;
     }
 }

@@ -18,12 +18,12 @@
 //           before g = s τ + ½ c τ². There s = n·(d_a − d_b) + max p·(n×θ_a) + max p·(θ_b×n) is the largest speed along
 //           n of two of their points: p are those of the cores, about the origins of their bodies, whose translations
 //           are d; and c = |θ_a|² r_a + |θ_b|² r_b bounds how s grows. So what turns past a surface takes few advances.
-//           The points of that place are carried back to the beginning with their bodies, and their gap is n·(p_b −
-//           p_a) there.
+//           A contact of that place, at the share t of the way, has the arms and the normal that it has there, since
+//           they say how fast the bodies close, and the gap that this speed takes until t.
 // Points of a pair where it is, or near, may be closer than its bodies move towards them at first, as the bound has it,
 // while none touches yet; and what comes into the envelope on the way may pass. Then the shapes are advanced in the
-// same way, to a thousandth of their gap or of the envelope: those that pass get no contact, and where the normal of
-// the beginning has turned till then those of that place count.
+// same way, to a thousandth of their gap or of the envelope: those that pass get no contact, and where the normal has
+// turned till then the contacts of that place count.
 #pragma once
 
 #include <vector>
@@ -53,9 +53,9 @@ public:
 
 private:
     bool near(const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope) const;
-    /// found_ ← the points in the envelope at the place where the shapes come nearer than `meeting`, if they do.
-    void far(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b, double envelope,
-             double meeting);
+    /// found_ ← the points in the envelope at the place where the shapes come nearer than `distance`, if they do.
+    void advance_to(double distance, NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a,
+                    const Sweep& of_b, double envelope);
     /// found_ ← what is left of it where the shapes pass, or meet elsewhere.
     void keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                          double envelope);

@@ -35,6 +35,11 @@ namespace delassus {
 // (docs/references.md). Where the embedded method is of an order p̂ below p − 1, its error ĉ h^{p̂+1} says more than it
 // should: the error at a fixed time falls as h^p, so that the bound is the tolerance (in m and rad) to the power
 // (p̂ + 1)/p.
+//
+// A bound in metres says nothing of a motion that is smaller: a mass on a spring that moves by 1 µm had steps as long
+// as the method is stable for, and half its amplitude. So with `of_way` the bound of a coordinate is a share of the
+// longest way that it has gone from where it began, and no more than of its size. What moves a thousandth as far as
+// another coordinate has that as its way: off the plane of a mechanism there is rounding only.
 
 namespace {
 
@@ -50,6 +55,10 @@ constexpr double rounding_of_step = 1e-9;
 constexpr double faint_impact = 0.1;
 /// Of a speed that a contact should not have: what the step errs by, and its halves do not see.
 constexpr double share_of_wrong_speed = 0.25;
+/// Of the longest way of all coordinates.
+constexpr double least_of_ways = 1e-3;
+/// Of positions, and of 1 for those of about 0: what they cannot be known better than.
+constexpr double rounding_of_positions = 1e-13;
 /// Of the longest step: whose error may be made at an edge.
 constexpr double share_of_event = 0.01;
 /// Of the longest step: rates over it are those of an instant, and their rounding is small.
@@ -114,6 +123,9 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
             "oscillate for ever, and no step would be short enough; take hht, generalized_alpha or euler_implicit, or "
             "give a fixed \"step\"");
     if (!(control.slow > 0.0)) control_.slow = control.absolute;
+    control_.of_way = control.of_way && embedded_ && !stepper.damps_at_once();
+    if (control_.of_way) gone_.assign(static_cast<std::size_t>(system.n()), 0.0);
+    longest_ = way_ = gone_;
     stepper.choose_steps(std::min(control.absolute, control_.slow));
 }
 
@@ -134,17 +146,39 @@ double AdaptiveStepping::error_of(const State& begin, const State& whole, const 
     return worst;
 }
 
-double AdaptiveStepping::error_of(const State& begin, const State& end, const EmbeddedError& error, double h) const {
+double AdaptiveStepping::error_of(const State& begin, const State& end, const EmbeddedError& error, double h) {
     const double exponent = (stepper_.embedded_order() + 1.0) / stepper_.order();
+    const bool of_way = control_.of_way && h > (1.0 + rounding_of_step) * control_.smallest;
+    double least = 0.0, known = 0.0;
+    if (of_way) {
+        system_.difference(begin.q.data(), end.q.data(), way_.data());
+        for (std::size_t i = 0; i < gone_.size(); ++i) least = std::max(least, least_of_ways * longest_way(i));
+        known = rounding_of_positions;
+        for (const double position : end.q) known = std::max(known, rounding_of_positions * std::abs(position));
+    }
     double worst = 0.0;
     for (std::size_t i = 0; i < error.positions.size(); ++i) {
         const double speed = std::max(std::abs(begin.v[i]), std::abs(end.v[i]));
         const double share = control_.absolute + control_.relative * speed / size(i);
-        const double allowed = share_of_step * size(i) * std::pow(share, exponent);
+        const double range = of_way ? std::min(std::max(longest_way(i), least), size(i)) : size(i);
+        const double allowed = std::max(share_of_step * range * std::pow(share, exponent), known);
         const double ratio = std::max(std::abs(error.positions[i]), h * std::abs(error.velocities[i])) / allowed;
         worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
     }
     return worst;
+}
+
+double AdaptiveStepping::longest_way(std::size_t velocity) const {
+    return std::max(longest_[velocity], std::abs(gone_[velocity] + way_[velocity]));
+}
+
+void AdaptiveStepping::go(const State& begin, const State& end) {
+    if (!control_.of_way) return;
+    system_.difference(begin.q.data(), end.q.data(), way_.data());
+    for (std::size_t i = 0; i < gone_.size(); ++i) {
+        longest_[i] = longest_way(i);
+        gone_[i] += way_[i];
+    }
 }
 
 void AdaptiveStepping::extrapolate(const State& whole, State& halves) const {
@@ -382,7 +416,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
             throw StepFailure(
                 fmt::format("the step fell below {:.3g} at t = {:.9g}; {}", control_.smallest, state.t, failure));
         };
-        if (smallest && !unilateral_) fell_below();
+        if (smallest && !unilateral_ && !control_.of_way) fell_below();
         const double tried = std::max(proposed, control_.smallest), remaining = end - state.t;
         double h = remaining <= (1.0 + rounding_of_step) * tried ? remaining
                    : remaining < 2.0 * tried                     ? 0.5 * remaining
@@ -435,6 +469,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
         report_.step.contacts = std::move(trial.second.contacts);
         report_.step.multipliers = std::move(trial.second.multipliers);
         report_.h = h;
+        go(state, trial.end);
         state = std::move(trial.end);
         if (h == remaining) state.t = end;
         return std::move(report_);
@@ -469,14 +504,23 @@ double AdaptiveStepping::strictness(double h) const {
 }
 
 std::vector<double> AdaptiveStepping::save() const {
-    return {next_, last_error_, impacts_};
+    std::vector<double> memory = {next_, last_error_, impacts_};
+    memory.insert(memory.end(), gone_.begin(), gone_.end());
+    memory.insert(memory.end(), longest_.begin(), longest_.end());
+    return memory;
 }
 
 void AdaptiveStepping::load(const std::vector<double>& memory) {
-    if (memory.size() != 3) throw InputError("the memory of the step control must have three numbers");
+    const std::size_t n = gone_.size();
+    if (memory.size() != 3 + 2 * n)
+        throw InputError(
+            fmt::format("the memory of the step control has {} numbers, not {}", memory.size(), 3 + 2 * n));
     next_ = memory[0];
     last_error_ = memory[1];
     impacts_ = memory[2];
+    const auto ways = memory.begin() + 3;
+    gone_.assign(ways, ways + static_cast<std::ptrdiff_t>(n));
+    longest_.assign(ways + static_cast<std::ptrdiff_t>(n), memory.end());
 }
 
 }  // namespace delassus

@@ -47,6 +47,8 @@ namespace {
 
 /// h ω up to which the trapezoidal rule has a faint error of the fastest motion.
 constexpr double rate_of_faint_error = 2.0;
+/// Of the change of a velocity by impacts, beyond which it says no acceleration.
+constexpr double mostly = 0.5;
 /// The same where steps are divided until their error is small; they resolve no faster vibrations.
 constexpr double rate_that_errors_show = 100.0;
 
@@ -89,7 +91,7 @@ void ThetaMethod::restart() {
     multipliers_.clear();
     contacts_.restart();
     for (auto& change : changes_) change.clear();
-    unsure_.clear();
+    struck_.clear();
     error_.forget();
     left_.clear();
     last_h_ = 0.0;
@@ -97,7 +99,7 @@ void ThetaMethod::restart() {
 
 void ThetaMethod::forces_jumped() {
     for (auto& change : changes_) change.clear();
-    unsure_.clear();
+    struck_.clear();
     error_.forget();
 }
 
@@ -108,7 +110,7 @@ StepMemory ThetaMethod::memory() const {
     memory.of_columns.assign(changes_.begin(), changes_.end());
     for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
     memory.of_columns.push_back(left_);
-    memory.of_columns.push_back(unsure_);
+    memory.of_columns.push_back(struck_);
     memory.of_columns.push_back(contacts_.resolution().left());
     memory.of_rows = {multipliers_};
     memory.impulses = contacts_.kept();
@@ -123,7 +125,7 @@ void ThetaMethod::set_memory(StepMemory&& memory) {
     error_.load(std::span(memory.of_columns).subspan(changes_.size(), error_.kept()));
     const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + error_.kept());
     left_ = std::move(rest[0]);
-    unsure_ = std::move(rest[1]);
+    struck_ = std::move(rest[1]);
     contacts_.resolution().load(std::move(rest[2]));
     multipliers_ = std::move(memory.of_rows.at(0));
     contacts_.keep(std::move(memory.impulses));
@@ -150,7 +152,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     } else {
         iterate(state, h, solver, report);
     }
-    contacts_.add_turned_impulses(solution_.lambda);
+    contacts_.add_known_impulses(solution_.lambda);
     contacts_.drop_negligible(problem_, solution_);
 
     result_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
@@ -167,7 +169,8 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
     if (struck && m_ > 0) projection_.project_velocities(end_, problem_.H, solver, report);
     if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
-    if (settings_.linearly_implicit && !contacts_.follows_impacts()) remember_change(result_, struck, h);
+    mark_struck(struck);
+    if (settings_.linearly_implicit && !contacts_.follows_impacts()) remember_change(result_, h);
     last_h_ = h;
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;
@@ -230,31 +233,39 @@ void ThetaMethod::extrapolate(double h) {
 
 // What positions lack by impacts (VelocityContacts::find_impacts()), added to the end of the step. Of what moves after
 // an impact in the step before, the guess ṽ may not know what holds it since; v is what it would be then. The nearer
-// one to v⁺ counts, by which nothing moves too far.
+// one to v⁺ counts, by which nothing moves too far. Not in the parts of a step that is cut between impacts, each of
+// which follows one.
 void ThetaMethod::move_late(double h) {
     for_each_vector([&](std::int32_t first, std::int32_t size) {
         const auto k = static_cast<std::size_t>(first);
         auto change = delta_.segment(first, size);
         change = result_.segment(first, size) - smooth_.segment(first, size);
         const auto held = result_.segment(first, size) - free_.segment(first, size);
-        if (!unsure_.empty() && unsure_[k] != 0.0 && held.squaredNorm() < change.squaredNorm()) change = held;
+        if (settings_.linearly_implicit && !contacts_.follows_impacts() && !struck_.empty() && struck_[k] > mostly &&
+            held.squaredNorm() < change.squaredNorm())
+            change = held;
         change *= contacts_.on_velocities()[k].late * h;
     });
     system_.increment(end_.q.data(), delta_.data(), end_.q.data());
 }
 
+/// The share of impacts in what the step changes each velocity by.
+void ThetaMethod::mark_struck(bool struck) {
+    struck_.assign(static_cast<std::size_t>(n_), 0.0);
+    if (!struck) return;
+    for (std::size_t k = 0; k < struck_.size(); ++k) struck_[k] = std::max(contacts_.on_velocities()[k].share, 0.0);
+}
+
 // What an impact changes at once is no acceleration: there the last ones stay.
-void ThetaMethod::remember_change(const Vector& result, bool struck, double h) {
+void ThetaMethod::remember_change(const Vector& result, double h) {
     const auto n = static_cast<std::size_t>(n_);
     std::vector<double>& last = changes_[0];
     std::vector<double>& before = changes_[1];
     if (!last.empty()) before.resize(n);
     last.resize(n);
-    unsure_.resize(n);
     for (std::int32_t i = 0; i < n_; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        unsure_[k] = struck && contacts_.on_velocities()[k].share > 0.5 ? 1.0 : 0.0;
-        if (unsure_[k] != 0.0) continue;
+        if (struck_[k] > mostly) continue;
         if (!before.empty()) before[k] = last[k];
         last[k] = (result[i] - free_[i]) / h;
     }
@@ -306,7 +317,7 @@ void ThetaMethod::linearize(const State& begin, double h) {
     problem_.a.assign(force_.begin(), force_.end());
     system_.multiply_mass(at_theta_, 1.0, back_.data(), problem_.a.data());
     problem_.H.multiply_add(1.0, guess_.data(), problem_.a.data());
-    contacts_.add_turned_impulses(problem_);
+    contacts_.add_known_impulses(problem_);
     if (m_ > 0) set_constraint_rows(begin, h);
 }
 
@@ -469,7 +480,7 @@ void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
-    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)});
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, last_h_, struck_);
     timed_ = true;
 }
 
@@ -489,7 +500,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     };
     if (contacts_.any()) {
         time_meetings(begin, h, solver, report);
-        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_, unsure_);
+        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_, struck_);
     }
     linearize_at_guess();
     if (!found()) return;

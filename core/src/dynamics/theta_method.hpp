@@ -57,7 +57,8 @@ private:
     template <class Act>
     void for_each_vector(const Act& act) const;
     void move_late(double h);
-    void remember_change(const Vector& result, bool struck, double h);
+    void mark_struck(bool struck);
+    void remember_change(const Vector& result, double h);
     void resolve_up_to(double h);
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
@@ -92,7 +93,7 @@ private:
     StepError error_;
     StepRequest request_{.warm_start = true};
     std::vector<std::pair<std::int32_t, std::int32_t>> vectors_;  ///< first velocities and sizes, ascending
-    std::vector<double> unsure_;  ///< 1: of the velocity the last step says no acceleration; n, or empty
+    std::vector<double> struck_;  ///< the share of impacts in the change of each velocity in the last step; n, or empty
     std::vector<double> left_;    ///< by the last solve, in the norm of the masses, n, or empty
     bool chooses_steps_ = false;  ///< steps are chosen by their error
     MatrixAssembler H_, D_;

@@ -340,12 +340,14 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.along_normal = block.along_normal();
         const ContactPoint* point = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
         contact.pushed = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
-        contact.last = contact.pushed ? lambda[first_row_ + row] : 0.0;
+        if (contact.pushed && contact.along_normal)
+            std::copy_n(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_ + row), std::min<std::size_t>(size, 3),
+                        contact.last.begin());
         const Before* before = find_before(block.key);
         if (before && before_.blocks()[before->block].cone.rows != block.cone.rows) before = nullptr;
         if (before) {
             contact.before = before->row;
-            contact.known = true;
+            contact.was_there = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
             const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
@@ -404,7 +406,8 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
             }
             if (i == 0) continue;
             squares += (here + b) * (here + b);
-            if (settings_.once && contact.known) along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
+            if (settings_.once && contact.was_there)
+                along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
         }
         double& b = problem.b[first];
         b += contact.normal;
@@ -494,6 +497,7 @@ bool VelocityContacts::only_take() {
         changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
         contact.turns = contact.strikes = false;
         contact.impact.reset();
+        contact.known = {};
         contact.moved = contact.wanted = 0.0;
         contact.sliding = -1.0;
         const double gap = contact.resolved_gap();
@@ -555,13 +559,20 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         if (settings_.once && speed <= 0.25 * contact.change) continue;
         note_impact(rows_.blocks()[k], gap, contact.approach, contact.pushed, h_, settings_.restitution_speed, report);
     }
-    kept_.keep(rows_.blocks(), rows_.contacts(), std::span(lambda).subspan(first_row_));
+    // What pushed until an impact alone does not push any more.
+    ended_.assign(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_), lambda.end());
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& contact = contacts_[k];
+        if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0])
+            std::fill_n(ended_.begin() + static_cast<std::ptrdiff_t>(contact.row), rows_.blocks()[k].cone.rows, 0.0);
+    }
+    kept_.keep(rows_.blocks(), rows_.contacts(), ended_);
     const std::size_t first_contact = contacts_.size() - rows_.contacts().size();
     for (std::size_t k = 0; k < rows_.contacts().size(); ++k) {
         // Of a contact that nobody knew at the beginning the gap follows from its speed: it was no deeper than the
         // others.
         const Contact& contact = contacts_[first_contact + k];
-        rows_.contacts()[k].gap = contact.known ? contact.gap : std::max(contact.gap, deepest_);
+        rows_.contacts()[k].gap = contact.was_there ? contact.gap : std::max(contact.gap, deepest_);
     }
     report.contacts.swap(rows_.contacts());
 }

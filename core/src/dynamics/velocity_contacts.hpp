@@ -63,20 +63,22 @@ public:
     /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
     void take_out_open(Problem& problem) const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
-    /// the velocities at the end of the step without impacts, n.
-    void time_meetings(Problem& problem, std::span<const double> smooth);
+    /// the velocities at the end of the step without impacts, n. last_h, last_struck: as of time_turns().
+    void time_meetings(Problem& problem, std::span<const double> smooth, double last_h,
+                       std::span<const double> last_struck);
     /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
     [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
     void let_slide_on(Problem& problem) const;
     /// What turns round within the step gets the bounds of that time. sliding: the velocities at the end of the step if
-    /// it slid on, n; last_h: the size of the step before; struck: not 0 of velocities that an impact changed in it, n
-    /// or empty.
-    void time_turns(Problem& problem, std::span<const double> sliding, double last_h, std::span<const double> struck);
-    /// problem.a += Dᵀ of what friction did until it turned round.
-    void add_turned_impulses(Problem& problem) const;
+    /// it slid on, n; last_h: the size of the step before; last_struck: the share of impacts in what it
+    /// changed each velocity by, n or empty.
+    void time_turns(Problem& problem, std::span<const double> sliding, double last_h,
+                    std::span<const double> last_struck);
+    /// problem.a += Dᵀ of what contacts did until an impact or until their friction turned round.
+    void add_known_impulses(Problem& problem) const;
     /// lambda of the whole problem += the same.
-    void add_turned_impulses(std::vector<double>& lambda) const;
+    void add_known_impulses(std::vector<double>& lambda) const;
     /// b for a guess of the velocities at the end, n. `iteration` counts from 0: late ones only lower De Saxcé's terms.
     /// solution: of the last iteration; natural_error: of the solves so far.
     void set_b(Problem& problem, const Solution& solution, std::span<const double> guess, int iteration,
@@ -144,7 +146,7 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
-        bool known = false;             ///< it is in before_
+        bool was_there = false;         ///< it is in before_
         bool turns = false;             ///< b has what its rows turn until the end of the step
         bool nearly_as_before = false;  ///< it is known, and its rows turn as a smooth motion lets them
         bool met_on_the_way = false;    ///< its rows in before_ are those of the meeting
@@ -164,9 +166,9 @@ private:
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool strikes = false;                        ///< b is that of an impact
         std::optional<Impact> impact;                ///< it strikes at a time within the step
-        double struck = HUGE_VAL;        ///< when an impact first strikes one of the bodies of an open contact
-        double last = 0.0;               ///< its impulse in the step before, where it pushed
-        std::array<double, 2> turned{};  ///< of friction, until it turned round
+        double struck = HUGE_VAL;       ///< when an impact first strikes one of its bodies, if it has none itself
+        std::array<double, 3> last{};   ///< its impulse in the step before, where it pushed
+        std::array<double, 3> known{};  ///< of this step's, until an impact or until friction turned round
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -195,8 +197,10 @@ private:
     bool take_rows_at(double time, std::size_t block, Problem& problem);
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
-    /// Contact::struck, and what follows for b.
-    void find_struck(const Problem& problem);
+    /// Contact::struck, and what follows for b and for what pushes.
+    void find_struck(const Problem& problem, double last_h, std::span<const double> last_struck);
+    /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.
+    [[nodiscard]] bool was_struck(const Problem& problem, const Contact& contact, std::span<const double> shares) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;
@@ -218,6 +222,7 @@ private:
     };
     std::vector<Sum> sums_;           // of what acts on velocities, by weights
     std::vector<std::size_t> found_;  // velocities
+    std::vector<double> ended_;       // of the rows at the end of the step: what acts on
     std::vector<double> struck_;      // of each velocity, when an impact first changes it; empty where there is none
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end

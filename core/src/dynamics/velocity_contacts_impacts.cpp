@@ -117,15 +117,16 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate,
 // whose means are those of times θ h/2 apart; the speed at the beginning is that with the rate of this instant. The row
 // of the meeting, which stays, meets at the same time from another gap.
-void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth) {
+void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth, double last_h,
+                                     std::span<const double> last_struck) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
         double gap = contact.resolved_gap();
         const bool bounces = block.restitution > 0.0;
         if (!contact.along_normal || (!bounces && contact.pushed)) continue;
-        const double rate = contact.known && !contact.met_on_the_way ? before_.rows()[contact.before].rate
-                                                                     : rows_.rows()[contact.row].rate;
+        const double rate = contact.was_there && !contact.met_on_the_way ? before_.rows()[contact.before].rate
+                                                                         : rows_.rows()[contact.row].rate;
         const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
         double speed = -contact.approach - 0.5 * h_ * pull;
         if (contact.pushes_on((1.0 - theta_) * h_ * speed)) continue;
@@ -139,7 +140,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
                            : speed < -h_ * std::abs(acceleration()) - contact.resolution / h_;
         };
         if (!bounces && gap <= 0.0 && !strikes()) {
-            if (contact.known) take_rates_of_end(contact, block);
+            if (contact.was_there) take_rates_of_end(contact, block);
             continue;
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
@@ -172,13 +173,18 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             contact.recovery = 0.0;
         }
     }
-    find_struck(problem);
+    find_struck(problem, last_h, last_struck);
 }
 
 // An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ), but no less
 // than u⁻: where the contact opens at first, its work P (u⁻ + u⁺)/2 would gain energy.
-void VelocityContacts::find_struck(const Problem& problem) {
-    constexpr double shortest_rest = 1e-9;
+//
+// One that pushed goes on as it did until τ, whether the impact opens it or not: the share τ/h of the impulse of the
+// step before is known, unless an impact was in that, or the step was of quite another size, as one for an impact is. A
+// block that rocks from one edge to the other stands on the first one until then; with P = 0 there, as u⁺ > 0 asks for,
+// the second would carry it for the whole step, which takes h g b/k² of its rotation at each impact.
+void VelocityContacts::find_struck(const Problem& problem, double last_h, std::span<const double> last_struck) {
+    constexpr double shortest_rest = 1e-9, like = 2.0;
     const auto& D = problem.D;
     struck_.clear();
     const auto for_each_column = [&](const Contact& contact, const auto& act) {
@@ -193,10 +199,16 @@ void VelocityContacts::find_struck(const Problem& problem) {
     if (struck_.empty()) return;
     for (Contact& contact : contacts_) {
         const double gap = contact.resolved_gap();
-        if (!contact.along_normal || contact.impact || contact.pushed || !(gap > 0.0)) continue;
+        if (!contact.along_normal || contact.impact || (!contact.pushed && !(gap > 0.0))) continue;
         for_each_column(contact,
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
         if (!(contact.struck < h_)) continue;
+        if (contact.pushed) {
+            if (last_h < like * h_ && h_ < like * last_h && !was_struck(problem, contact, last_struck))
+                for (std::size_t i = 0; i < contact.known.size(); ++i)
+                    contact.known[i] = contact.struck / last_h * contact.last[i];
+            continue;
+        }
         const double then = std::max(gap - contact.approach * contact.struck, 0.0);
         contact.normal = std::max(then / std::max(h_ - contact.struck, shortest_rest * h_), -contact.approach);
     }
@@ -241,7 +253,7 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
     for (const Contact& contact : contacts_) {
         const std::size_t first = first_row_ + contact.row;
         if (!acts(contact)) continue;
-        const double share = std::max(1.0 - contact.last / solution.lambda[first], 0.0);
+        const double share = std::max(1.0 - contact.last[0] / solution.lambda[first], 0.0);
         const OnVelocity value{share, share * (1.0 - theta_ - contact.impact->acts / h_)};
         for_each_entry(D, first, 1,
                        [&](std::size_t, std::size_t column, double) { add(column, value, solution.lambda[first]); });
@@ -299,8 +311,8 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
         const Contact& contact = contacts_[k];
         const std::size_t row = first_row_ + contact.row;
         const double gap = contact.resolved_gap(), closing = contact.change - contact.end_speed;
-        if (!(contact.struck < h_) || rows_.blocks()[k].restitution == 0.0 || !(solution.lambda[row] > 0.0) ||
-            !(closing > 0.0))
+        if (contact.pushed || !(contact.struck < h_) || rows_.blocks()[k].restitution == 0.0 ||
+            !(solution.lambda[row] > 0.0) || !(closing > 0.0))
             continue;
         const double e = rows_.blocks()[k].restitution, mobility = contact.change / solution.lambda[row];
         if (0.5 * e * e * closing * closing <= faint * mobility * kinetic() || is_loaded(row)) continue;
@@ -351,8 +363,18 @@ double VelocityContacts::sliding_speed(std::size_t block) const {
     const UnilateralRows::Block& own = rows_.blocks()[block];
     const bool bounded = own.cone.kind == ConeKind::Box && own.cone.rows == 1 && std::isfinite(own.cone.lo[0]) &&
                          std::isfinite(own.cone.hi[0]);
-    if (!bounded || contact.servo || !contact.known) return 0.0;
+    if (!bounded || contact.servo || !contact.was_there) return 0.0;
     return speed_at_begin(contact.row, contact.before);
+}
+
+bool VelocityContacts::was_struck(const Problem& problem, const Contact& contact,
+                                  std::span<const double> shares) const {
+    constexpr double faint = 0.05;
+    bool found = false;
+    for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) {
+        found = found || (!shares.empty() && shares[column] > faint);
+    });
+    return found;
 }
 
 bool VelocityContacts::any_turns_round(const Problem& problem, const Solution& solution) const {
@@ -380,16 +402,9 @@ void VelocityContacts::let_slide_on(Problem& problem) const {
 }
 
 void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding, double last_h,
-                                  std::span<const double> struck) {
+                                  std::span<const double> last_struck) {
     const auto slides_back = [&](std::size_t row, double change, double both) {
         return change > both * coupling(problem.D, diagonal_, first_row_ + row, first_row_ + row);
-    };
-    const auto was_struck = [&](const Contact& contact) {
-        bool found = false;
-        for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) {
-            found = found || (!struck.empty() && struck[column] != 0.0);
-        });
-        return found;
     };
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
@@ -405,7 +420,8 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
             continue;
         }
-        const bool stays = contact.pushed && contact.known && !contact.impact && last_h > 0.0;
+        const bool stays =
+            contact.pushed && contact.was_there && !contact.impact && !(contact.known[0] > 0.0) && last_h > 0.0;
         if (cone.kind != ConeKind::Friction || !stays) continue;
         const auto axes = static_cast<std::size_t>(cone.rows) - 1;
         std::array<double, 2> before{};
@@ -415,29 +431,29 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             squares += before[i] * before[i];
             along += before[i] * end_speed(1 + i);
         }
-        if (!(along < 0.0) || was_struck(contact)) continue;
-        const double size = std::sqrt(squares), force = cone.parameters[0] * contact.last * h_ / last_h;
+        if (!(along < 0.0) || was_struck(problem, contact, last_struck)) continue;
+        const double size = std::sqrt(squares), force = cone.parameters[0] * contact.last[0] * h_ / last_h;
         if (!slides_back(contact.row + 1, size - along / size, 2.0 * force)) continue;
         const double share = squares / (squares - along);  // τ/h
-        for (std::size_t i = 0; i < axes; ++i) contact.turned[i] = -share * force * before[i] / size;
+        for (std::size_t i = 0; i < axes; ++i) contact.known[1 + i] = -share * force * before[i] / size;
         cone.parameters[0] *= 1.0 - share;
     }
 }
 
-void VelocityContacts::add_turned_impulses(Problem& problem) const {
+void VelocityContacts::add_known_impulses(Problem& problem) const {
     for (const Contact& contact : contacts_)
-        for (std::size_t i = 0; i < contact.turned.size(); ++i)
-            if (contact.turned[i] != 0.0)
-                for_each_entry(problem.D, first_row_ + contact.row + 1 + i, 1,
+        for (std::size_t i = 0; i < contact.known.size(); ++i)
+            if (contact.known[i] != 0.0)
+                for_each_entry(problem.D, first_row_ + contact.row + i, 1,
                                [&](std::size_t, std::size_t column, double value) {
-                                   problem.a[column] += value * contact.turned[i];
+                                   problem.a[column] += value * contact.known[i];
                                });
 }
 
-void VelocityContacts::add_turned_impulses(std::vector<double>& lambda) const {
+void VelocityContacts::add_known_impulses(std::vector<double>& lambda) const {
     for (const Contact& contact : contacts_)
-        for (std::size_t i = 0; i < contact.turned.size(); ++i)
-            if (contact.turned[i] != 0.0) lambda[first_row_ + contact.row + 1 + i] += contact.turned[i];
+        for (std::size_t i = 0; i < contact.known.size(); ++i)
+            if (contact.known[i] != 0.0) lambda[first_row_ + contact.row + i] += contact.known[i];
 }
 
 }  // namespace delassus

@@ -59,14 +59,15 @@ void check_shape(const Shape& shape, const std::string& who, const KindRow& row,
                         who, shape.margin, smallest));
     }
     if (shape.kind == ShapeKind::Plane && shape.body >= 0 && !setup.fixed[shape.body]) {
-        throw InputError(fmt::format(
-            "{}: body {} moves; planes are for fixed bodies and the world only; use a box here.", who, shape.body));
+        throw InputError(
+            fmt::format("{}: body {} moves; planes are for fixed bodies and the world only; use a box here.", who,
+                        setup.name_of(shape.body)));
     }
     if (shape.kind == ShapeKind::Terrain || shape.kind == ShapeKind::HeightField) {
         if (shape.body >= 0 && !setup.fixed[shape.body]) {
             throw InputError(fmt::format(
                 "{}: body {} moves; terrain is for fixed bodies and the world only; use convex shapes here.", who,
-                shape.body));
+                setup.name_of(shape.body)));
         }
         if (shape.mesh == nullptr) throw InputError(fmt::format("{}: it has no mesh.", who));
         check_terrain(*shape.mesh, who);
@@ -79,6 +80,11 @@ void check_shape(const Shape& shape, const std::string& who, const KindRow& row,
 }
 
 }  // namespace
+
+std::string CollisionSetup::name_of(std::int32_t body) const {
+    const auto number = static_cast<std::size_t>(body);
+    return number < names.size() ? fmt::format("\"{}\"", names[number]) : std::to_string(body);
+}
 
 void check_collision_setup(const CollisionSetup& setup) {
     for (std::size_t i = 0; i < setup.shapes.size(); ++i) {

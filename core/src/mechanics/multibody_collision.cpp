@@ -102,6 +102,7 @@ void MultibodySystem::Implementation::make_detector() {
     for (const auto& body : bodies) {
         setup.fixed.push_back(body.column < 0 && !body.prescribed);
         setup.group.push_back(prescribed.empty() || body.column >= 0 ? -1 : 1);
+        setup.names.push_back(body.parameters.name);
     }
     for (const auto& node : nodes) {
         setup.fixed.push_back(!node.moves());

@@ -62,6 +62,7 @@ void Simulation::make_method() {
     const bool by_accuracy = system_->steps_by_accuracy && !std::isfinite(named);
     if (by_accuracy || std::isfinite(named)) {
         StepControl control = control_within(by_accuracy ? system_->accuracy : named, system_->step);
+        control.of_way = !by_accuracy;
         if (by_accuracy) {
             SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
             control.sizes = std::move(sizes.of_velocities);
