@@ -62,7 +62,10 @@ void VelocityContacts::take_out_open(Problem& problem) const {
     const bool compliant = problem.E.rows > 0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
-        const bool keeps = !contact.along_normal || contact.pushes_on((1.0 - theta_) * h_ * contact.approach);
+        // What the turn of its rows leaves of the speed of one that pushes does not open it; one that bounced may be
+        // open.
+        const bool keeps = !contact.along_normal || (contact.pushed && rows_.blocks()[k].restitution == 0.0) ||
+                           contact.pushes_on((1.0 - theta_) * h_ * contact.approach);
         if (keeps) problem.cones[cone++] = problem.cones[bilateral_cones_ + k];
         for (std::int32_t i = 0; i < rows_.blocks()[k].cone.rows; ++i, ++row) {
             if (!keeps) continue;
