@@ -2,6 +2,7 @@
 // Shapes that move farther in a step than the envelope, and boxes whose faces nearly meet.
 #include <numbers>
 
+#include "delassus/error.hpp"
 #include "scene.hpp"
 
 #ifdef DELASSUS_HAS_FCL
