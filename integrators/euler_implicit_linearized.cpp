@@ -143,7 +143,7 @@ private:
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
-        if (linearization_.wanted()) judge_linearization(state, h, report);
+        if (linearization_.wanted()) judge_linearization(state, h, solver, report);
         report_reactions(solution_.lambda, h, report);
         keep(solution_.lambda, h);
         report.contacts.swap(rows_.contacts());
@@ -276,7 +276,7 @@ private:
 
     // The impulse of the forces as the linear model has them, h f − h² K v⁺ − h R (v⁺ − v), is a + M (v⁺ − v) − M v⁺
     // less what else stands in H v⁺: a − H v⁺ + h² G v⁺ + M (v⁺ − v), with a and H as they were assembled.
-    void judge_linearization(const State& begin, double h, StepReport& report) {
+    void judge_linearization(const State& begin, double h, StepSolver& solver, StepReport& report) {
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = end_.v[i] - begin.v[i];
         impulse_.assign(problem_.a.begin(), problem_.a.end());
         problem_.H.multiply_add(-1.0, end_.v.data(), impulse_.data());
@@ -290,7 +290,7 @@ private:
                 for (std::int32_t i = 0; i < 3; ++i)
                     force_[spins_[k].column + i] += spins_[k].impulse[i] - h * end_spins_[k].torque[i];
         }
-        linearization_.judge(begin, end_, h, force_, impulse_, problem_.H, "euler_implicit_linearized", report);
+        linearization_.judge(begin, end_, h, force_, impulse_, problem_.H, "euler_implicit_linearized", solver, report);
     }
 
     // D takes its arrays from the unilateral rows where there are no others.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "delassus/adaptive_stepping.hpp"
@@ -182,9 +181,7 @@ private:
     }
 
     [[nodiscard]] double energy_norm(const State& at, const std::vector<double>& v) {
-        acceleration_.assign(v.size(), 0.0);
-        system_.multiply_mass(at, 1.0, v.data(), acceleration_.data());
-        return std::sqrt(std::max(std::inner_product(v.begin(), v.end(), acceleration_.begin(), 0.0), 0.0));
+        return std::sqrt(std::max(2.0 * kinetic_energy(system_, at, v, acceleration_), 0.0));
     }
 
     /// now_ ← after a step of the contact method, which may be as short as its error wants it. Its size.
@@ -203,7 +200,6 @@ private:
                 std::swap(now_, next);
                 return tried;
             }
-            contact_.restart();
             contact_.load(memory);
             longest_ = std::max(tried * std::max(0.9 / std::sqrt(error), 0.25), least);
             tried = tried / std::ceil(tried / longest_);
@@ -322,16 +318,13 @@ private:
     // ---- Flight ----
 
     AdaptiveStepping& control(double h) {
-        constexpr double smallest = 1e-6, largest = 1e6;
+        constexpr double largest = 1e6;
         if (!control_) {
             control_step_ = h;
-            control_ = std::make_unique<AdaptiveStepping>(system_, *flight_,
-                                                          StepControl{.absolute = limit_,
-                                                                      .initial = h,
-                                                                      .smallest = smallest * h,
-                                                                      .largest = largest * h,
-                                                                      .finds_impacts = false,
-                                                                      .of_way = true});
+            StepControl control = StepControl::within(limit_, h);
+            control.largest = largest * h;
+            control.finds_impacts = false;
+            control_ = std::make_unique<AdaptiveStepping>(system_, *flight_, control);
         }
         return *control_;
     }

@@ -26,7 +26,8 @@
 #include "guards.hpp"
 #include "python_system.hpp"
 #include "scenes.hpp"
-#include "simulation/fixed_step.hpp"
+#include "simulation/stepping.hpp"
+#include "support/finite.hpp"
 
 namespace delassus::python {
 
@@ -46,18 +47,18 @@ public:
         if (named.name.empty()) named.name = "auto";
         check_solver(*registry_, named);
         state_ = system_.initial_state();
-        timestepper_ = make_timestepper(set_.integrator, system_, set_.integrator_options);
-        if (set_.control) {
-            control_ = std::make_unique<AdaptiveStepping>(system_, *timestepper_, *set_.control);
-        } else if (const double limit = timestepper_->error_limit(); std::isfinite(limit)) {
-            StepControl control = control_within(limit, set_.step);
-            control.of_way = true;
-            control_ = std::make_unique<AdaptiveStepping>(
-                system_, *timestepper_, control,
-                fmt::format("{} cannot follow the motion there; take an implicit method, or euler_implicit_linearized, "
-                            "which is less exact and may go on",
-                            set_.integrator));
-        }
+        SteppingSettings steps{
+            .step = set_.step,
+            .end = set_.end,
+            .chosen = set_.control,
+            .divided = std::nullopt,
+            .accuracy = set_.accuracy,
+            .advice = fmt::format("{} cannot follow the motion there; take an implicit method, or "
+                                  "euler_implicit_linearized, which is less exact and may go on",
+                                  set_.integrator),
+        };
+        stepping_ = std::make_unique<Stepping>(
+            system_, make_timestepper(set_.integrator, system_, set_.integrator_options), std::move(steps));
         measure(state_, record_);
     }
 
@@ -87,9 +88,7 @@ public:
         return record;
     }
 
-    [[nodiscard]] bool finished() const {
-        return set_.control ? state_.t >= set_.end : has_ended(state_.t, set_.end, set_.step);
-    }
+    [[nodiscard]] bool finished() const { return stepping_->ends(state_.t); }
     [[nodiscard]] const State& state() const { return state_; }
     [[nodiscard]] const StepRecord& record() const { return record_; }
     [[nodiscard]] const StepReport& report() const { return report_; }
@@ -107,38 +106,35 @@ private:
                 fmt::format("the simulation has reached its end, {} s: there is no further step", set_.end));
         const auto begin = std::chrono::steady_clock::now();
         const auto where = [&] { return fmt::format("step {} from t = {:.9g} s", record_.step + 1, state_.t); };
-        const std::vector<double> memory = timestepper_->save();
-        const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
         State next = state_;
         StepRecord record;
         AdaptiveStepReport taken;
         solver_->reset_effort();
         try {
-            advance(next, taken, record, memory);
-            const auto finite = [](const std::vector<double>& values) {
-                return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-            };
-            if (!finite(next.q) || !finite(next.v)) throw StepFailure("the state at the end of the step is not finite");
+            stepping_->advance(next, *solver_, taken);
+            if (!all_finite(next.q) || !all_finite(next.v))
+                throw StepFailure("the state at the end of the step is not finite");
             measure(next, record);
         } catch (const Unsupported& error) {
-            undo(memory, control);
+            stepping_->undo();
             throw Unsupported(fmt::format("{}: {}", where(), error.what()));
         } catch (const StepInterrupted&) {
-            undo(memory, control);
+            stepping_->undo();
             throw;
         } catch (const StepFailure& error) {
-            undo(memory, control);
+            stepping_->undo();
             throw StepFailure(fmt::format("{}: {}", where(), error.what()));
         } catch (const InputError& error) {
-            undo(memory, control);
+            stepping_->undo();
             throw StepFailure(fmt::format("{}: {}", where(), error.what()));
         } catch (...) {  // of the user's methods
-            undo(memory, control);
+            stepping_->undo();
             throw;
         }
         const SolverEffort& effort = solver_->effort();
         record.step = record_.step + 1;
         record.h = taken.h;
+        record.substeps = taken.substeps;
         record.rejected = taken.rejected;
         record.impact = taken.impact;
         record.contacts = taken.step.unilateral_blocks;
@@ -153,38 +149,6 @@ private:
         state_ = std::move(next);
         report_ = std::move(taken.step);
         return record_;
-    }
-
-    void advance(State& state, AdaptiveStepReport& taken, StepRecord& record, const std::vector<double>& memory) {
-        if (set_.control) {
-            taken = control_->step(state, set_.end, *solver_);
-            return;
-        }
-        const FixedStep step = fixed_step(state.t, set_.end, set_.step);
-        if (control_) {
-            const Parts parts = step_within_error(*control_, state, step.end, *solver_, taken.step);
-            record.parts = parts.taken;
-            taken.rejected = parts.rejected;
-        } else {
-            const auto take = [this](State& moved, double h, StepReport& report) {
-                solver_->forget_misses();
-                timestepper_->step(moved, h, *solver_, report);
-                solver_->require_usable();
-            };
-            try {
-                take(state, step.h, taken.step);
-            } catch (const StepTooLong& failure) {
-                record.parts = step_in_parts(*timestepper_, take, state_, memory, step.h, state, taken.step, failure);
-            }
-        }
-        taken.h = step.h;
-        state.t = step.end;
-    }
-
-    void undo(const std::vector<double>& memory, const std::vector<double>& control) {
-        timestepper_->restart();
-        timestepper_->load(memory);
-        if (control_) control_->load(control);
     }
 
     /// record ← what is known of a state. The system does not say what momentum is.
@@ -217,8 +181,7 @@ private:
     Turn turn_;
     State state_;
     std::unique_ptr<StepSolver> solver_;
-    std::unique_ptr<Timestepper> timestepper_;
-    std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the parts of fixed ones; or empty
+    std::unique_ptr<Stepping> stepping_;
     StepRecord record_;
     StepReport report_;  // of the last step
     UnilateralRows rows_;

@@ -43,7 +43,7 @@ TEST(Impact, EndsWhereTheMotionThroughAllOfThemEnds) {
           Case{0.01, 0.2, -500.0, 0.7, 2}, Case{0.001, -1.0, -1000.0, 0.95, 6}, Case{0.002, -0.5, -700.0, 1.0, 3},
           Case{0.01, -3.0, 100.0, 0.3, 1}, Case{0.0, 0.5, -200.0, 0.9, 3}}) {
         SCOPED_TRACE(fmt::format("{} {} {} {}", one.gap, one.speed, one.acceleration, one.restitution));
-        const auto impact = impact_within(h, one.gap, one.speed, one.acceleration, one.restitution);
+        const auto impact = impact_within(h, {one.gap, one.speed, one.acceleration}, one.acceleration, one.restitution);
         ASSERT_TRUE(impact);
         const End end = followed(h, one.gap, one.speed, one.acceleration, one.restitution);
         EXPECT_EQ(end.bounces, one.bounces);
@@ -54,7 +54,7 @@ TEST(Impact, EndsWhereTheMotionThroughAllOfThemEnds) {
 }
 
 TEST(Impact, ComesToRestWhereAllFlightsAreOver) {
-    const auto impact = impact_within(0.1, 0.001, -0.1, -9.81, 0.3);
+    const auto impact = impact_within(0.1, {0.001, -0.1, -9.81}, -9.81, 0.3);
     ASSERT_TRUE(impact);
     EXPECT_EQ(impact->end_speed, 0.0);
     const double alone = 0.001 + (-0.1 - 0.5 * 9.81 * 0.1) * 0.1;
@@ -62,11 +62,11 @@ TEST(Impact, ComesToRestWhereAllFlightsAreOver) {
 }
 
 TEST(Impact, IsNoneWhereTheContactDoesNotMeet) {
-    EXPECT_FALSE(impact_within(0.01, 0.02, -1.0, 0.0, 0.5));
-    EXPECT_FALSE(impact_within(0.01, 0.02, -1.0, 200.0, 0.5));
-    EXPECT_FALSE(impact_within(0.01, 0.005, -1.0, 200.0, 0.5)) << "turns round before";
-    EXPECT_FALSE(impact_within(0.01, 0.0, 0.0, -9.81, 0.5)) << "rests";
-    EXPECT_FALSE(impact_within(0.01, 0.0, 1.0, 9.81, 0.5));
+    EXPECT_FALSE(impact_within(0.01, {0.02, -1.0, 0.0}, 0.0, 0.5));
+    EXPECT_FALSE(impact_within(0.01, {0.02, -1.0, 200.0}, 200.0, 0.5));
+    EXPECT_FALSE(impact_within(0.01, {0.005, -1.0, 200.0}, 200.0, 0.5)) << "turns round before";
+    EXPECT_FALSE(impact_within(0.01, {0.0, 0.0, -9.81}, -9.81, 0.5)) << "rests";
+    EXPECT_FALSE(impact_within(0.01, {0.0, 1.0, 9.81}, 9.81, 0.5));
 }
 
 }  // namespace

@@ -101,8 +101,8 @@ TEST(Tolerance, GoesOnWithTheSameBits) {
         EXPECT_EQ(got.state.t, expected.state.t) << scene;
         EXPECT_EQ(got.state.q, expected.state.q) << scene;
         EXPECT_EQ(got.state.v, expected.state.v) << scene;
-        EXPECT_EQ(got.memory, expected.memory) << scene;
-        EXPECT_EQ(got.control, expected.control) << scene;
+        EXPECT_EQ(got.stepping.method, expected.stepping.method) << scene;
+        EXPECT_EQ(got.stepping.control, expected.stepping.control) << scene;
         EXPECT_EQ(got.totals.rejected, expected.totals.rejected) << scene;
         EXPECT_EQ(got.totals.impacts, expected.totals.impacts) << scene;
         EXPECT_EQ(got.totals.smallest_step, expected.totals.smallest_step) << scene;

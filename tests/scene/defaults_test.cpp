@@ -420,7 +420,7 @@ TEST(Defaults, ASoftBlockHitsTheGroundHard) {
         "test"));
     run.finish();
     const auto& totals = run.simulation.totals();
-    EXPECT_GT(totals.most_parts, 1);
+    EXPECT_GT(totals.most_substeps, 1);
     EXPECT_LE(totals.energy, totals.start_energy);
     EXPECT_EQ(totals.unsolved_steps, 0);
     for (std::int32_t node = 0; node < run.system().node_count(); ++node)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Elastic blocks and cables in scene files.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -158,6 +159,29 @@ double sag(const std::string& load, const std::string& keys = "") {
         ++count;
     }
     return -sum / count;
+}
+
+// A box that a hook lowers onto the floor by a cable, whose end weighs little: the cable goes slack.
+TEST(ElasticScene, ACableGoesSlackWhereItsLoadLands) {
+    for (const double h : {0.002, 0.005, 1.0 / 60.0}) {
+        Running run(parse_scene(
+            fmt::format(
+                "step: {:.17g}\nend: 3\nmaterials: {{m: {{friction: 0.5}}}}\nbodies:\n"
+                "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                "- {{name: hook, motion: {{translation: [0, 0, {{ramp: {{to: -1, start: 0.2, duration: 2, smoothness: "
+                "1}}}}]}}, position: [0, 0, 3]}}\n"
+                "- {{name: box, mass: 5, position: [0, 0, 0.9], shapes: [{{box: {{size: [0.4, 0.4, 0.4]}}, "
+                "material: m}}]}}\n"
+                "nodes: [{{name: n0, mass: 0.01, position: [0, 0, 3]}}, {{name: n1, mass: 0.01, position: [0, 0, "
+                "1.1]}}]\n"
+                "cables: [{{name: c, nodes: [n0, n1], young: 1e9, area: 1e-5, density: 1000, damping_time: 0.01}}]\n"
+                "attachments: [{{name: a0, body: hook, node: n0}}, {{name: a1, body: box, node: n1}}]\n",
+                h),
+            "s.yaml"));
+        run.finish();
+        EXPECT_NEAR(run.pose("box").position[2], 0.2, 1e-6) << h;
+        EXPECT_EQ(run.simulation.totals().unsolved_steps, 0) << h;
+    }
 }
 
 TEST(ElasticScene, ALoadOnAFaceBendsTheBar) {

@@ -250,5 +250,57 @@ TEST(ImpactMotion, ABlockRocksAsHousnerHasIt) {
             }
 }
 
+// A face that meets a wall at the very end of a step, where rounding lets one corner meet in it and another one after
+// it.
+TEST(ImpactMotion, AFaceMeetsWithAllItsCornersWhereAStepEnds) {
+    for (const double e : {1.0, 0.5})
+        for (const int steps : {13, 21, 30})
+            for (const double h : {1.0 / 60.0, 0.01, 0.007}) {
+                const double speed = 3.7, width = 0.37;
+                SCOPED_TRACE(fmt::format("e {}, {} steps of {}", e, steps, h));
+                auto run = run_of(fmt::format(
+                    "step: {:.17g}\nend: {:.17g}\nmaterials: {{m: {{friction: 0}}, w: {{friction: 0}}}}\n"
+                    "material_pairs: [{{first: m, second: w, friction: 0, restitution: {}}}]\nbodies:\n"
+                    "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                    "- {{name: wall, fixed: true, position: [{:.17g}, 0, 0.5], shapes: [{{box: {{size: [1, 4, "
+                    "3]}}, material: w}}]}}\n"
+                    "- {{name: box, mass: 1.5, position: [0, 0, 0.11], velocity: [{}, 0, 0], shapes: [{{box: "
+                    "{{size: [{}, 0.3, 0.22]}}, material: m}}]}}\n",
+                    h, (steps + 9) * h, e, 0.5 + 0.5 * width + speed * steps * h, speed, width));
+                run.finish();
+                const auto [v, omega] = run.velocities("box");
+                EXPECT_NEAR(v[0], -e * speed, 1e-9 * speed);
+                EXPECT_NEAR(v[2], 0.0, 1e-9 * speed);
+                EXPECT_NEAR(omega[1], 0.0, 1e-8 * speed);
+            }
+}
+
+// Friction turns round where a box that slides on the ground bounces off a wall: it comes back by e² u²/(2 μ g), u
+// being the speed with which it meets.
+TEST(ImpactMotion, FrictionTurnsRoundWhereABoxBouncesOffAWall) {
+    const double g = 9.81;
+    for (const char* method : {"", "integrator: moreau_jean\n"})
+        for (const auto& [v0, mu, e, way] :
+             {std::tuple(1.0, 0.3, 0.8, 0.1019), {6.0, 0.2, 0.6, 2.31}, {2.0, 0.5, 0.0, 0.2}})
+            for (const double h : {0.02, 1.0 / 60.0, 0.0073}) {
+                SCOPED_TRACE(fmt::format("{}{} m/s, step {}", method, v0, h));
+                auto run = run_of(
+                    method +
+                    fmt::format(
+                        "step: {:.17g}\nend: 4\nmaterials: {{m: {{friction: {}}}, w: {{friction: 0}}}}\n"
+                        "material_pairs: [{{first: m, second: w, friction: 0, restitution: {}}}]\nbodies:\n"
+                        "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                        "- {{name: wall, fixed: true, position: [{}, 0, 0.5], shapes: [{{box: {{size: [1, 4, 3]}}, "
+                        "material: w}}]}}\n"
+                        "- {{name: box, mass: 1.5, position: [0, 0, 0.05], velocity: [{}, 0, 0], shapes: [{{box: "
+                        "{{size: [1, 0.4, 0.1]}}, material: m}}]}}\n",
+                        h, mu, e, 1.0 + way, v0));
+                run.finish();
+                const double square = v0 * v0 - 2.0 * mu * g * way, back = e * e * square / (2.0 * mu * g);
+                const double far = std::max(v0 * v0 / (2.0 * mu * g), way);
+                EXPECT_NEAR(way - run.pose("box").position[0], back, 0.01 * std::max(back, 0.1 * far));
+            }
+}
+
 }  // namespace
 }  // namespace delassus::impact_motion_test

@@ -222,12 +222,12 @@ TEST(LinearizationLimit, DividesStepsThatAreTooLong) {
         EXPECT_EQ(failure_of(run), "");
         const auto& totals = run.simulation.totals();
         EXPECT_GT(totals.divided_steps, 400) << method;
-        EXPECT_GE(totals.most_parts, 2) << method;
+        EXPECT_GE(totals.most_substeps, 2) << method;
         EXPECT_LE(totals.worst_linearization, 0.1) << method;
         EXPECT_EQ(run.simulation.state().t, 0.5);
         EXPECT_NEAR(run.pose("bob").position[0], 0.39104879, off) << method;
         // The same as with that step from the beginning, where all are divided alike.
-        Running shorter = running(spring_pendulum(stiffness), method, 0.001 / static_cast<double>(totals.most_parts));
+        Running shorter = running(spring_pendulum(stiffness), method, 0.001 / static_cast<double>(totals.most_substeps));
         EXPECT_EQ(failure_of(shorter), "");
         EXPECT_EQ(shorter.simulation.totals().divided_steps, 0) << method;
         EXPECT_NEAR(shorter.pose("bob").position[0], run.pose("bob").position[0], off) << method;

@@ -180,7 +180,7 @@ TEST(Method, AChainWithoutOptionsKeepsItsEnergy) {
     EXPECT_LE(std::abs(totals.energy - totals.start_energy), 1e-5 * totals.potential_drop);
     EXPECT_EQ(run.simulation.record().step, 775);
     EXPECT_GT(totals.divided_steps, 0);
-    EXPECT_GT(totals.most_parts, 1);
+    EXPECT_GT(totals.most_substeps, 1);
     EXPECT_TRUE(run.simulation.warnings().empty());
     Running exact(parse_scene(head + "integrator: {name: dormand_prince, options: {error_limit: 1.0e-9}}\n" + chain(6),
                               "test.yaml"));
@@ -256,7 +256,7 @@ TEST(ErrorLimit, GoesOnFromACheckpointWithTheSameBits) {
     resumed.simulation.load(whole.simulation.save());
     whole.finish();
     resumed.finish();
-    EXPECT_GT(whole.simulation.totals().most_parts, 1);
+    EXPECT_GT(whole.simulation.totals().most_substeps, 1);
     EXPECT_EQ(whole.simulation.totals().divided_steps, resumed.simulation.totals().divided_steps);
     EXPECT_EQ(whole.simulation.state().q, resumed.simulation.state().q);
     EXPECT_EQ(whole.simulation.state().v, resumed.simulation.state().v);

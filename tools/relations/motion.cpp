@@ -126,7 +126,7 @@ void go(const std::string& text, const Registry& registry, const RunOrder& order
     motion.warnings = running->simulation.warnings();
     const auto& totals = running->simulation.totals();
     motion.parts = static_cast<double>(motion.t.size() - 1) +
-                   static_cast<double>(totals.divided_steps) * static_cast<double>(totals.most_parts);
+                   static_cast<double>(totals.divided_steps) * static_cast<double>(totals.most_substeps);
     motion.rows_left_out = !running->simulation.save().rows_left_out.empty();
 }
 

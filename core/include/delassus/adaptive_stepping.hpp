@@ -27,6 +27,9 @@ struct StepControl {
     /// that the coordinate has gone from where it began, so that small motions are as exact, for their size, as large
     /// ones. Not in steps of the smallest size, which can pass a jump of velocities.
     bool of_way = false;
+
+    /// How steps of size h are divided into parts that err by a `limit` of a method at most.
+    [[nodiscard]] DELASSUS_API static StepControl within(double limit, double h);
 };
 
 /// What a step with a chosen size did.
@@ -37,6 +40,7 @@ struct AdaptiveStepReport {
     double error = 0.0;         ///< estimate over tolerance; ≤ 1, but for impacts
     std::int32_t rejected = 0;  ///< trials that were thrown away
     bool impact = false;        ///< a short step for a contact that closed at its beginning
+    std::int64_t substeps = 1;  ///< in which it was taken
 };
 
 /// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves, and the halves are
@@ -108,7 +112,6 @@ private:
     [[nodiscard]] double growth(double error, double last, double most) const;
     /// What the estimate of a step of this size is multiplied by.
     [[nodiscard]] double strictness(double h) const;
-    void restore(const std::vector<double>& memory);
     void count(const StepReport& report);
 
     DynamicalSystem& system_;

@@ -260,4 +260,8 @@ public:
     [[nodiscard]] virtual double energy(const State& state) const;
 };
 
+/// ½ vᵀ M v with the mass matrix at a state, J; v: n. momentum ← M v.
+[[nodiscard]] DELASSUS_API double kinetic_energy(const DynamicalSystem& system, const State& at,
+                                                 std::span<const double> v, std::vector<double>& momentum);
+
 }  // namespace delassus

@@ -37,7 +37,7 @@ struct StepRecord {
     std::int64_t solver_iterations = 0;
     double natural = 0.0;        ///< largest natural error of the step's solves by a plugin
     double h = 0.0;              ///< size of the step, s
-    std::int64_t parts = 1;      ///< into which the step was divided, as the method could not take it in one
+    std::int64_t substeps = 1;   ///< in which the step was taken
     std::int64_t rejected = 0;   ///< trials of the step control that were thrown away
     bool impact = false;         ///< a short step of the step control, for a contact that closed
     double seconds = 0.0;        ///< of wall time, everything included
@@ -73,7 +73,7 @@ struct SimulationTotals {
     std::int64_t repeated_solves = 0;   ///< by `auto`, since the solver that was asked for missed its tolerance
     std::int64_t near_goal_solves = 0;  ///< that ended somewhat above what their steps are worth (docs/tolerance.md)
     std::int64_t divided_steps = 0;     ///< fixed steps that the method could not take in one
-    std::int64_t most_parts = 0;        ///< that one of them was divided into
+    std::int64_t most_substeps = 0;     ///< that one of them was divided into
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;
@@ -90,15 +90,20 @@ struct SimulationTotals {
     std::string last_change;
 };
 
+/// What the steps of a system depend on besides its state.
+struct SteppingMemory {
+    std::vector<double> method;   ///< Timestepper::save(), warm starts included
+    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps that nothing divides
+    std::vector<double> ahead;    ///< where the method is ahead of the state, and how it came there; empty: it is not
+};
+
 /// All that a simulation carries from step to step: with equal scenes, going on from it gives the same bits.
 struct SimulationState {
     std::int64_t step = 0;
-    State state;                  ///< in the coordinates of the simulation
-    std::vector<double> memory;   ///< Timestepper::save(), warm starts included
-    std::vector<double> control;  ///< AdaptiveStepping::save(); empty with fixed steps that nothing divides
+    State state;  ///< in the coordinates of the simulation
+    SteppingMemory stepping;
     std::vector<std::int32_t>
         rows_left_out;             ///< of the bilateral constraints (MultibodySystem::kept_rows()); ascending
-    std::vector<double> ahead;     ///< where the method is ahead of `state`, and how it came there; empty: it is not
     std::vector<double> sleeping;  ///< which bodies sleep, how long the others were quiet; empty where none may sleep
     std::vector<double> inputs;    ///< Inputs::save() of the scene's system
     std::vector<std::int32_t> overlapping;  ///< pairs of bodies that come to overlap however short the steps, a then b
@@ -115,8 +120,8 @@ struct SteppingMethod {
 class EnergyGuard;
 class EnergyWatch;
 class OverlapWatch;
-class LookAhead;
 class SharedRun;
+class Stepping;
 
 /// One system of a scene, advanced step by step by its timestepper and its solver.
 ///
@@ -224,31 +229,22 @@ private:
     [[nodiscard]] const State& bodies_at(const State& state, State& memory) const;
     /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
-    /// memory: of the timestepper, before the step.
-    void advance(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
-    /// A step of fixed size, in parts where it is too long as one. False where parts cannot help, whether bodies
-    /// overlap or energy grows: that is not watched any longer, and the step is to be taken again.
-    bool advance_fixed(State& state, AdaptiveStepReport& report, const std::vector<double>& memory);
-    /// A state that is shown, by steps that are as long as their errors allow.
-    void advance_ahead(State& state, double end, StepReport& report);
-    void show_ahead(State& state, double end, StepReport& report);
+    /// state ← the next one that is shown.
+    void advance(State& state, AdaptiveStepReport& report);
     /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
     void add_unilateral_forces(std::vector<double>& force) const;
     /// Which bodies touched in the last step, and joints that repeat others, as the end of a sentence; or empty.
     [[nodiscard]] std::string what_acts() const;
-    /// The timestepper of method(), and what controls its steps.
+    /// What takes the steps of method().
     void make_method();
+    /// How its steps are divided by the accuracy; the solver is told.
+    [[nodiscard]] StepControl control_of_accuracy();
     /// Another of methods_, with its coordinates; the state stays to be set.
     void change_method(std::size_t number);
     /// The next of methods_ goes on from the state shown, if there is one. why: a sentence.
     bool go_on(const std::string& why);
     /// Shares the bodies with the other processes, where there are any and the system, its method and solver allow it.
     void share(const Registry& registry);
-    /// A step of the timestepper, with the other processes if need be.
-    void take_step(State& state, double h, StepReport& report);
-    /// A step in parts that end between its impacts, the first of this length. memory: the timestepper's at `state`.
-    void step_between_impacts(State& state, double h, double first, std::vector<double> memory, StepReport& report);
-    [[nodiscard]] std::vector<double> memory_of_method() const;
     /// Has the system choose anew which rows to keep where it must; the method then starts anew. steps: so far. Returns
     /// whether it did.
     bool renew_rows(State& state, std::int64_t steps);
@@ -263,11 +259,8 @@ private:
     SceneSystem* system_;
     std::vector<SteppingMethod> methods_;  // the scene's, and those that may take its place
     std::unique_ptr<StepSolver> solver_;
-    std::unique_ptr<Timestepper> timestepper_;
-    std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the parts of fixed ones; or empty
-    std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
-    std::uint64_t revision_ = 0;                 // of the system, that the method knows
-    std::unique_ptr<Sleeping> sleeping_;         // empty where none may sleep
+    std::uint64_t revision_ = 0;          // of the system, that the method knows
+    std::unique_ptr<Sleeping> sleeping_;  // empty where none may sleep
     Assembly assembly_;
     std::string beyond_stops_;  // at the start, a warning; or empty
     std::shared_ptr<const Equilibrium> equilibrium_;
@@ -281,9 +274,10 @@ private:
     std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or processes share bodies
     std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or processes share them
     bool restitutes_ = false;                 // a material does
-    std::string deep_;                        // of this step: what came to overlap whatever its parts; or empty
+    std::string deep_;                        // of this step: what came to overlap whatever its substeps; or empty
     std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies
-    std::vector<double> gathered_;            // the memory of the method for all bodies, after step gathered_at_
+    std::unique_ptr<Stepping> stepping_;
+    std::vector<double> gathered_;  // the memory of the method for all bodies, after step gathered_at_
     std::int64_t gathered_at_ = -1;
 };
 

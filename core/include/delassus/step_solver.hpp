@@ -164,6 +164,8 @@ public:
     /// The processes that step the rest of the system, where there are several: problems are solved with them, and
     /// solve() is collective. Null: this process steps all of it. Not owned.
     DELASSUS_API void share(SharedSteps* steps);
+    /// Whether its problems are parts of those of several processes, which all have to take part in a solve.
+    [[nodiscard]] DELASSUS_API bool is_shared() const;
     /// Whether it is so on all of these processes. Collective.
     [[nodiscard]] DELASSUS_API bool on_all(bool own) const;
     /// The largest of these processes' values. Collective.

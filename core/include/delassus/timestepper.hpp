@@ -130,7 +130,8 @@ public:
     [[nodiscard]] virtual StepMemory memory() const;
     virtual void set_memory(StepMemory&& memory);
 
-    /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave.
+    /// The numbers that make up the memory of the method, for checkpoints; load() takes what save() gave, and forgets
+    /// all else.
     [[nodiscard]] virtual std::vector<double> save() const;
     virtual void load(const std::vector<double>& memory);
 

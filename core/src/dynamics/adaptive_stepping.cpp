@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/substeps.hpp"
+
 namespace delassus {
 
 // ---- The estimate ----
@@ -92,6 +94,10 @@ void for_each_sliding(const UnilateralRows& rows, Act act) {
 }
 
 }  // namespace
+
+StepControl StepControl::within(double limit, double h) {
+    return {.absolute = limit, .initial = h, .smallest = shortest_substep * h, .largest = h, .of_way = true};
+}
 
 AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control,
                                    std::string advice)
@@ -190,17 +196,12 @@ void AdaptiveStepping::extrapolate(const State& whole, State& halves) const {
     for (std::size_t i = 0; i < delta.size(); ++i) halves.v[i] += share * (halves.v[i] - whole.v[i]);
 }
 
-void AdaptiveStepping::restore(const std::vector<double>& memory) {
-    stepper_.restart();
-    stepper_.load(memory);
-}
-
 AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, StepSolver& solver) {
     solver.forget_misses();
     Trial trial;
     if (embedded_) {
         trial.end = begin;
-        restore(memory_);
+        stepper_.load(memory_);
         trial.second = stepper_.step(trial.end, h, solver);
         count(trial.second);
         solver.require_usable();
@@ -209,11 +210,11 @@ AdaptiveStepping::Trial AdaptiveStepping::take(const State& begin, double h, Ste
         return trial;
     }
     State whole = begin;
-    restore(memory_);
+    stepper_.load(memory_);
     trial.whole = stepper_.step(whole, h, solver);
     count(trial.whole);
     trial.end = begin;
-    restore(memory_);
+    stepper_.load(memory_);
     trial.first = stepper_.step(trial.end, 0.5 * h, solver);
     count(trial.first);
     if (unilateral_) trial.middle = trial.end.v;
@@ -378,7 +379,7 @@ AdaptiveStepping::Trial AdaptiveStepping::until_impact(const State& begin, doubl
 }
 
 AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double h, double end, StepSolver& solver) {
-    restore(memory_);
+    stepper_.load(memory_);
     const double remaining = end - state.t;
     report_.h = remaining < h + control_.smallest ? remaining : h;
     report_.impact = true;
@@ -454,7 +455,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
             }
             if (!trial.touches) fell_below();
         }
-        restore(trial.memory);
+        stepper_.load(trial.memory);
         // A step cut by the end or by an impact says less than the one that it was to be.
         const double next = h * growth(trial.error, h, shrunk);
         next_ = std::clamp(h < tried ? std::max(next, tried) : next, control_.smallest, control_.largest);

@@ -164,4 +164,11 @@ double DynamicalSystem::energy(const State&) const {
     return std::numeric_limits<double>::quiet_NaN();
 }
 
+double kinetic_energy(const DynamicalSystem& system, const State& at, std::span<const double> v,
+                      std::vector<double>& momentum) {
+    momentum.assign(v.size(), 0.0);
+    system.multiply_mass(at, 1.0, v.data(), momentum.data());
+    return 0.5 * std::inner_product(v.begin(), v.end(), momentum.begin(), 0.0);
+}
+
 }  // namespace delassus

@@ -10,17 +10,23 @@ namespace delassus {
 //
 //     g + u τ + ½ a τ² = 0,      closing with s = −(u + a τ) = √(u² − 2 a g)
 //
-// and leaves with w = e s. For a ≥ 0 that was all. Otherwise it meets again after the flight F = 2 w/|a|, with a speed
-// and hence a next flight of e times the last ones: k flights take F (1 − eᵏ)/(1 − e). What is left of the step after
-// the last whole flight is t, and then u⁺ = eᵏ w + a t and g⁺ = eᵏ w t + ½ a t². All flights together take F/(1 − e):
-// if that is over within the step, the contact is at rest, u⁺ = g⁺ = 0.
+// and leaves with w = e s. From then on the acceleration is a'. For a' ≥ 0 that was all. Otherwise it meets again after
+// the flight F = 2 w/|a'|, with a speed and hence a next flight of e times the last ones: k flights take F (1 − eᵏ)/(1
+// − e). What is left of the step after the last whole flight is t, and then u⁺ = eᵏ w + a' t and g⁺ = eᵏ w t + ½ a' t².
+// All flights together take F/(1 − e): if that is over within the step, the contact is at rest, u⁺ = g⁺ = 0.
 //
-// One impulse with the same effect changes the speed by u⁺ − u − a h, and acts at the time that leads to the same g⁺:
+// One impulse that leads there from the motion with a changes the speed by u⁺ − (−s + a (h − τ)), and acts at the time
+// that gives the same g⁺:
 //
-//     g + u h + ½ a h² + (h − τ*) (u⁺ − u − a h) = g⁺
+//     −s (h − τ) + ½ a (h − τ)² + (h − τ*) (u⁺ + s − a (h − τ)) = g⁺
 //
-// (τ* = τ for a single bounce; with e = 0 and a < 0 what then presses the bodies together is in it).
-std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration, double restitution) {
+// (τ* = τ for a single bounce with a' = a; with e = 0 and a' < 0 what then presses the bodies together is in it).
+//
+// What is flush meets everywhere at once. Where that is the end of the step, rounding lets one corner meet and not
+// another one, so that a gap within its resolution there is none.
+std::optional<Impact> impact_within(double h, const Approach& approach, double after, double restitution,
+                                    double resolution) {
+    const auto& [gap, speed, acceleration] = approach;
     const double square = speed * speed - 2.0 * acceleration * gap;
     if (!(square > 0.0)) return std::nullopt;
     Impact impact;
@@ -32,11 +38,12 @@ std::optional<Impact> impact_within(double h, double gap, double speed, double a
     } else {
         return std::nullopt;
     }
-    double left = h - impact.meets;
-    if (!(left >= 0.0)) return std::nullopt;
-    double leaves = restitution * impact.closing;
-    if (acceleration < 0.0) {
-        const double flight = 2.0 * leaves / -acceleration;
+    if (!(h - impact.meets >= -resolution / impact.closing)) return std::nullopt;
+    impact.meets = std::min(impact.meets, h);
+    const double rest = h - impact.meets;
+    double left = rest, leaves = restitution * impact.closing;
+    if (after < 0.0) {
+        const double flight = 2.0 * leaves / -after;
         if (flight <= left * (1.0 - restitution)) {
             leaves = left = 0.0;
         } else if (flight < left) {
@@ -51,10 +58,10 @@ std::optional<Impact> impact_within(double h, double gap, double speed, double a
             }
         }
     }
-    impact.end_speed = leaves + acceleration * left;
-    const double end_gap = (leaves + 0.5 * acceleration * left) * left;
-    impact.change = impact.end_speed - speed - acceleration * h;
-    const double alone = gap + (speed + 0.5 * acceleration * h) * h;
+    impact.end_speed = leaves + after * left;
+    const double end_gap = (leaves + 0.5 * after * left) * left;
+    impact.change = impact.end_speed + impact.closing - acceleration * rest;
+    const double alone = (-impact.closing + 0.5 * acceleration * rest) * rest;
     impact.acts = impact.change > 0.0 ? h - (end_gap - alone) / impact.change : impact.meets;
     return impact;
 }

@@ -8,19 +8,26 @@
 
 namespace delassus {
 
+/// How a row moves before something meets.
+struct Approach {
+    double gap = 0.0;           ///< at the beginning of the step, ≥ 0
+    double speed = 0.0;         ///< there; negative: closing
+    double acceleration = 0.0;  ///< until it meets
+};
+
 /// A contact that meets within a step, and stays or bounces, perhaps several times, as if its row had one acceleration
-/// besides.
+/// besides from then on.
 struct Impact {
     double meets = 0.0;      ///< after the beginning of the step, s
     double closing = 0.0;    ///< speed with which it meets then, > 0
     double end_speed = 0.0;  ///< at the end of the step; negative if it closes again there
-    double change = 0.0;     ///< of the speed, by the impulses of all bounces, ≥ 0
+    double change = 0.0;     ///< of the speed, from what it would be if nothing met
     double acts = 0.0;       ///< when in the step one impulse of that size would lead to the same gap at its end, s
 };
 
-/// Nothing if the contact does not meet. gap ≥ 0, speed (negative: closing) and acceleration of the row at the
-/// beginning of the step of size h > 0; restitution in [0, 1].
-[[nodiscard]] DELASSUS_API std::optional<Impact> impact_within(double h, double gap, double speed, double acceleration,
-                                                               double restitution);
+/// Nothing if the contact does not meet in the step of size h > 0, nor misses that by more than a gap of `resolution`.
+/// after: acceleration of the row from then on; restitution in [0, 1].
+[[nodiscard]] DELASSUS_API std::optional<Impact> impact_within(double h, const Approach& approach, double after,
+                                                               double restitution, double resolution = 0.0);
 
 }  // namespace delassus

@@ -6,6 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
+
+#include "dynamics/linear_problem.hpp"
 
 namespace delassus {
 
@@ -25,7 +29,7 @@ Linearization::Linearization(DynamicalSystem& system, double limit)
 
 void Linearization::judge(const State& begin, const State& end, double h, std::span<const double> force,
                           std::span<const double> linear, const SparseMatrix& H, std::string_view method,
-                          StepReport& report) {
+                          StepSolver& solver, StepReport& report) {
     const auto n = static_cast<std::int32_t>(linear.size());
     M_.begin(n, n);
     system_.add_mass(end, 1.0, M_);
@@ -46,9 +50,19 @@ void Linearization::judge(const State& begin, const State& end, double h, std::s
         before += squared(begin.v[k]) * mass;
         after += squared(end.v[k]) * mass;
     }
-    const double scale = std::sqrt(std::max({before, after, forces}));
-    const auto share = [scale](double value) { return value > 0.0 ? value / scale : 0.0; };
-    const double error = share(std::sqrt(difference) - std::sqrt(rounding));
+    const auto share = [&](double value) {
+        return value > 0.0 ? value / std::sqrt(std::max({before, after, forces})) : 0.0;
+    };
+    const auto error_now = [&] { return share(std::sqrt(difference) - std::sqrt(rounding)); };
+    if (error_now() > limit_ && system_.m() > 0 && !solver.is_shared()) {
+        std::vector<double> off(force.begin(), force.end());
+        for (std::size_t i = 0; i < off.size(); ++i) off[i] -= linear[i];
+        difference = norm_beside_joints(end, std::move(off), solver, report);
+        forces = norm_beside_joints(end, {linear.begin(), linear.end()}, solver, report);
+        difference *= difference;
+        forces *= forces;
+    }
+    const double error = error_now();
     report.linearization = error;
     report.linearization_rounding = share(std::sqrt(rounding));
     if (error <= limit_) return;
@@ -57,6 +71,24 @@ void Linearization::judge(const State& begin, const State& end, double h, std::s
         "the velocities in a step, where linearization_limit is {:.2g}; take shorter steps, a method that iterates "
         "(euler_implicit), or a joint in place of a very stiff part",
         method, begin.t, h, error, limit_));
+}
+
+double Linearization::norm_beside_joints(const State& end, std::vector<double> impulse, StepSolver& solver,
+                                         StepReport& report) {
+    Problem problem;
+    const auto n = static_cast<std::int32_t>(impulse.size());
+    M_.begin(n, n);
+    system_.add_mass(end, 1.0, M_);
+    problem.H = M_.finish();
+    D_.begin(system_.m(), n);
+    system_.add_constraint_jacobian(end, 0, D_);
+    problem.D = D_.finish();
+    problem.b.assign(static_cast<std::size_t>(system_.m()), 0.0);
+    problem.cones = free_cones(system_);
+    problem.a = impulse;
+    const LinearSolution change = solve_linear(std::move(problem), solver, report, "linearisation");
+    const double square = change.x.dot(Eigen::Map<const Vector>(impulse.data(), n));
+    return std::sqrt(std::max(square, 0.0));
 }
 
 OptionInfo linearization_option() {

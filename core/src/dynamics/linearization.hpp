@@ -21,6 +21,11 @@ namespace delassus {
 // T = k (h v)²/2l is h T/(m v) = (hω)² φ/2 = η, with φ = h v/l the turn in a step. In the next step its geometric
 // stiffness T/l, as h² T/l beside m, slows the bob by η φ, and a radian has 1/φ steps. (M is taken by its diagonal.)
 //
+// What joints and attachments hold does not change the velocities: a light node that hangs on a heavy body moves with
+// it. So where η is beyond a limit, both numerators are measured again by the changes that they allow,
+//
+//     M δ − C_qᵀ λ = h (f − f_lin),      C_q δ = 0,      ‖h (f − f_lin)‖² = δᵀ M δ
+//
 // Rounding of the positions, 10 ε ‖q‖_∞ as in Newton's method, leaves a difference of that times the diagonal of
 // (H − M)/h, which counts for nothing.
 class DELASSUS_API Linearization {
@@ -34,13 +39,18 @@ public:
     /// report.linearization ← η of the step from begin to end, and what rounding may make of it. force: h f there,
     /// linear: h f_lin, n each; H: M + h R + h² K or near to it. Throws StepTooLong if η is beyond the limit.
     void judge(const State& begin, const State& end, double h, std::span<const double> force,
-               std::span<const double> linear, const SparseMatrix& H, std::string_view method, StepReport& report);
+               std::span<const double> linear, const SparseMatrix& H, std::string_view method, StepSolver& solver,
+               StepReport& report);
 
 private:
+    /// The norm in M⁻¹ of what joints let an impulse change at a state.
+    [[nodiscard]] double norm_beside_joints(const State& end, std::vector<double> impulse, StepSolver& solver,
+                                            StepReport& report);
+
     DynamicalSystem& system_;
     double limit_;
     bool wanted_;
-    MatrixAssembler M_;
+    MatrixAssembler M_, D_;
 };
 
 /// The row of the option `linearization_limit`.

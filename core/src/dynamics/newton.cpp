@@ -345,7 +345,7 @@ private:
                          linear = h_ * (trial_residual_.inertia - trial_residual_.reaction);
             const auto n = static_cast<std::size_t>(newton_.n_);
             linearization.judge(begin_, trial_.state, h_, {force.data(), n}, {linear.data(), n}, newton_.kept_.H,
-                                settings_.method, report_);
+                                settings_.method, solver_, report_);
         }
         newton_.judge_turns(begin_, h_, trial_.delta);
         point_ = trial_;

@@ -381,6 +381,10 @@ void StepSolver::share(SharedSteps* steps) {
     implementation_->shared = steps;
 }
 
+bool StepSolver::is_shared() const {
+    return implementation_->shared != nullptr;
+}
+
 bool StepSolver::on_all(bool own) const {
     return implementation_->shared ? implementation_->shared->on_all(own) : own;
 }

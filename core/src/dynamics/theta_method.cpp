@@ -164,7 +164,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     }
     end_.v = solution_.x;
     require_finite(state, end_, h, settings_.name);
-    if (linearization_.wanted()) judge_linearization(state, h, result_, report);
+    if (linearization_.wanted()) judge_linearization(state, h, result_, solver, report);
     if (!settings_.linearly_implicit || struck || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
     if (struck && m_ > 0) projection_.project_velocities(end_, problem_.H, solver, report);
@@ -443,6 +443,7 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
             time_turns(solver, report);
             turns = true;
         }
+        if (iteration == 0 && timed_ && contacts_.follow_others(problem_, solution_)) turns = true;
         if (guess_.allFinite() && !taking && contacts_gain(begin) && contacts_.only_take()) {
             taking = true;  // from the start, which is not where energy came from
             guess_ = free_;
@@ -504,7 +505,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     }
     linearize_at_guess();
     if (!found()) return;
-    if (changes_[0].empty()) {
+    if ((timed_ && contacts_.follow_others(problem_, solution_)) || changes_[0].empty()) {
         linearize_at_guess();
         if (!found()) return;
     }
@@ -536,14 +537,16 @@ void ThetaMethod::note_error(const State& begin, double h) {
 }
 
 // The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).
-void ThetaMethod::judge_linearization(const State& begin, double h, const Vector& result, StepReport& report) {
+void ThetaMethod::judge_linearization(const State& begin, double h, const Vector& result, StepSolver& solver,
+                                      StepReport& report) {
     impulse_of_forces(begin, h, result);
     back_ = result - solved_from_;
     linear_ = solved_force_;
     problem_.H.multiply_add(-1.0, back_.data(), linear_.data());
     system_.multiply_mass(at_theta_, 1.0, back_.data(), linear_.data());
     const auto n = static_cast<std::size_t>(n_);
-    linearization_.judge(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H, settings_.name, report);
+    linearization_.judge(begin, end_, h, {force_.data(), n}, {linear_.data(), n}, problem_.H, settings_.name, solver,
+                         report);
 }
 
 // A row's C at the end is what the linear model of its step missed. Beyond linearization_limit times the way h |D| |v|

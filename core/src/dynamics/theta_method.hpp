@@ -76,7 +76,8 @@ private:
     void note_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
     void judge_constraints(const State& begin, double h);
-    void judge_linearization(const State& begin, double h, const Vector& result, StepReport& report);
+    void judge_linearization(const State& begin, double h, const Vector& result, StepSolver& solver,
+                             StepReport& report);
 
     static constexpr int most_iterations = 50;
 

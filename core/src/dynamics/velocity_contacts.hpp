@@ -66,6 +66,9 @@ public:
     /// the velocities at the end of the step without impacts, n. last_h, last_struck: as of time_turns().
     void time_meetings(Problem& problem, std::span<const double> smooth, double last_h,
                        std::span<const double> last_struck);
+    /// Whether impacts lead to other speeds, since other contacts act otherwise after them in the answer than before
+    /// them: then b has those, and the problem is to be solved again.
+    [[nodiscard]] bool follow_others(const Problem& problem, const Solution& solution);
     /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
     [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
@@ -166,8 +169,10 @@ private:
         bool left = false;                           ///< `once`: it bounced in the step before, and opens
         bool strikes = false;                        ///< b is that of an impact
         std::optional<Impact> impact;                ///< it strikes at a time within the step
+        Approach before_impact;                      ///< until then
         double struck = HUGE_VAL;       ///< when an impact first strikes one of its bodies, if it has none itself
         std::array<double, 3> last{};   ///< its impulse in the step before, where it pushed
+        double goes_on = 0.0;           ///< after that impact, if all went on: of `last`
         std::array<double, 3> known{};  ///< of this step's, until an impact or until friction turned round
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
@@ -199,6 +204,9 @@ private:
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
     void find_struck(const Problem& problem, double last_h, std::span<const double> last_struck);
+    /// What others do to the speed of an impact's row after it, beside what they did before it, m/s or rad/s.
+    [[nodiscard]] double change_of_others(const Problem& problem, const Solution& solution,
+                                          const Contact& impact) const;
     /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.
     [[nodiscard]] bool was_struck(const Problem& problem, const Contact& contact, std::span<const double> shares) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);

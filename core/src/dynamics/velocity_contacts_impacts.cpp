@@ -147,7 +147,9 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             continue;
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
-            return impact_within(h_, from, begin, acceleration() + turning, block.restitution);
+            contact.before_impact = {from, begin, acceleration() + turning};
+            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, block.restitution,
+                                 contact.resolution);
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
@@ -179,6 +181,51 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
     find_struck(problem, last_h, last_struck);
 }
 
+// What other contacts do after an impact is not what they did before it: friction turns round where a body bounces off
+// a wall. Until τ they push as in the step before; the solver finds the rest P. Of that as much is force as they would
+// push with if they went on, P_o, and the remainder is of the impact itself. So the row's acceleration after τ is
+//
+//     a' = a + W (P_f − P_o)/(h − τ),      P_f = min(1, Σ P_o,n/Σ P_n) P,      W = D diag(H)⁻¹ Dᵀ
+//
+// in which P is that of the first answer. Only what slows it down counts: in a stack, where several impacts meet, one
+// that is left faster could gain energy.
+bool VelocityContacts::follow_others(const Problem& problem, const Solution& solution) {
+    constexpr double faint = 1e-9;
+    bool any = false;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[k];
+        if (!contact.impact || !(solution.lambda[first_row_ + contact.row] > 0.0)) continue;
+        const double rest = h_ - contact.impact->meets, change = change_of_others(problem, solution, contact);
+        if (!(rest > 0.0) || !(-change > faint * contact.impact->closing)) continue;
+        contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change / rest,
+                                       rows_.blocks()[k].restitution, contact.resolution);
+        contact.normal = -contact.impact->end_speed;
+        any = true;
+    }
+    return any;
+}
+
+double VelocityContacts::change_of_others(const Problem& problem, const Solution& solution,
+                                          const Contact& impact) const {
+    double found = 0.0, expected = 0.0, normal_found = 0.0, normal_expected = 0.0;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Contact& other = contacts_[k];
+        if (other.goes_on == 0.0) continue;
+        bool coupled = false;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
+            const std::size_t row = first_row_ + other.row + i;
+            const double W = coupling(problem.D, diagonal_, first_row_ + impact.row, row);
+            found += W * solution.lambda[row];
+            expected += W * other.goes_on * other.last[i];
+            coupled = coupled || W != 0.0;
+        }
+        if (!coupled) continue;
+        normal_found += solution.lambda[first_row_ + other.row];
+        normal_expected += other.goes_on * other.last[0];
+    }
+    return (normal_found > normal_expected ? normal_expected / normal_found : 1.0) * found - expected;
+}
+
 // An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ), but no less
 // than u⁻: where the contact opens at first, its work P (u⁻ + u⁺)/2 would gain energy.
 //
@@ -207,9 +254,10 @@ void VelocityContacts::find_struck(const Problem& problem, double last_h, std::s
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
         if (!(contact.struck < h_)) continue;
         if (contact.pushed) {
-            if (last_h < like * h_ && h_ < like * last_h && !was_struck(problem, contact, last_struck))
-                for (std::size_t i = 0; i < contact.known.size(); ++i)
-                    contact.known[i] = contact.struck / last_h * contact.last[i];
+            if (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)) continue;
+            for (std::size_t i = 0; i < contact.known.size(); ++i)
+                contact.known[i] = contact.struck / last_h * contact.last[i];
+            contact.goes_on = (h_ - contact.struck) / last_h;
             continue;
         }
         const double then = std::max(gap - contact.approach * contact.struck, 0.0);

@@ -140,7 +140,12 @@ Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOv
             put_method("integrator", overrides.integrator, {}, source, system);
         }
         for (const auto& [path, text] : overrides.values) scene::set_value(source, root, path, text);
-        for (const auto& system : system_nodes) put_values(overrides, source, system);
+        std::vector<double> planned_ends;
+        for (const auto& system : system_nodes) {
+            const YAML::Node end = system.IsMap() ? system["end"] : YAML::Node();
+            planned_ends.push_back(end.IsDefined() && end.IsScalar() ? end.as<double>(0.0) : 0.0);
+            put_values(overrides, source, system);
+        }
         const std::pair<std::string_view, Handler> title{
             "title", [&](const YAML::Node& n) { scene.title = scalar(source, n, "title"); }};
         if (root["systems"].IsDefined()) {
@@ -161,7 +166,9 @@ Scene parse_scene(const std::string& yaml, std::string_view where, const SceneOv
         } else {
             read_one_system(source, root, scene, "main", "the scene", {title, {"systems", [](const YAML::Node&) {}}});
         }
-        for (auto& system : scene.systems) {
+        for (std::size_t i = 0; i < scene.systems.size(); ++i) {
+            SceneSystem& system = scene.systems[i];
+            system.planned_end = planned_ends[i] > 0.0 ? planned_ends[i] : system.end;
             if (overrides.law) system.solver.law = overrides.law;
             scene::choose_method(system);
         }

@@ -133,9 +133,9 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
                                    {"t", bits({simulation.state.t})},
                                    {"q", bits(simulation.state.q)},
                                    {"v", bits(simulation.state.v)},
-                                   {"memory", bits(simulation.memory)},
-                                   {"control", bits(simulation.control)},
-                                   {"ahead", bits(simulation.ahead)},
+                                   {"memory", bits(simulation.stepping.method)},
+                                   {"control", bits(simulation.stepping.control)},
+                                   {"ahead", bits(simulation.stepping.ahead)},
                                    {"rows_left_out", simulation.rows_left_out},
                                    {"sleeping", bits(simulation.sleeping)},
                                    {"overlapping", simulation.overlapping},
@@ -166,9 +166,9 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
             one.at("name").get_to(system.name);
             one.at("step").get_to(system.simulation.step);
             system.simulation.state = {number(one.at("t")), numbers(one.at("q")), numbers(one.at("v"))};
-            system.simulation.memory = numbers(one.at("memory"));
-            system.simulation.control = numbers(one.at("control"));
-            system.simulation.ahead = numbers(one.at("ahead"));
+            system.simulation.stepping.method = numbers(one.at("memory"));
+            system.simulation.stepping.control = numbers(one.at("control"));
+            system.simulation.stepping.ahead = numbers(one.at("ahead"));
             system.simulation.sleeping = numbers(one.at("sleeping"));
             one.at("rows_left_out").get_to(system.simulation.rows_left_out);
             one.at("overlapping").get_to(system.simulation.overlapping);

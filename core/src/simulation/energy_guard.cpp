@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "delassus/simulation.hpp"
-#include "simulation/fixed_step.hpp"
+#include "dynamics/substeps.hpp"
 
 namespace delassus {
 namespace {
@@ -71,15 +71,16 @@ void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
     totals_ = &totals;
     before_ = totals.growth;
     last_taken_ = HUGE_VAL;
+    const double left = system_.planned_end > t ? system_.planned_end - t : system_.planned_end;
     allowed_ = before_ < budget && totals.start_overlap == 0.0 && guard_.watches(totals)
-                   ? std::max(0.5 * budget, before_ + (budget - before_) * std::min(h / (system_.end - t), 1.0))
+                   ? std::max(0.5 * budget, before_ + (budget - before_) * std::min(h / left, 1.0))
                    : HUGE_VAL;
 }
 
 void EnergyWatch::require_within(double energy, double h) {
     constexpr double helps = 0.7;
     const double growth = EnergyGuard::growth(*totals_, energy, recovered_);
-    const bool shortest = h < 1.5 * h_ / static_cast<double>(most_parts);
+    const bool shortest = h < 1.5 * h_ / static_cast<double>(most_substeps);
     if (growth <= allowed_ || growth - before_ > helps * last_taken_ || shortest) return;
     last_taken_ = growth - before_;
     throw Gain("the energy grows by more than the accuracy allows, though nothing supplies any");

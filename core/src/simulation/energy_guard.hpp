@@ -52,11 +52,12 @@ private:
 // The one counts what bodies get that a step lets sink in and the next ones lift. The other sees a rise that friction
 // hides, and not what they lift. What overlaps at the start gives energy, which is no growth, as long as the deepest
 // overlap shrinks. What of G does not come back adds up over a run. All of it may come to B = accuracy · max(A, floor)
-// until the time T at which the run ends. Half of B is free, for what comes and goes; of the rest a step may take the
-// share of the time that is left:
+// until the time T at which the scene ends (by itself: a run that is ended before and goes on later takes the same
+// steps). Half of B is free, for what comes and goes; of the rest a step may take the share of the time that is left:
 //
 //     G⁺ ≤ max(B/2, G + (B − G) h/(T − t)),      G: the largest growth up to now
 //
+// with T in place of T − t beyond T.
 // A step that takes more is too long and goes in parts, each halving of which lowers what it takes by 2ᵖ for a method
 // of order p. Where a halving leaves more than 0.7 of it, as where an impact gives energy, parts do not help and the
 // step counts as it is, and so do all once B is used up.

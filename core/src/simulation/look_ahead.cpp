@@ -12,9 +12,9 @@
 //     ends (MultibodySystem::next_corner()), at which steps end. What the state brings about, the estimate sees or
 //     not, as in any method with chosen steps; so they are at most `most_longer` times as long.
 //   - A step ends at a corner and is judged by forces or speeds of beyond. So steps end shortly before, and one of the
-//     smallest size passes the corner. Where `crowd` corners follow one another at less than `apart` steps shown in the
-//     mean, as in a table that samples a curve, that would cost more than it saves: there steps are no longer than
-//     those shown, and end with them.
+//     smallest size passes the corner. Where `cluster_size` corners follow one another at less than `cluster_spacing`
+//     steps shown in the mean, as in a table that samples a curve, that would cost more than it saves: there steps are
+//     no longer than those shown, and end with them.
 //   - A body turns by half a turn or more, so that the difference of two orientations is not the way between them. So
 //     none turns by more than `largest_turn` at the speeds of the beginning, in a step that is longer than those shown.
 #include "simulation/look_ahead.hpp"
@@ -32,14 +32,15 @@ constexpr double most_longer = 20.0;
 /// Steps from one to this of those shown end with these: what longer ones save is less than reading them costs. (The
 /// control grows slowly; from 1.07 it would come to 1.25.)
 constexpr double worth = 1.07;
-constexpr int crowd = 8;
-constexpr double apart = 4.0;
+constexpr int cluster_size = 8;
+constexpr double cluster_spacing = 4.0;
 constexpr double largest_turn = 1.0;  // rad
 
 }  // namespace
 
-LookAhead::LookAhead(DynamicalSystem& system, const MultibodySystem& bodies, double step, double smallest)
-    : system_(system), bodies_(bodies), step_(step), smallest_(smallest), output_(system) {}
+LookAhead::LookAhead(DynamicalSystem& system, const MultibodySystem& bodies, const JointCoordinates* joints,
+                     double step, double smallest)
+    : system_(system), bodies_(bodies), joints_(joints), step_(step), smallest_(smallest), output_(system) {}
 
 void LookAhead::begin(const State& state) {
     way_.degree = 0;
@@ -47,31 +48,32 @@ void LookAhead::begin(const State& state) {
     way_.multipliers.clear();
 }
 
-double LookAhead::largest(const State& bodies) const {
+double LookAhead::largest() {
+    if (joints_) joints_->bodies_of(way_.end, front_);
     double fastest = 0.0;
     for (BodyIndex body = 0; body < bodies_.body_count(); ++body) {
-        const Vector3 omega = bodies_.velocities(bodies, body)[1];
+        const Vector3 omega = bodies_.velocities(joints_ ? front_ : way_.end, body)[1];
         fastest = std::max(fastest, std::hypot(omega[0], omega[1], omega[2]));
     }
     return std::clamp(largest_turn / fastest, step_, most_longer * step_);
 }
 
-bool LookAhead::crowded(double corner) const {
+bool LookAhead::clustered(double corner) const {
     double last = corner;
-    for (int i = 0; i < crowd; ++i) last = bodies_.next_corner(last);
-    return last - corner < crowd * apart * step_;
+    for (int i = 0; i < cluster_size; ++i) last = bodies_.next_corner(last);
+    return last - corner < cluster_size * cluster_spacing * step_;
 }
 
-AdaptiveStepReport LookAhead::advance(double to, const State& bodies, const Timestepper& stepper,
-                                      AdaptiveStepping& control, StepSolver& solver) {
+AdaptiveStepReport LookAhead::advance(double to, const Timestepper& stepper, AdaptiveStepping& control,
+                                      StepSolver& solver) {
     State front = way_.end;
     const double corner = bodies_.next_corner(front.t), before = corner - 0.5 * smallest_;
     AdaptiveStepReport report;
-    if (corner - front.t <= step_ && crowded(corner)) {
+    if (corner - front.t <= step_ && clustered(corner)) {
         control.set_largest(step_);
         report = control.step(front, to, solver);
     } else if (front.t < before) {
-        const double longest = largest(bodies);
+        const double longest = largest();
         control.set_largest(longest, step_);
         const double next = std::min(control.next(), longest);
         const bool fits = next >= step_ && next < worth * step_;

@@ -7,6 +7,7 @@
 
 #include "delassus/adaptive_stepping.hpp"
 #include "delassus/continuous_extension.hpp"
+#include "delassus/joint_coordinates.hpp"
 #include "delassus/multibody.hpp"
 
 namespace delassus {
@@ -14,9 +15,10 @@ namespace delassus {
 /// How far a method has come ahead of what is shown, and the way of its last step.
 class LookAhead {
 public:
-    /// bodies: whose motions have the corners. step: between the states shown, s; smallest: of the method's, s. All
-    /// that is passed outlives it.
-    LookAhead(DynamicalSystem& system, const MultibodySystem& bodies, double step, double smallest);
+    /// bodies: whose motions have the corners; joints: what `system` is, or null. step: between the states shown, s;
+    /// smallest: of the method's, s. All that is passed outlives it.
+    LookAhead(DynamicalSystem& system, const MultibodySystem& bodies, const JointCoordinates* joints, double step,
+              double smallest);
 
     /// Where the method has come to.
     [[nodiscard]] const State& front() const { return way_.end; }
@@ -28,10 +30,9 @@ public:
     [[nodiscard]] std::int64_t advances() const { return advances_; }
     void count_advance() { ++advances_; }
 
-    /// One step of the method from the front on, for a state to be shown at `to`. bodies: those at the front. Throws as
-    /// control.step(); then what was ahead is as before.
-    AdaptiveStepReport advance(double to, const State& bodies, const Timestepper& stepper, AdaptiveStepping& control,
-                               StepSolver& solver);
+    /// One step of the method from the front on, for a state to be shown at `to`. Throws as control.step(); then what
+    /// was ahead is as before.
+    AdaptiveStepReport advance(double to, const Timestepper& stepper, AdaptiveStepping& control, StepSolver& solver);
     /// Whether a corner made the last step as short as it was.
     [[nodiscard]] bool cut_by_corner() const { return cut_; }
     /// state ← that at `to`, which the method has reached; the problems solved go to the report.
@@ -54,12 +55,14 @@ public:
     void put_back(Memory memory);
 
 private:
-    [[nodiscard]] double largest(const State& bodies) const;
+    [[nodiscard]] double largest();
     /// Whether many corners follow this one closely.
-    [[nodiscard]] bool crowded(double corner) const;
+    [[nodiscard]] bool clustered(double corner) const;
 
     DynamicalSystem& system_;
     const MultibodySystem& bodies_;
+    const JointCoordinates* joints_;
+    State front_;  // of the bodies; memory
     double step_, smallest_;
     DenseOutput output_;
     ContinuousExtension way_;

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "delassus/simulation.hpp"
-#include "simulation/fixed_step.hpp"
-#include "simulation/look_ahead.hpp"
+#include "dynamics/substeps.hpp"
 #include "simulation/method_change.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sizes_of_motion.hpp"
+#include "simulation/stepping.hpp"
 
 namespace delassus {
 
@@ -44,49 +44,46 @@ std::vector<SteppingMethod> methods_of(const SceneSystem& system) {
 }
 
 void Simulation::make_method() {
-    control_.reset();
-    ahead_.reset();
+    stepping_.reset();
     revision_ = system_->system->revision();
-    timestepper_ = make_timestepper(method().integrator, dynamics(), method().options);
+    auto timestepper = make_timestepper(method().integrator, dynamics(), method().options);
+    SteppingSettings settings{
+        .step = system_->step,
+        .end = system_->end,
+        .chosen = system_->control,
+        .divided = std::nullopt,
+        .accuracy = system_->accuracy,
+        .advice = fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
+                              "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
+                              method().integrator),
+        .restitutes = restitutes_};
+    if (system_->steps_by_accuracy && !std::isfinite(timestepper->error_limit()))
+        settings.divided = control_of_accuracy();
+    stepping_ = std::make_unique<Stepping>(dynamics(), std::move(timestepper), std::move(settings), shared_.get());
     if (shared_) {
         shared_->restart();
-        gathered_ = timestepper_->save();
+        gathered_ = stepping_->timestepper()->save();
         gathered_at_ = now_.step;
-        return;
     }
-    if (system_->control) {
-        control_ = std::make_unique<AdaptiveStepping>(dynamics(), *timestepper_, *system_->control);
-        return;
-    }
-    const double named = timestepper_->error_limit();
-    const bool by_accuracy = system_->steps_by_accuracy && !std::isfinite(named);
-    if (by_accuracy || std::isfinite(named)) {
-        StepControl control = control_within(by_accuracy ? system_->accuracy : named, system_->step);
-        control.of_way = !by_accuracy;
-        if (by_accuracy) {
-            SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
-            control.sizes = std::move(sizes.of_velocities);
-            control.slow = control.absolute * sizes.least;
-            if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
-            std::vector<double> bounds = control.sizes;
-            for (double& bound : bounds) bound *= share_of_solves * control.absolute;
-            solver_->bound_errors(std::move(bounds));
-        }
-        control_ = std::make_unique<AdaptiveStepping>(
-            dynamics(), *timestepper_, control,
-            fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
-                        "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
-                        method().integrator));
-        if (timestepper_->has_extension() && system_->system->foreseeable())
-            ahead_ =
-                std::make_unique<LookAhead>(dynamics(), *system_->system, system_->step, shortest_part * system_->step);
-    }
+    if (stepping_->timestepper()->has_extension() && stepping_->has_limit() && system_->system->foreseeable())
+        stepping_->look_ahead(std::make_unique<LookAhead>(dynamics(), *system_->system, joint_.get(), system_->step,
+                                                          shortest_substep * system_->step));
+}
+
+StepControl Simulation::control_of_accuracy() {
+    SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
+    StepControl control = StepControl::within(system_->accuracy, system_->step);
+    control.sizes = std::move(sizes.of_velocities);
+    control.slow = control.absolute * sizes.least;
+    if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
+    std::vector<double> bounds = control.sizes;
+    for (double& bound : bounds) bound *= share_of_solves * control.absolute;
+    solver_->bound_errors(std::move(bounds));
+    return control;
 }
 
 void Simulation::change_method(std::size_t number) {
-    timestepper_.reset();
-    control_.reset();
-    ahead_.reset();
+    stepping_.reset();
     joint_.reset();
     system_->system->assemble();
     now_.totals.method_changes = static_cast<std::int64_t>(number);

@@ -14,15 +14,15 @@
 #include "delassus/distributed.hpp"
 #include "delassus/error.hpp"
 #include "simulation/energy_guard.hpp"
-#include "simulation/fixed_step.hpp"
-#include "simulation/look_ahead.hpp"
 #include "simulation/method_change.hpp"
 #include "simulation/overlap_watch.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
 #include "simulation/step_columns.hpp"
+#include "simulation/stepping.hpp"
 #include "simulation/stops_at_start.hpp"
 #include "simulation/touching.hpp"
+#include "simulation/watched_step.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/finite.hpp"
 #include "support/frames.hpp"
@@ -142,6 +142,9 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         if (solver.name.empty()) solver.name = auto_name;
         check_solver(registry, solver);
         require_law(system, registry, solver_->law());
+        const auto restitutes = [](const auto& one) { return one.contact.restitution > 0.0; };
+        restitutes_ = std::any_of(system.materials.begin(), system.materials.end(), restitutes) ||
+                      std::any_of(system.material_pairs.begin(), system.material_pairs.end(), restitutes);
         assembly_ = system.system->assemble();
         share(registry);
         if (!in_joints) make_method();
@@ -167,7 +170,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
             make_method();
         });
     now_.state = dynamics().initial_state();
-    if (ahead_) ahead_->begin(now_.state);
+    if (LookAhead* ahead = stepping_->ahead()) ahead->begin(now_.state);
     if (joint_) joint_->bodies_of(now_.state, bodies_);
     constraint_.resize(static_cast<std::size_t>(system.system->constraint_rows()));
     beyond_stops_ = beyond_stops(*system.system, bodies_at(now_.state, next_bodies_));
@@ -177,9 +180,6 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (!shared_ && system.system->size_of_shapes() > 0.0)
         overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy, bodies_at(now_.state, next_bodies_),
                                                    system.step);
-    const auto restitutes = [](const auto& one) { return one.contact.restitution > 0.0; };
-    restitutes_ = std::any_of(system.materials.begin(), system.materials.end(), restitutes) ||
-                  std::any_of(system.material_pairs.begin(), system.material_pairs.end(), restitutes);
     measure(state(), now_.step);
     now_.totals.start_energy = now_.totals.lowest = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
@@ -231,8 +231,7 @@ void Simulation::settle_turns(State& state) const {
 }
 
 void Simulation::begin_anew() {
-    if (ahead_) ahead_->begin(now_.state);
-    timestepper_->forces_jumped();
+    stepping_->begin_anew(now_.state);
 }
 
 void Simulation::notice_changes() {
@@ -256,11 +255,11 @@ double Simulation::input(std::string_view name) const {
 }
 
 void Simulation::renew_rows_ahead() {
-    LookAhead::Memory memory = ahead_->memory();
+    LookAhead::Memory memory = stepping_->ahead()->memory();
     if (!renew_rows(memory.way.end, memory.advances)) return;
     memory.way.degree = 0;
     memory.way.multipliers.clear();
-    ahead_->put_back(std::move(memory));
+    stepping_->ahead()->put_back(std::move(memory));
 }
 
 bool Simulation::renew_rows(State& state, std::int64_t steps) {
@@ -272,16 +271,14 @@ bool Simulation::renew_rows(State& state, std::int64_t steps) {
     if (mechanics.m() + held == mechanics.constraint_rows() || (steps % every != 0 && record_.drift < drifted))
         return false;
     if (joint_ ? !joint_->renew_rows(state, steps) : !mechanics.renew_rows(state, steps)) return false;
-    const std::vector<double> control = control_ ? control_->save() : std::vector<double>{};
+    const std::unique_ptr<Stepping> before = std::move(stepping_);
     make_method();
-    if (control_) control_->load(control);
+    stepping_->keep_control_of(*before);
     return true;
 }
 
 bool Simulation::finished() const {
-    // The last of steps that are chosen ends at `end` itself.
-    const double t = now_.state.t;
-    return system_->control ? t >= system_->end : has_ended(t, system_->end, system_->step);
+    return stepping_->ends(now_.state.t);
 }
 
 void Simulation::measure(const State& state, std::int64_t step) {
@@ -329,6 +326,15 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
             totals.start_energy, record_.energy, scale, taken.h, method().integrator, limits.energy_growth));
 }
 
+void Simulation::advance(State& state, AdaptiveStepReport& report) {
+    if (sleeping_) sleeping_->begin_step(stepping_->next(state.t).h);
+    WatchedStep watch(*system_->system, joint_.get(), *solver_, {overlaps_.get(), energy_.get(), &now_.totals},
+                      !restitutes_, next_bodies_);
+    stepping_->advance(state, *solver_, report, &watch);
+    deep_ = watch.deep();
+    if (sleeping_) sleeping_->end_step(now_.state, state);
+}
+
 const StepRecord& Simulation::step() {
     const auto begin = Clock::now();
     TraceSpan span("step", "step");
@@ -342,47 +348,32 @@ const StepRecord& Simulation::step() {
         go_on(fmt::format("the energy rose by {:.3g} J, {:.2g} % of what can have moved, though nothing supplies any",
                           now_.totals.growth, 100.0 * now_.totals.growth_share));
     notice_changes();
-    const bool advances = ahead_ && !ahead_->reaches(fixed_step(now_.state.t, system_->end, system_->step).end);
     State next = now_.state;
     try {
-        if (advances) {
-            renew_rows_ahead();
-        } else if (!ahead_) {
+        if (!stepping_->ahead()) {
             renew_rows(next, now_.step);
+        } else if (!stepping_->ahead()->reaches(stepping_->next(next.t).end)) {
+            renew_rows_ahead();
         }
-        if (shared_) shared_->prepare(next, fixed_step(next.t, system_->end, system_->step).h, timestepper_);
+        if (shared_) shared_->prepare(next, stepping_->next(next.t).h, stepping_->timestepper());
     } catch (const StepFailure& error) {
         throw StepFailure(fmt::format("{}: {}", where(), error.what()));
     }
-    // Where the state is only read off, the method stays as it is.
-    const bool only_shows = ahead_ && !advances;
-    deep_.clear();
-    const std::vector<double> memory = only_shows ? std::vector<double>{} : timestepper_->save();
     const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
-    const std::vector<double> control = control_ && !only_shows ? control_->save() : std::vector<double>{};
-    std::optional<LookAhead::Memory> ahead;
-    if (advances) {
-        ahead = ahead_->memory();
-        ahead_->count_advance();
-    }
     AdaptiveStepReport& taken = next_report_;
     SimulationTotals judged = now_.totals;
     const StepRecord last = record_;
     solver_->reset_effort();
     const auto undo = [&] {
         record_ = last;
-        if (only_shows) return;
-        timestepper_->restart();
-        timestepper_->load(memory);
+        stepping_->undo();
         if (sleeping_) sleeping_->load(sleeping);
-        if (control_) control_->load(control);
-        if (ahead) ahead_->put_back(std::move(*ahead));
     };
     try {
-        advance(next, taken, memory);
+        advance(next, taken);
         if (!all_finite(next.q) || !all_finite(next.v))
             throw StepFailure("the state at the end of the step is not finite");
-        if (!ahead_) settle_turns(next);
+        if (!stepping_->ahead()) settle_turns(next);
         measure(bodies_at(next, next_bodies_), now_.step + 1);
         record_.penetration = 0.0;
         for (const auto& contact : taken.step.contacts)
@@ -418,6 +409,7 @@ const StepRecord& Simulation::step() {
     record_.natural = effort.worst_natural;
     record_.solved = report.solved;
     record_.h = taken.h;
+    record_.substeps = taken.substeps;
     record_.rejected = taken.rejected;
     record_.impact = taken.impact;
     record_.linearization = report.linearization;
@@ -425,9 +417,9 @@ const StepRecord& Simulation::step() {
 
     auto& totals = now_.totals;
     add_step(record_, totals);
-    if (record_.parts > 1) {
+    if (record_.substeps > 1) {
         ++totals.divided_steps;
-        totals.most_parts = std::max(totals.most_parts, record_.parts);
+        totals.most_substeps = std::max(totals.most_substeps, record_.substeps);
     }
     if (!taken.impact) {
         totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
@@ -454,7 +446,7 @@ const StepRecord& Simulation::step() {
 std::vector<double> Simulation::multipliers() const {
     MultibodySystem& mechanics = *system_->system;
     if (record_.h == 0.0) return {};
-    const std::vector<double> kept = ahead_ ? ahead_->multipliers(coordinates(), *solver_) : report().multipliers;
+    const std::vector<double> kept = stepping_->multipliers(coordinates(), *solver_, report());
     std::vector<double> all = mechanics.all_multipliers(kept);
     if (!joint_) return all;
     std::vector<double> force(static_cast<std::size_t>(mechanics.n()), 0.0);
@@ -617,7 +609,7 @@ std::string Simulation::start() const {
 
 void Simulation::gather() {
     if (!shared_ || gathered_at_ == now_.step) return;
-    gathered_ = flat(shared_->memory(*timestepper_));
+    gathered_ = flat(shared_->memory(*stepping_->timestepper()));
     gathered_at_ = now_.step;
 }
 
@@ -633,13 +625,6 @@ std::vector<Simulation::Share> Simulation::shares() const {
     return shared_ ? shared_->shares() : std::vector<Share>{};
 }
 
-std::vector<double> Simulation::memory_of_method() const {
-    if (!shared_) return timestepper_->save();
-    if (gathered_at_ != now_.step)
-        throw InputError("the processes did not bring together what a checkpoint needs: call gather() before save()");
-    return gathered_;
-}
-
 SimulationState Simulation::save() const {
     SimulationState result = now_;
     const MultibodySystem& mechanics = *system_->system;
@@ -651,9 +636,10 @@ SimulationState Simulation::save() const {
             ++next;
         else
             result.rows_left_out.push_back(row);
-    result.memory = memory_of_method();
-    if (control_) result.control = control_->save();
-    if (ahead_) result.ahead = ahead_->save();
+    if (shared_ && gathered_at_ != now_.step)
+        throw InputError("the processes did not bring together what a checkpoint needs: call gather() before save()");
+    result.stepping = stepping_->save();
+    if (shared_) result.stepping.method = gathered_;
     if (sleeping_) result.sleeping = sleeping_->save();
     if (overlaps_) result.overlapping = overlaps_->given_up();
     return result;
@@ -686,23 +672,18 @@ void Simulation::load(SimulationState state) {
     system_->system->keep_rows(kept);
     if (joint_) joint_->bodies_of(state.state, bodies_);
     make_method();
-    timestepper_->load(state.memory);
+    stepping_->load(state.stepping, state.state);
     if (shared_) {
-        shared_->set_memory(timestepper_->memory());
-        gathered_ = state.memory;
+        shared_->set_memory(stepping_->timestepper()->memory());
+        gathered_ = state.stepping.method;
         gathered_at_ = state.step;
     }
-    if (control_) control_->load(state.control);
-    if (ahead_ && state.ahead.empty()) ahead_->begin(state.state);
-    if (ahead_ && !state.ahead.empty()) ahead_->load(state.ahead);
     if (sleeping_) sleeping_->load(state.sleeping);
     if (overlaps_) overlaps_->set_given_up(state.overlapping);
     system_->inputs.load(state.inputs);
     now_ = std::move(state);
-    now_.memory.clear();
+    now_.stepping = {};
     now_.rows_left_out.clear();
-    now_.control.clear();
-    now_.ahead.clear();
     now_.sleeping.clear();
     now_.overlapping.clear();
     record_ = {};

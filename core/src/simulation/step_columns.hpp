@@ -124,7 +124,7 @@ inline constexpr std::array<TotalColumn, 36> total_columns = {{
      &SimulationTotals::near_goal_solves, "/effort/near_goal_solves"},
     {"divided_steps", "1", "fixed steps that the method could not take in one", &SimulationTotals::divided_steps,
      "/divided_steps"},
-    {"most_parts", "1", "that one of them was divided into", &SimulationTotals::most_parts, "/most_parts"},
+    {"most_substeps", "1", "that one of them was divided into", &SimulationTotals::most_substeps, "/most_substeps"},
     {"inexact_steps", "1", "steps with a part that errs by more than the accuracy asks, however short it is",
      &SimulationTotals::inexact_steps, "/inexact_steps"},
     {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Steps that are cut between impacts that follow one another within them (internal).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "delassus/export.hpp"
+#include "delassus/timestepper.hpp"
+
+namespace delassus {
+
+/// Takes the steps of a method. One in which an impact leads to another (StepReport::cut) is cut between them, as often
+/// as it has to be: the second one then has the speed with which its bodies meet. Restitution gives back no more than
+/// there was: else the step stays whole.
+class DELASSUS_API ImpactCuts {
+public:
+    /// Outlives this.
+    explicit ImpactCuts(DynamicalSystem& system) : system_(system) {}
+
+    /// As Timestepper::step().
+    void step(Timestepper& stepper, State& state, double h, StepSolver& solver, StepReport& report);
+
+private:
+    /// A step in parts that end between its impacts, the first of this length. memory: the method's at `state`.
+    static void step_in_cuts(Timestepper& stepper, State& state, double h, double first, std::vector<double> memory,
+                             StepSolver& solver, StepReport& report);
+    [[nodiscard]] double kinetic(const State& state);
+    /// What contacts give on the way from one state to another, J.
+    [[nodiscard]] double gain(const State& from, const State& to);
+
+    DynamicalSystem& system_;
+    std::vector<double> momentum_, way_, forces_;
+};
+
+}  // namespace delassus

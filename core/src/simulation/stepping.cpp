@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "simulation/stepping.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "delassus/error.hpp"
+#include "dynamics/substeps.hpp"
+#include "simulation/shared_run.hpp"
+
+namespace delassus {
+
+Stepping::Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timestepper, SteppingSettings settings,
+                   SharedRun* shared)
+    : system_(system), settings_(std::move(settings)), shared_(shared), timestepper_(std::move(timestepper)) {
+    if (settings_.restitutes) cuts_ = std::make_unique<ImpactCuts>(system);
+    if (shared) return;
+    if (settings_.chosen) {
+        control_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.chosen);
+        return;
+    }
+    if (const double limit = timestepper_->error_limit(); std::isfinite(limit))
+        settings_.divided = StepControl::within(limit, settings_.step);
+    if (settings_.divided)
+        control_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.divided, settings_.advice);
+}
+Stepping::~Stepping() = default;
+
+bool Stepping::ends(double t) const {
+    // The last of steps that are chosen ends at `end` itself.
+    return settings_.chosen ? t >= settings_.end : has_ended(t, settings_.end, settings_.step);
+}
+
+void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
+    begin_ = state;
+    reads_ = ahead_ && ahead_->reaches(next(state.t).end);
+    ahead_before_.reset();
+    if (!reads_) {
+        method_before_ = timestepper_->save();
+        if (control_) control_before_ = control_->save();
+        if (ahead_) {
+            ahead_before_ = ahead_->memory();
+            ahead_->count_advance();
+        }
+    }
+    if (settings_.chosen) {
+        report = control_->step(state, settings_.end, solver);
+        return;
+    }
+    const FixedStep step = next(state.t);
+    report.h = step.h;
+    report.error = 0.0;
+    report.rejected = 0;
+    report.impact = false;
+    if (ahead_) {
+        step_ahead(state, step.end, solver, report);
+    } else if (control_) {
+        step_within_error(state, step.end, solver, report);
+    } else {
+        step_fixed(state, solver, report, watch);
+    }
+    state.t = step.end;
+}
+
+void Stepping::undo() {
+    if (reads_) return;
+    timestepper_->load(method_before_);
+    if (control_) control_->load(control_before_);
+    if (ahead_before_) ahead_->put_back(std::move(*ahead_before_));
+}
+
+void Stepping::go_back(State& state) {
+    state = begin_;
+    timestepper_->load(method_before_);
+}
+
+// ---- Steps of a fixed size ----
+
+void Stepping::take(State& state, double h, StepSolver& solver, StepReport& report) {
+    solver.forget_misses();
+    if (shared_) {
+        shared_->step(state, h, *timestepper_, solver, report);
+    } else if (cuts_) {
+        cuts_->step(*timestepper_, state, h, solver, report);
+    } else {
+        timestepper_->step(state, h, solver, report);
+    }
+    solver.require_usable();
+}
+
+void Stepping::try_substeps(std::int64_t substeps, State& state, StepSolver& solver, AdaptiveStepReport& report,
+                            StepWatch* watch) {
+    // Where rounding makes more of the linear model's error than this, nobody knows whether substeps are short enough.
+    constexpr double most_rounding = 0.1;
+    const double h = report.h / static_cast<double>(substeps);
+    if (watch) watch->begin_trial(substeps);
+    report.step.clear();
+    for (std::int64_t i = 1; i <= substeps; ++i) {
+        take(state, h, solver, substep_);
+        if (watch) watch->judge(state, h, substep_, i == substeps);
+        if (substeps > 1 && substep_.linearization_rounding > most_rounding)
+            throw StepTooLong("the last digits of positions are as large as what a step errs by");
+        substep_.follow(report.step);
+        std::swap(report.step, substep_);
+    }
+    report.substeps = substeps;
+}
+
+void Stepping::step_whole(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
+    while (true) {
+        try {
+            return try_substeps(1, state, solver, report, watch);
+        } catch (const StepTooLong& failure) {
+            if (!watch || !watch->mend(failure, substep_, state)) throw;
+        }
+        go_back(state);
+    }
+}
+
+void Stepping::step_in_substeps(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch,
+                                const StepTooLong& failure) {
+    if (watch) watch->begin_substeps(failure);
+    for (std::int64_t substeps = 2;; substeps *= 2) {
+        go_back(state);
+        try {
+            return try_substeps(substeps, state, solver, report, watch);
+        } catch (const StepTooLong&) {
+            if (substeps >= most_substeps) throw;
+        }
+    }
+}
+
+void Stepping::step_fixed(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
+    if (watch) watch->begin(state, report.h);
+    for (bool taken = false; !taken;) {
+        try {
+            step_whole(state, solver, report, watch);
+            taken = true;
+        } catch (const StepTooLong& failure) {
+            try {
+                step_in_substeps(state, solver, report, watch, failure);
+                taken = true;
+            } catch (const StepFailure& last) {
+                if (!watch || !watch->give_up(failure, last)) {
+                    if (!dynamic_cast<const StepTooLong*>(&last)) throw;
+                    throw StepFailure(
+                        fmt::format("{}; {} substeps of it are too long as well", failure.what(), most_substeps));
+                }
+                go_back(state);
+            }
+        }
+    }
+    if (watch) watch->end();
+}
+
+// ---- Steps by their error ----
+
+void Stepping::step_within_error(State& state, double end, StepSolver& solver, AdaptiveStepReport& report) {
+    report.step.clear();
+    report.substeps = 0;
+    for (; state.t < end; ++report.substeps) {
+        AdaptiveStepReport part = control_->step(state, end, solver);
+        part.step.follow(report.step);
+        std::swap(report.step, part.step);
+        report.rejected += part.rejected;
+        report.error = std::max(report.error, part.error);
+    }
+}
+
+void Stepping::step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report) {
+    report.step.clear();
+    report.substeps = 0;
+    while (!ahead_->reaches(end)) {
+        AdaptiveStepReport part = ahead_->advance(end, *timestepper_, *control_, solver);
+        if (!ahead_->cut_by_corner()) ++report.substeps;
+        part.step.follow(report.step);
+        std::swap(report.step, part.step);
+    }
+    report.substeps = std::max<std::int64_t>(report.substeps, 1);
+    show_ahead(state, end, solver, report);
+    report.step.multipliers.clear();
+}
+
+// Where constraints lose rank, a state on the way of a step cannot be returned to them, nor can a step that ends there
+// tell which of several branches it is on: velocities along them fit the constraints alike. The way that leapt over it
+// does, and is shown as it is where it is off the constraints by no more than the method may err.
+void Stepping::show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report) {
+    try {
+        StepReport shown;
+        solver.forget_misses();
+        ahead_->show(end, state, solver, shown);
+        solver.require_usable();
+        shown.follow(report.step);
+        std::swap(report.step, shown);
+        return;
+    } catch (const StepFailure&) {
+        ahead_->read(end, state);
+        std::vector<double> off(static_cast<std::size_t>(system_.m()));
+        system_.constraint(state, off.data());
+        const double limit = std::min(timestepper_->error_limit(), settings_.accuracy);
+        if (std::all_of(off.begin(), off.end(), [limit](double C) { return std::abs(C) <= limit; })) return;
+    }
+    state = begin_;
+    timestepper_->restart();
+    control_->set_largest(settings_.step);
+    AdaptiveStepReport shown;
+    step_within_error(state, end, solver, shown);
+    report.step = std::move(shown.step);
+    report.substeps = shown.substeps;
+    ahead_->begin(state);
+}
+
+// ---- What is kept ----
+
+void Stepping::begin_anew(const State& state) {
+    if (ahead_) ahead_->begin(state);
+    timestepper_->forces_jumped();
+}
+
+std::vector<double> Stepping::multipliers(const State& state, StepSolver& solver, const StepReport& report) {
+    return ahead_ ? ahead_->multipliers(state, solver) : report.multipliers;
+}
+
+SteppingMemory Stepping::save() const {
+    SteppingMemory memory{.method = timestepper_->save(), .control = {}, .ahead = {}};
+    if (control_) memory.control = control_->save();
+    if (ahead_) memory.ahead = ahead_->save();
+    return memory;
+}
+
+void Stepping::load(const SteppingMemory& memory, const State& state) {
+    timestepper_->load(memory.method);
+    if (control_) control_->load(memory.control);
+    if (!ahead_) return;
+    if (memory.ahead.empty()) return ahead_->begin(state);
+    ahead_->load(memory.ahead);
+}
+
+void Stepping::keep_control_of(const Stepping& other) {
+    if (control_ && other.control_) control_->load(other.control_->save());
+}
+
+}  // namespace delassus

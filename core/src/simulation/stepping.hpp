@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a system comes from one state that is shown to the next (internal).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "delassus/adaptive_stepping.hpp"
+#include "delassus/export.hpp"
+#include "delassus/simulation.hpp"
+#include "delassus/timestepper.hpp"
+#include "dynamics/impact_cuts.hpp"
+#include "simulation/fixed_step.hpp"
+#include "simulation/look_ahead.hpp"
+#include "simulation/step_watch.hpp"
+
+namespace delassus {
+
+class SharedRun;
+
+/// What the steps of a system follow from.
+struct SteppingSettings {
+    double step = 0.0, end = 0.0;        ///< between states that are shown, and of the run, s
+    std::optional<StepControl> chosen;   ///< steps follow from a tolerance; `step` means nothing then
+    std::optional<StepControl> divided;  ///< how fixed steps are divided, where the method has no error_limit()
+    double accuracy = 0.0;    ///< off constraints by no more, a state is shown where it cannot be returned to them
+    std::string advice;       ///< what to do where no substep is short enough
+    bool restitutes = false;  ///< there is restitution: steps are cut between impacts
+};
+
+// One step that is shown is, from the inside out:
+//
+//     a step of the method            Timestepper; of several processes, SharedRun
+//     cut between impacts             ImpactCuts, where there is restitution
+//     in 2, 4, … equal substeps         where the method or the watch calls it too long
+//   or
+//     in substeps by their error      AdaptiveStepping, where there is an error limit, an accuracy or a tolerance
+//     longer than what is shown       LookAhead, where the method knows the way of its steps
+//
+/// The layers around the step of a method.
+class DELASSUS_API Stepping {
+public:
+    /// system outlives this; timestepper is made for it. shared: by other processes, outlives this; or null.
+    Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timestepper, SteppingSettings settings,
+             SharedRun* shared = nullptr);
+    ~Stepping();
+
+    /// Whether t is the end of the run.
+    [[nodiscard]] bool ends(double t) const;
+    /// The fixed step from t on.
+    [[nodiscard]] FixedStep next(double t) const { return fixed_step(t, settings_.end, settings_.step); }
+
+    /// state ← the next one that is shown. watch: of fixed steps that are not divided by their error, or null. Throws
+    /// StepFailure, or Unsupported as the method does; call undo() then.
+    void advance(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch = nullptr);
+    /// Everything but the state is as before the last advance().
+    void undo();
+
+    /// The state was changed from outside, or what acts on it has jumped.
+    void begin_anew(const State& state);
+    /// λ of the bilateral constraints at the state that was shown last; report: of its step.
+    [[nodiscard]] std::vector<double> multipliers(const State& state, StepSolver& solver, const StepReport& report);
+
+    /// SharedRun replaces it.
+    [[nodiscard]] std::unique_ptr<Timestepper>& timestepper() { return timestepper_; }
+    /// Shows states by steps that are longer; null: there are none such.
+    [[nodiscard]] LookAhead* ahead() { return ahead_.get(); }
+    void look_ahead(std::unique_ptr<LookAhead> ahead) { ahead_ = std::move(ahead); }
+    /// Whether fixed steps are divided by their error.
+    [[nodiscard]] bool has_limit() const { return control_ && !settings_.chosen; }
+
+    [[nodiscard]] SteppingMemory save() const;
+    void load(const SteppingMemory& memory, const State& state);
+    /// That of the choice of steps goes on with another method.
+    void keep_control_of(const Stepping& other);
+
+private:
+    void take(State& state, double h, StepSolver& solver, StepReport& report);
+    void step_fixed(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    void step_whole(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    void step_in_substeps(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch,
+                          const StepTooLong& failure);
+    void try_substeps(std::int64_t substeps, State& state, StepSolver& solver, AdaptiveStepReport& report,
+                      StepWatch* watch);
+    void step_within_error(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
+    void step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
+    void show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
+    void go_back(State& state);
+
+    DynamicalSystem& system_;
+    SteppingSettings settings_;
+    SharedRun* shared_;
+    std::unique_ptr<Timestepper> timestepper_;
+    std::unique_ptr<ImpactCuts> cuts_;           // or empty
+    std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the substeps of fixed ones; or empty
+    std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
+    // Of the last advance(), before it:
+    State begin_;
+    bool reads_ = false;  // all was known already, and nothing has changed
+    std::vector<double> method_before_, control_before_;
+    std::optional<LookAhead::Memory> ahead_before_;
+    StepReport substep_;  // memory
+};
+
+}  // namespace delassus
