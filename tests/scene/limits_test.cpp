@@ -227,7 +227,8 @@ TEST(LinearizationLimit, DividesStepsThatAreTooLong) {
         EXPECT_EQ(run.simulation.state().t, 0.5);
         EXPECT_NEAR(run.pose("bob").position[0], 0.39104879, off) << method;
         // The same as with that step from the beginning, where all are divided alike.
-        Running shorter = running(spring_pendulum(stiffness), method, 0.001 / static_cast<double>(totals.most_substeps));
+        Running shorter =
+            running(spring_pendulum(stiffness), method, 0.001 / static_cast<double>(totals.most_substeps));
         EXPECT_EQ(failure_of(shorter), "");
         EXPECT_EQ(shorter.simulation.totals().divided_steps, 0) << method;
         EXPECT_NEAR(shorter.pose("bob").position[0], run.pose("bob").position[0], off) << method;

@@ -90,7 +90,7 @@ struct SceneSystem {
     std::optional<SleepingRule> sleeping;  ///< none: every body is awake
     std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given
     RunLimits limits;                            ///< what a run must not exceed
-    double end = 0.0;          ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
+    double end = 0.0;                            ///< s, ≥ 0: the time at which the simulation ends; it starts at 0
     double planned_end = 0.0;  ///< that of the scene by itself, where `end` was asked for (SceneOverrides::end), s
 
     // The names that a plan and a report use.
