@@ -6,6 +6,7 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -13,6 +14,7 @@
 
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
+#include "importers/xml_known.hpp"
 #include "importers/xml_tree.hpp"
 #include "model_import/model.hpp"
 #include "support/text_file.hpp"
@@ -313,21 +315,34 @@ std::string with_name(const std::string& text, const std::string& name) {
     return printer.CStr();
 }
 
+constexpr std::array<KnownElement, 18> urdf_elements = {{
+    {"link", "name type~", "inertial collision visual~"},
+    {"inertial", "", "origin mass inertia"},
+    {"origin", "xyz rpy", ""},
+    {"mass", "value", ""},
+    {"inertia", "ixx ixy ixz iyy iyz izz", ""},
+    {"collision", "name group~", "origin geometry"},
+    {"geometry", "", "box sphere cylinder mesh"},
+    {"box", "size", ""},
+    {"sphere", "radius", ""},
+    {"cylinder", "radius length", ""},
+    {"mesh", "filename scale", ""},
+    {"joint", "name type", "origin parent child axis dynamics limit calibration~ mimic safety_controller~"},
+    {"parent", "link", ""},
+    {"child", "link", ""},
+    {"axis", "xyz", ""},
+    {"dynamics", "damping friction", ""},
+    {"limit", "lower upper effort velocity", ""},
+    {"mimic", "joint multiplier offset", ""},
+}};
+
 /// What urdfdom passes over without a word.
 void note_unread(const XmlElement& robot, Model& model) {
-    static const std::set<std::string> of_link = {"inertial", "visual", "collision"};
-    static const std::set<std::string> of_joint = {
-        "origin", "parent", "child", "axis", "dynamics", "limit", "calibration", "mimic", "safety_controller"};
     static const std::set<std::string> looks = {"material", "sensor", "visual", "dynamic_shadows", "laser_retro"};
-    const auto lose = [&](const XmlElement& element, const std::string& of) {
-        model.lose(fmt::format("element <{}> of {}", element.name, of), "URDF as it is read here does not have it");
-    };
     for (const XmlElement& part : robot.children) {
         const std::string name = part.text("name");
         if (part.name == "link" || part.name == "joint") {
-            const auto& known = part.name == "link" ? of_link : of_joint;
-            for (const XmlElement& child : part.children)
-                if (!known.contains(child.name)) lose(child, fmt::format("{} \"{}\"", part.name, name));
+            note_unknown(part, urdf_elements, "URDF", model);
         } else if (part.name == "gazebo") {
             std::vector<std::string> acts;
             for (const XmlElement& child : part.children)
