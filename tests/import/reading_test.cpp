@@ -102,8 +102,12 @@ TEST(ImportUrdf, RefusesWithOneSentence) {
               std::string::npos);
     EXPECT_NE(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "-1") + hinge_of("a", "b"))).find("mass"),
               std::string::npos);
-    EXPECT_EQ(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "0") + hinge_of("a", "b"))),
-              "a.urdf: nothing in the model moves that has mass");
+    EXPECT_EQ(
+        refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "0") + hinge_of("a", "b"))),
+        "a.urdf: nothing in the model moves that has mass; not carried over: link \"b\": an inertia without a mass: "
+        "left out; body \"b\": it has no mass and carries none: left out, with its joint");
+    EXPECT_EQ(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "abc") + hinge_of("a", "b"))),
+              "a.urdf: link \"b\": line 1: <mass>: value=\"abc\" is to be numbers, and \"abc\" is none");
     EXPECT_NE(refusal("a.urdf", urdf_of(link_of("a") + link_of("b") + hinge_of("a", "b", "<mimic joint=\"ab\"/>")))
                   .find("mimics itself"),
               std::string::npos);
@@ -151,6 +155,19 @@ TEST(ImportUrdf, MendsWhatRobotsOfOthersHave) {
     EXPECT_EQ(lost["collision 2 of link \"b\""], "an open mesh: the convex hull of its points collides");
     EXPECT_NE(lost["body \"b\""].find("that of a ball of water"), std::string::npos) << lost["body \"b\""];
     EXPECT_NE(made.yaml.find("inertia: {xx: 0.0048"), std::string::npos) << made.yaml;
+}
+
+TEST(ImportUrdf, NamesXacroWhereItsMacrosAreStillThere) {
+    const std::string two = link_of("a") + link_of("b");
+    EXPECT_EQ(refusal("a.urdf.xacro", urdf_of(two + "<xacro:wheel side='left'/>" + hinge_of("a", "b"))),
+              "a.urdf.xacro: it has macros of xacro; expand it first: xacro a.urdf.xacro > a.urdf");
+    EXPECT_EQ(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "${m}") + hinge_of("a", "b"))),
+              "a.urdf: it has macros of xacro; expand it first: xacro a.urdf > a.expanded.urdf");
+    EXPECT_EQ(refusal("a.xml", urdf_of("<gazebo><k>${k}</k></gazebo>" + two + hinge_of("a", "b"))),
+              "a.xml: it has macros of xacro; expand it first: xacro a.xml > a.expanded.urdf");
+    EXPECT_EQ(refusal("a.urdf", "<robot name='r' xmlns:xacro='http://ros.org/wiki/xacro'>" + two + hinge_of("a", "b") +
+                                    "</robot>"),
+              "");
 }
 
 TEST(ImportUrdf, ListsWhatTheLibraryPassesOver) {
@@ -290,6 +307,10 @@ TEST(ImportMjcf, RefusesWithOneSentence) {
     EXPECT_EQ(refusal("a.xml", mjcf_of("<body>\n<joint type='door'/>" + bob + "</body>")),
               "a.xml: line 2: <joint>: type=\"door\" is none of free, ball, slide, hinge");
     EXPECT_EQ(refusal("a.xml", mjcf_of(bob)), "a.xml: nothing in the model moves that has mass");
+    EXPECT_EQ(
+        refusal("a.xml", mjcf_of("<body name='b'><freejoint/><geom name='g' type='box' size='0.1 0 0.1'/></body>")),
+        "a.xml: nothing in the model moves that has mass; not carried over: shape \"g\": a size of it is not "
+        "positive: left out; body \"b\": it has no mass, and nothing holds it: left out");
     ImportSettings settings;
     settings.keyframe = "home";
     EXPECT_EQ(refusal("a.xml", mjcf_of("<body><joint/>" + bob + "</body>"), settings),
