@@ -195,6 +195,8 @@ class Solver(_delassus.Solver):
               max_iterations: Optional[int] = None, time_limit: Optional[float] = None,
               start: Union[Result, Tuple[Any, Any], None] = None, curve: bool = False) -> Result:
         """Solve. Not converging is a status of the result; see solve() for the arguments."""
+        if not isinstance(problem, _delassus.Problem):
+            raise InputError(f"a solver takes a Problem, not a {type(problem).__name__}; read() makes one of a path")
         if start is not None:
             start = _start(start)
         return self._solve(problem, tolerance, max_iterations, time_limit, law, start, curve)
@@ -203,7 +205,7 @@ class Solver(_delassus.Solver):
         return f"<delassus.Solver: {self.name} {self.version}>"
 
 
-def solve(problem: Problem, solver: Union[str, Solver] = "auto", tolerance: float = 1e-8, law: Optional[str] = None,
+def solve(problem: Union[Problem, Path], solver: Union[str, Solver] = "auto", tolerance: float = 1e-8, law: Optional[str] = None,
           max_iterations: Optional[int] = None, time_limit: Optional[float] = None,
           start: Union[Result, Tuple[Any, Any], None] = None, curve: bool = False,
           plugin_path: Sequence[Path] = (), **options: Any) -> Result:
@@ -211,6 +213,7 @@ def solve(problem: Problem, solver: Union[str, Solver] = "auto", tolerance: floa
 
     Parameters
     ----------
+    problem : a Problem, or the path of one as read() takes it
     solver : a name as Solver takes it, or a Solver
     tolerance : of the natural error, dimensionless (docs/errors.md)
     law : 'associated' or 'coulomb' for this solve; None: the problem's own
@@ -224,6 +227,8 @@ def solve(problem: Problem, solver: Union[str, Solver] = "auto", tolerance: floa
     the solver cannot take the problem, InputError for a wrong option or setting. Ctrl-C ends the solve when the solver
     next shows an iterate, and raises KeyboardInterrupt. Other threads run meanwhile.
     """
+    if isinstance(problem, (str, os.PathLike)):
+        problem = read(problem)
     if isinstance(solver, _delassus.Solver):
         if options or plugin_path:
             raise InputError("options and plugin_path belong to the Solver: give them where it is made")

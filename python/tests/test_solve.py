@@ -116,6 +116,16 @@ class Results(unittest.TestCase):
         np.testing.assert_array_equal(one.lam, two.lam)
         self.assertEqual(one.options, {"omega": "1.2"})
 
+    def test_a_path_in_place_of_a_problem(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.pile.write(folder + "/pile")
+            by_path = delassus.solve(folder + "/pile", "pgs", tolerance=1e-3)
+            np.testing.assert_array_equal(by_path.lam, delassus.solve(self.pile, "pgs", tolerance=1e-3).lam)
+            with self.assertRaisesRegex(delassus.InputError, "there is no such file or folder"):
+                delassus.solve(folder + "/none")
+        with self.assertRaisesRegex(delassus.InputError, "takes a Problem, not a str"):
+            delassus.Solver("pgs").solve("pile")
+
     def test_exceptions_have_the_librarys_sentences(self):
         for kind, sentence, arguments in (
                 (delassus.Unsupported, 'apgd cannot solve "sphere_pile": the exact Coulomb law',

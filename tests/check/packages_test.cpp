@@ -185,7 +185,11 @@ TEST_F(Packages, AreCheckedBeforeTheyAreLoaded) {
     const auto used = run({"solve", problem_, "--solver", "touches_file"});
     EXPECT_EQ(used.exit_code, 2);
     EXPECT_NE(used.err.find(words), std::string::npos) << used.err;
-    EXPECT_NE(run({"plugins", "list"}).out.find(words), std::string::npos);
+    const std::string listed = run({"plugins", "list"}).out;
+    EXPECT_NE(listed.find("\n" + words), std::string::npos) << "its path is there once: " << listed;
+    const auto shown = run({"plugins", "info", "touches_file"});
+    EXPECT_EQ(shown.exit_code, 2);
+    EXPECT_NE(shown.err.find(words), std::string::npos) << shown.err;
 
     Json manifest = Json::parse(content_of(place / "touches_file.json"));
     manifest["platform"] = "linux_vax";

@@ -123,6 +123,20 @@ TEST(Run, ResumeRefusesAnotherScene) {
     EXPECT_EQ(run_command("run " + scene("pendulum") + " --resume " + (scratch / "none").string()).exit_code, 2);
 }
 
+TEST(Run, ResumeSaysWhereItIsAndNamesTheSolver) {
+    const ScratchFolder scratch;
+    const auto folder = (scratch / "run").string(), arguments = "run " + scene("brick_wall") + " ";
+    const auto whole = run_command(arguments + "--end 0.02 -o " + folder);
+    ASSERT_EQ(whole.exit_code, 0) << whole.err;
+    const auto passed = run_command(arguments + "--end 0.01 --resume " + folder);
+    EXPECT_EQ(passed.exit_code, 2);
+    EXPECT_EQ(passed.err, "delassus: " + folder + " has come to t = 0.02 s, beyond the --end of 0.01 s\n");
+    const auto again = run_command(arguments + "--end 0.02 --resume " + folder);  // nothing is left to do
+    EXPECT_EQ(again.exit_code, 0) << again.err;
+    EXPECT_NE(again.out.find(" solves, "), std::string::npos) << again.out;
+    EXPECT_EQ(again.out.find("\n  : "), std::string::npos) << again.out;
+}
+
 TEST(Run, LeavesForeignFilesAlone) {
     const ScratchFolder scratch;
     std::ofstream(scratch / "thesis.tex") << "x";

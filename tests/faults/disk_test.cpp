@@ -238,7 +238,12 @@ TEST_F(StoppedRun, ANewOneIsRefused) {
 TEST_F(StoppedRun, ByALimitOfFileSizesGoesOn) {
     std::optional<FileSizeLimit> limit;
     const auto stop = [&] { limit.emplace(fs::file_size(scratch_ / "run/trajectory.h5") + 100'000); };
-    expect_it_goes_on(scratch_ / "run", stop, [&] { limit.reset(); });
+    expect_it_goes_on(scratch_ / "run", stop, [&] {
+        limit.reset();
+        const auto report = nlohmann::json::parse(text_of(scratch_ / "run" / "report.json"));
+        EXPECT_EQ(report.at("status"), "failed");
+        EXPECT_NE(report.at("message").get<std::string>().find("cannot be written"), std::string::npos);
+    });
 }
 
 #endif

@@ -276,7 +276,7 @@ TEST(ImportRepairs, GroupsLosses) {
     const auto lines = grouped(all);
     ASSERT_EQ(lines.size(), 2U);
     EXPECT_EQ(lines[0].what, "5 × geom \"0\", geom \"1\", geom \"2\" and 2 more");
-    EXPECT_EQ(lines[0].why, "a size of 0 (of the first; the others alike)");
+    EXPECT_EQ(lines[0].why, "a size of 0 (the first; the others have other numbers or names)");
     EXPECT_EQ(lines[1].what, "joint \"j\"");
 }
 
@@ -343,6 +343,77 @@ TEST(ImportSdfLosses, SoftContactsAreLost) {
     EXPECT_EQ(lost[0].why, "kp, soft_cfm: contacts are rigid");
 }
 #endif
+
+// torquescale 0: the anchor in the second body stays where it is in the first, and the second body turns about it.
+TEST(ImportMjcfToday, AWeldWithoutTorquesIsAConnection) {
+    const std::string ball = "<freejoint/><geom type='sphere' size='0.1' contype='0' conaffinity='0'/></body>";
+    const auto welded = [&](const std::string& how) {
+        return Made(mjcf("<body name='a' pos='0 0 1'>" + ball + "<body name='b' pos='1 0 1'>" + ball, "",
+                         "<equality><weld name='w' body1='a' body2='b' " + how + "/></equality>"));
+    };
+    const Made loose = welded("torquescale='0' anchor='-0.5 0 0'");
+    EXPECT_TRUE(loose.text.lost.empty()) << loose.text.yaml;
+    EXPECT_EQ(loose.named("joints", "w")["kind"].as<std::string>(), "spherical");
+    EXPECT_EQ(loose.named("joints", "w")["point"][0].as<double>(), 0.5);
+    const Made posed =
+        welded("torquescale='0' anchor='-0.4 0 0' relpose='0.6 0 0 0 1 0 0'");  // turned, but not held so
+    EXPECT_EQ(posed.named("joints", "w")["point"][0].as<double>(), 0.6);
+    const Made rigid = welded("");
+    EXPECT_EQ(rigid.named("joints", "w")["kind"].as<std::string>(), "fixed");
+    const Made half = welded("torquescale='0.5'");
+    ASSERT_EQ(half.text.lost.size(), 1U);
+    EXPECT_EQ(half.text.lost[0].why, "torquescale 0.5: the weld is rigid");
+    EXPECT_EQ(half.named("joints", "w")["kind"].as<std::string>(), "fixed");
+}
+
+TEST(ImportMjcfToday, RefusesTwoOrientationsZeroOnesAndNamesThatAreThereTwice) {
+    const auto refusal = [](const std::string& model) -> std::string {
+        try {
+            const Made made(model);
+        } catch (const InputError& error) {
+            const std::string what = error.what();
+            return what.substr(what.find("line"));
+        }
+        return "";
+    };
+    EXPECT_EQ(refusal(mjcf("<body euler='0 0 3' quat='1 0 0 0'><freejoint/>" + bob + "</body>")),
+              "line 1: <body>: it has two orientations, quat and euler");
+    EXPECT_EQ(refusal(mjcf("<body><freejoint/><geom size='0.1' zaxis='0 0 1' axisangle='0 0 1 1'/></body>")),
+              "line 1: <geom>: it has two orientations, axisangle and zaxis");
+    EXPECT_EQ(refusal(mjcf("<body quat='0 0 0 0'><freejoint/>" + bob + "</body>")),
+              "line 1: <body>: quat is no rotation: its numbers are all 0");
+    const std::string hinge = "<body name='a'><joint name='j'/>" + bob + "</body>";
+    const std::string two = "<motor name='m' joint='j'/><motor name='m' joint='j'/>";
+    EXPECT_EQ(refusal(mjcf(hinge, "", "<actuator>" + two + "</actuator>")),
+              "line 1: <motor>: there is another actuator \"m\"");
+    EXPECT_EQ(
+        refusal(mjcf(hinge, "",
+                     "<equality><joint name='e' joint1='j'/><weld name='e' body1='a' active='false'/></equality>")),
+        "line 1: <weld>: there is another equality \"e\"");
+    EXPECT_EQ(refusal(mjcf(hinge, "", "<keyframe><key name='k'/><key name='k'/></keyframe>")),
+              "line 1: <key>: there is another keyframe \"k\"");
+}
+
+TEST(ImportMjcfToday, ARangeWhoseEndsAreNotInTheirOrderIsALoss) {
+    const Made made(
+        mjcf("<body name='a'><joint name='j' range='30 -30' actuatorfrcrange='2 -2'/>" + bob + "</body>", "",
+             "<actuator><motor name='m' joint='j' ctrlrange='1 -1'/></actuator>" +
+                 std::string("<keyframe><key ctrl='3'/></keyframe>")),
+        [] {
+            ImportSettings settings;
+            settings.keyframe = "0";
+            return settings;
+        }());
+    std::vector<std::string> why;
+    for (const auto& one : made.text.lost) why.push_back(one.why);
+    EXPECT_EQ(why,
+              (std::vector<std::string>{"range 30 -30, whose ends are not in their order: it limits nothing",
+                                        "actuatorfrcrange 2 -2, whose ends are not in their order: it limits nothing",
+                                        "ctrlrange 1 -1, whose ends are not in their order: it limits nothing"}));
+    EXPECT_FALSE(made.named("joints", "j")["limits"]);
+    const Made off(mjcf("<body name='a'><joint name='j' range='30 -30' limited='false'/>" + bob + "</body>"));
+    EXPECT_TRUE(off.text.lost.empty());
+}
 
 }  // namespace import_mjcf
 }  // namespace delassus::tests

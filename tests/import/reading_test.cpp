@@ -102,8 +102,12 @@ TEST(ImportUrdf, RefusesWithOneSentence) {
               std::string::npos);
     EXPECT_NE(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "-1") + hinge_of("a", "b"))).find("mass"),
               std::string::npos);
-    EXPECT_EQ(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "0") + hinge_of("a", "b"))),
-              "a.urdf: nothing in the model moves that has mass");
+    EXPECT_EQ(
+        refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "0") + hinge_of("a", "b"))),
+        "a.urdf: nothing in the model moves that has mass; not carried over: link \"b\": an inertia without a mass: "
+        "left out; body \"b\": it has no mass and carries none: left out, with its joint");
+    EXPECT_EQ(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "abc") + hinge_of("a", "b"))),
+              "a.urdf: link \"b\": line 1: <mass>: value=\"abc\" is to be numbers, and \"abc\" is none");
     EXPECT_NE(refusal("a.urdf", urdf_of(link_of("a") + link_of("b") + hinge_of("a", "b", "<mimic joint=\"ab\"/>")))
                   .find("mimics itself"),
               std::string::npos);
@@ -151,6 +155,34 @@ TEST(ImportUrdf, MendsWhatRobotsOfOthersHave) {
     EXPECT_EQ(lost["collision 2 of link \"b\""], "an open mesh: the convex hull of its points collides");
     EXPECT_NE(lost["body \"b\""].find("that of a ball of water"), std::string::npos) << lost["body \"b\""];
     EXPECT_NE(made.yaml.find("inertia: {xx: 0.0048"), std::string::npos) << made.yaml;
+}
+
+TEST(ImportUrdf, NamesXacroWhereItsMacrosAreStillThere) {
+    const std::string two = link_of("a") + link_of("b");
+    EXPECT_EQ(refusal("a.urdf.xacro", urdf_of(two + "<xacro:wheel side='left'/>" + hinge_of("a", "b"))),
+              "a.urdf.xacro: it has macros of xacro; expand it first: xacro a.urdf.xacro > a.urdf");
+    EXPECT_EQ(refusal("a.urdf", urdf_of(link_of("a") + link_of("b", "${m}") + hinge_of("a", "b"))),
+              "a.urdf: it has macros of xacro; expand it first: xacro a.urdf > a.expanded.urdf");
+    EXPECT_EQ(refusal("a.xml", urdf_of("<gazebo><k>${k}</k></gazebo>" + two + hinge_of("a", "b"))),
+              "a.xml: it has macros of xacro; expand it first: xacro a.xml > a.expanded.urdf");
+    EXPECT_EQ(refusal("a.urdf", "<robot name='r' xmlns:xacro='http://ros.org/wiki/xacro'>" + two + hinge_of("a", "b") +
+                                    "</robot>"),
+              "");
+}
+
+TEST(ImportUrdf, ListsWhatTheLibraryPassesOver) {
+    const ScratchFolder folder;
+    std::ofstream(folder / "a.urdf") << urdf_of(
+        link_of("a") +
+        "<link name='b'><inertial><origin xzy='0 0 1'/><mass value='1' unit='g'/><inertia ixx='1' ixy='0' ixz='0' "
+        "iyy='1' "
+        "iyz='0' izz='1'/></inertial></link>" +
+        hinge_of("a", "b", "<dynamics damping='1' spring_stiffness='2'/><orign xyz='0 0 1'/>"));
+    EXPECT_EQ(items(import_model(folder / "a.urdf", folder / "s.yaml").lost),
+              (std::vector<std::string>{"attribute xzy=\"0 0 1\" of <origin> of <inertial> of link \"b\"",
+                                        "attribute unit=\"g\" of <mass> of <inertial> of link \"b\"",
+                                        "attribute spring_stiffness=\"2\" of <dynamics> of joint \"ab\"",
+                                        "element <orign> of joint \"ab\""}));
 }
 
 TEST(ImportUrdf, TurnsInertias) {
@@ -201,6 +233,48 @@ TEST(ImportSdf, RefusesWithOneSentence) {
               std::string::npos);
 }
 
+// libsdformat passes over what its version of SDF does not have.
+TEST(ImportSdf, ListsWhatTheLibraryPassesOver) {
+    const auto lost = [](const std::string& of_link, const std::string& of_model = "",
+                         const std::string& version = "1.9") {
+        const ScratchFolder folder;
+        std::ofstream(folder / "a.sdf") << "<sdf version='" + version +
+                                               "' xmlns:x='x'><world name='w'><model name='m'>" + "<link name='a'>" +
+                                               of_link + "</link></model>" + of_model + "</world></sdf>";
+        return items(import_model(folder / "a.sdf", folder / "s.yaml").lost);
+    };
+    using Items = std::vector<std::string>;
+    EXPECT_EQ(lost("<inertial auto='true'/>"), Items{"attribute auto=\"true\" of <inertial> of link \"a\""});
+    EXPECT_EQ(lost("<inertial auto='false'/>"), Items{});
+    EXPECT_EQ(lost("<poze>0 0 1 0 0 0</poze><inertial><mas>5</mas></inertial>"),
+              (Items{"element <poze> of link \"a\"", "element <mas> of <inertial> of link \"a\""}));
+    EXPECT_EQ(lost("<inertial><fluid_added_mass><xx>5</xx></fluid_added_mass></inertial>"),
+              Items{"element <fluid_added_mass> of <inertial> of link \"a\""});
+    EXPECT_EQ(lost("", "<joint name='j' type='fixed'><parent>world</parent><child>m::a</child></joint>"),
+              Items{"element <joint> of world \"w\""});
+    EXPECT_EQ(lost("<self_collide>0</self_collide><must_be_base_link>true</must_be_base_link>"),
+              Items{"element <must_be_base_link> of link \"a\""});
+    EXPECT_EQ(lost("<visual name='v'><geometry><cone/></geometry></visual>", "", "1.12"), Items{});
+    EXPECT_EQ(lost("", "", "99"), Items{"version 99 of SDF"});
+    const std::string hinge =
+        "<joint name='j' type='revolute'><parent>world</parent><child>b</child><axis><limit>"
+        "<lower>-1</lower><upper>1</upper><stiffness>1e+08</stiffness></limit><mimic joint='k'/>"
+        "</axis></joint>";
+    EXPECT_EQ(lost("", "<model name='n'><link name='b'/>" + hinge + "</model>"),
+              Items{"element <mimic> of <axis> of joint \"j\""});
+}
+
+TEST(ImportSdf, TakesFrictionsOfOneEngineAlone) {
+    const ScratchFolder folder;
+    std::ofstream(folder / "a.sdf")
+        << "<sdf version='1.9'><model name='m'><link name='a'><collision name='c'><geometry><sphere><radius>1</radius>"
+           "</sphere></geometry><surface><friction><bullet><friction>0.3</friction><friction2>0.3</friction2></bullet>"
+           "</friction></surface></collision></link></model></sdf>";
+    const auto made = import_model(folder / "a.sdf", folder / "s.yaml");
+    EXPECT_EQ(items(made.lost), std::vector<std::string>{});
+    EXPECT_EQ(YAML::Load(made.yaml)["materials"]["friction 0.3"]["friction"].as<double>(), 0.3);
+}
+
 TEST(ImportSdf, TakesSurfacesBitMasksAndLosses) {
     Imported boxes(model_file("boxes.sdf"));
     EXPECT_EQ(items(boxes.text.lost),
@@ -233,6 +307,10 @@ TEST(ImportMjcf, RefusesWithOneSentence) {
     EXPECT_EQ(refusal("a.xml", mjcf_of("<body>\n<joint type='door'/>" + bob + "</body>")),
               "a.xml: line 2: <joint>: type=\"door\" is none of free, ball, slide, hinge");
     EXPECT_EQ(refusal("a.xml", mjcf_of(bob)), "a.xml: nothing in the model moves that has mass");
+    EXPECT_EQ(
+        refusal("a.xml", mjcf_of("<body name='b'><freejoint/><geom name='g' type='box' size='0.1 0 0.1'/></body>")),
+        "a.xml: nothing in the model moves that has mass; not carried over: shape \"g\": a size of it is not "
+        "positive: left out; body \"b\": it has no mass, and nothing holds it: left out");
     ImportSettings settings;
     settings.keyframe = "home";
     EXPECT_EQ(refusal("a.xml", mjcf_of("<body><joint/>" + bob + "</body>"), settings),

@@ -217,7 +217,15 @@ INSTANTIATE_TEST_SUITE_P(
              "s.yaml, line 4: a shape must have one of the keys \"sphere\", \"box\", \"capsule\", \"cylinder\", "
              "\"plane\", \"convex\", \"mesh\", \"terrain\", \"height_field\""},
         Case{"PlaneMoves", head + "bodies:\n  - {name: b, mass: 1, shapes: [{plane: {}}]}\n",
-             "s.yaml, line 4: a plane has no volume, so mass and inertia cannot follow from it"}),
+             "s.yaml, line 4: a plane is for fixed bodies only, and body \"b\" moves; use a box"},
+        Case{"PlaneThatNothingCanTouch",
+             head + "bodies:\n  - {name: a, fixed: true}\n  - {name: b, mass: 1, inertia: {xx: 1, yy: 1, zz: 1},\n"
+                    "     shapes: [{plane: {}}]}\n",
+             "s.yaml, line 6: a plane is for fixed bodies only, and body \"b\" moves; use a box"},
+        Case{"TerrainMoves",
+             head + "bodies:\n  - {name: b, mass: 1, shapes: [{height_field: {heights: [[0, 0], [0, 0]], size: [1, "
+                    "1]}}]}\n",
+             "s.yaml, line 4: terrain is for fixed bodies only, and body \"b\" moves; use convex shapes"}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
 
 TEST(BadSceneFile, EndsTheCommandWithCodeTwoAndOneSentence) {

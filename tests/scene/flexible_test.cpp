@@ -236,6 +236,8 @@ TEST(FlexibleScene, WrongBeamsAreToldInOneSentence) {
 TEST(FlexibleScene, WrongMeshesAreToldInOneSentence) {
     EXPECT_EQ(refusal("bodies:\n  - {name: b, mass: 1, shapes: [{mesh: none.obj}]}\n"),
               "s.yaml, line 4: none.obj: there is no such file");
+    EXPECT_EQ(refusal("bodies:\n  - {name: b, mass: 1, shapes: [{mesh: /}]}\n"),
+              "s.yaml, line 4: /: it is a folder, where a file of a mesh belongs");
     EXPECT_EQ(refusal("bodies:\n  - {name: b, mass: 1, shapes: [{mesh: {scale: 2}}]}\n"),
               "s.yaml, line 4: \"mesh\" lacks the key \"file\"");
     EXPECT_EQ(refusal("elastic_meshes:\n  - {name: b, file: none.vol}\n"),

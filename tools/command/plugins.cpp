@@ -14,6 +14,7 @@
 #include "process/stdout_guard.hpp"
 #include "process/supervision.hpp"
 #include "solver/installed_files.hpp"
+#include "solver/rejection.hpp"
 #include "support/atomic_file.hpp"
 #include "support/json.hpp"
 #include "support/text_file.hpp"
@@ -178,7 +179,7 @@ int list(const PluginsArguments& arguments) {
     if (!registry.missing_parts().empty()) fmt::print("\nLeft out here:\n");
     for (const auto& row : registry.missing_parts()) fmt::print("{}\n", row.reason);
     if (!listing.rejected.empty()) fmt::print("\nRejected:\n");
-    for (const auto& row : listing.rejected) fmt::print("{}: {}\n", row.path.string(), row.reason);
+    for (const auto& row : listing.rejected) fmt::print("{}\n", sentence_of(row));
     return exit_solved;
 }
 
@@ -190,7 +191,9 @@ PluginInfo info_of_library(const std::string& library) {
 
 PluginInfo info_of(const PluginsArguments& arguments) {
     if (is_library_path(arguments.plugin)) return info_of_library(arguments.plugin);
-    return solver_info(Registry(absolute(arguments.plugin_path)), arguments.plugin);
+    PluginInfo plugin = solver_info(Registry(absolute(arguments.plugin_path)), arguments.plugin);
+    require_checksums(plugin);
+    return plugin;
 }
 
 int info(const PluginsArguments& arguments) {

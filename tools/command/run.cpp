@@ -169,9 +169,13 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {
+            // A run that goes on may have nothing left to solve.
+            const auto& loaded = simulation.solver().loaded();
             fmt::print("  {}: {} solves, {} iterations, {:.3g} s, worst natural error {:.1e}\n",
-                       fmt::join(simulation.solver().loaded(), ", "), totals.plugin_solves, totals.solver_iterations,
-                       totals.solver_seconds, totals.worst_natural);
+                       !loaded.empty()              ? fmt::format("{}", fmt::join(loaded, ", "))
+                       : system.solver.name.empty() ? "auto"
+                                                    : system.solver.name,
+                       totals.plugin_solves, totals.solver_iterations, totals.solver_seconds, totals.worst_natural);
         }
         if (totals.repeated_solves > 0)
             fmt::print("  {} solves missed the tolerance with {} and were repeated with auto\n", totals.repeated_solves,
@@ -244,6 +248,17 @@ void check(const RunArguments& arguments) {
     throw InputError("--dump-problems writes whole problems, which no process has here; start one process");
 }
 
+/// A run that goes on goes on to a later end.
+void refuse_passed_end(const RunArguments& arguments, const Scene& scene) {
+    if (!arguments.scene.end) return;
+    double reached = 0.0;
+    for (const auto& system : RunFolder::checkpoint_of(arguments.resume, scene).systems)
+        reached = std::max(reached, system.simulation.state.t);
+    if (reached > *arguments.scene.end * (1.0 + 1e-9))
+        throw InputError(fmt::format("{} has come to t = {:.9g} s, beyond the --end of {:.9g} s",
+                                     arguments.resume.string(), reached, *arguments.scene.end));
+}
+
 /// The run's folder, on process 0; on the others what it has to do with the simulations alone. Null without a folder.
 /// every: ← how many steps there are from frame to frame.
 std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArguments& arguments, const Scene& scene,
@@ -253,6 +268,7 @@ std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArgumen
     every = arguments.files.every.value_or(1);
     together(run, [&] {
         if (first && resume) {
+            refuse_passed_end(arguments, scene);
             folder = std::make_unique<RunFolder>(arguments.resume, scene, simulations, arguments.files);
         } else if (first && !arguments.output.empty()) {
             folder = std::make_unique<RunFolder>(arguments.output, scene, read_file(arguments.scene.file), simulations,
@@ -269,6 +285,19 @@ std::unique_ptr<RunFolder> open_folder(const Communicator& run, const RunArgumen
             simulations[i].load(std::move(checkpoint.systems[i].simulation));
     });
     return folder;
+}
+
+/// Where a file of the run cannot be written, as on a full disk, its report may fit in: it says that the run failed.
+void report_failure(RunFolder& folder, const RunArguments& arguments, const Scene& scene,
+                    std::vector<Simulation>& simulations, const std::string& reason) {
+    RunResult result;
+    result.status = RunStatus::Failed;
+    result.message = reason;
+    try {
+        folder.write_report(
+            run_report_json(arguments.scene.file.filename().string(), scene, simulations, result, {}, {}));
+    } catch (const Error&) {  // the reason is said all the same
+    }
 }
 
 int run_on(const Communicator& run, const RunArguments& arguments) {
@@ -292,7 +321,14 @@ int run_on(const Communicator& run, const RunArguments& arguments) {
     std::vector<Track> tracks;
     if (arguments.check)
         for (const auto& simulation : simulations) tracks.emplace_back(simulation);
-    const RunResult result = advance(run, simulations, folder.get(), arguments, every, tracks);
+    const RunResult result = [&] {
+        try {
+            return advance(run, simulations, folder.get(), arguments, every, tracks);
+        } catch (const InputError& error) {
+            if (folder) report_failure(*folder, arguments, scene, simulations, error.what());
+            throw;
+        }
+    }();
     std::vector<RunCheck> checks;
     const bool complete = result.status == RunStatus::Finished || result.status == RunStatus::Unsolved;
     if (arguments.check && complete) checks = run_again(arguments, registry, simulations, tracks);

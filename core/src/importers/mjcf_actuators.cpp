@@ -92,7 +92,7 @@ void read_actuator(const XmlElement& element, Actuator& a) {
     }
 }
 
-void finish_actuators(Spec& spec) {
+void finish_actuators(Spec& spec, model_import::Model& model) {
     const Compiler& compiler = spec.compilers.front();
     std::map<std::string, std::int32_t> joints;
     std::vector<const Joint*> all;
@@ -102,9 +102,6 @@ void finish_actuators(Spec& spec) {
             all.push_back(&joint);
         }
     std::vector<double> inertias;  // of the freedoms, found once one is asked for
-    const auto is_limited = [&](Switch given, const std::array<double, 2>& range) {
-        return given == Switch::On || (given == Switch::Auto && compiler.auto_limits && range[0] < range[1]);
-    };
     for (Actuator& a : spec.actuators) {
         if (a.transmission == Transmission::Joint || a.transmission == Transmission::JointInParent)
             if (const auto found = joints.find(a.target); found != joints.end()) a.joint = found->second;
@@ -114,8 +111,9 @@ void finish_actuators(Spec& spec) {
                          radius = 0.5 * (joint->range[1] - joint->range[0]) * a.inherit_range;
             (a.dynamics == "integrator" ? a.state_range : a.control_range) = {middle - radius, middle + radius};
         }
-        a.is_control_limited = is_limited(a.control_limited, a.control_range);
-        a.is_force_limited = is_limited(a.force_limited, a.force_range);
+        const std::string what = fmt::format("actuator \"{}\"", a.name);
+        a.is_control_limited = limits(a.control_limited, "ctrlrange", a.control_range, compiler, what, model);
+        a.is_force_limited = limits(a.force_limited, "forcerange", a.force_range, compiler, what, model);
         // kv = 2 ζ √(kp m), m: what the joint moves where the model is at its reference, seen through the gear
         double& damping = a.bias_parameters[2];
         if (!(damping > 0.0) || a.gain_parameters[0] != -a.bias_parameters[1] || a.bias != "affine") continue;

@@ -194,6 +194,7 @@ void Parser::read_references(bool attached) {
                                                                             : "body";
                     if (!is_there(child, kind, equality.first)) return;
                     if (!equality.second.empty() && !is_there(child, kind, equality.second)) return;
+                    take_alone(child, "equality", equality.name);
                     spec_.equalities.push_back(std::move(equality));
                 });
             } else if (section.name == "actuator" && is_actuator(child.name)) {
@@ -206,6 +207,7 @@ void Parser::read_references(bool attached) {
                     const bool joint = actuator.transmission == Transmission::Joint ||
                                        actuator.transmission == Transmission::JointInParent;
                     if (joint && !is_there(child, "joint", actuator.target)) return;
+                    take_alone(child, "actuator", actuator.name);
                     spec_.actuators.push_back(std::move(actuator));
                 });
             } else if (section.name == "tendon" && (child.name == "spatial" || child.name == "fixed")) {
@@ -214,6 +216,7 @@ void Parser::read_references(bool attached) {
                     tendon.name.clear();
                     read_tendon(child, tendon);
                     tendon.name = full(tendon.name, suffix);
+                    take_alone(child, "tendon", tendon.name);
                     spec_.tendons.push_back(std::move(tendon));
                 });
             } else if (section.name == "keyframe" && child.name == "key" && !attached) {
@@ -256,6 +259,7 @@ void Parser::read_contacts(const XmlElement& section, bool attached) {
 void Parser::read_key(const XmlElement& element) {
     Key key;
     key.name = element.text("name");
+    take_alone(element, "keyframe", key.name);
     key.where = element.where();
     for (const auto& [attribute, values] :
          {std::pair("qpos", &key.qpos), std::pair("qvel", &key.qvel), std::pair("ctrl", &key.ctrl),
@@ -344,7 +348,7 @@ Spec read_spec(const std::filesystem::path& file, model_import::Model& model) {
     Building building{{}, model, {}, {}, {}, {}, false, 0};
     Parser(root, file.parent_path(), "", "", 0, building).read_all();
     finish(building.spec, model);
-    finish_actuators(building.spec);
+    finish_actuators(building.spec, model);
     return std::move(building.spec);
 }
 

@@ -56,7 +56,8 @@ void MjcfReader::read_equalities() {
 }
 
 // A connection holds two points together: sites, or an anchor of the first body where it is at the reference of both. A
-// weld holds two frames together. The scene starts elsewhere where a keyframe has balls or free bodies elsewhere.
+// weld holds two frames together, and with a torquescale of 0 two points of them: the anchor in the second body, and
+// where it is in the first. The scene starts elsewhere where a keyframe has balls or free bodies elsewhere.
 void MjcfReader::read_loop(const mjcf::Equality& equality, const std::string& name) {
     const std::string what = fmt::format("equality \"{}\"", equality.name);
     const std::vector<mjcf::Placed> reference = mjcf::place(spec_, nullptr);
@@ -92,14 +93,17 @@ void MjcfReader::read_loop(const mjcf::Equality& equality, const std::string& na
             second.local.translation() = anchor;
             first.local = mjcf::frame_of(Vector3d(equality.data.data() + 3), turn.normalized());
         } else {
-            first.local = frame_at(reference, first).inverse() * frame_at(reference, second);
+            second.local.translation() = anchor;
+            first.local = reference[static_cast<std::size_t>(first.body)].frame.inverse() * frame_at(reference, second);
         }
     }
+    const double torques = equality.type == EqualityType::Weld ? equality.data[10] : 0.0;
+    if (torques != 0.0 && torques != 1.0)
+        model_.lose(what, fmt::format("torquescale {:.6g}: the weld is rigid", torques));
     if (!moves(first.body) && !moves(second.body)) return;
     const mjcf::Frame one = frame_at(placed_, first), other = frame_at(placed_, second);
     double gap = (one.translation() - other.translation()).norm();
-    if (equality.type == EqualityType::Weld)
-        gap = std::max(gap, 2.0 * Quaterniond(one.linear().transpose() * other.linear()).vec().norm());
+    if (torques != 0.0) gap = std::max(gap, 2.0 * Quaterniond(one.linear().transpose() * other.linear()).vec().norm());
     if (gap > most_gap)
         return model_.lose(what, fmt::format("the bodies are {:.3g} m or rad from where it holds them", gap));
     if (body_at(first.body).weld == body_at(second.body).weld) return;  // they are one body
@@ -107,7 +111,7 @@ void MjcfReader::read_loop(const mjcf::Equality& equality, const std::string& na
     loop.closes_loop = true;
     JointParameters& own = loop.parameters;
     own.name = name;
-    own.kind = equality.type == EqualityType::Connect ? JointKind::Spherical : JointKind::Fixed;
+    own.kind = torques == 0.0 ? JointKind::Spherical : JointKind::Fixed;
     own.first = moving_body(first.body);
     own.second = moving_body(second.body);
     own.point = model_import::array(other.translation());
@@ -291,11 +295,10 @@ void MjcfReader::read_actuator(const mjcf::Actuator& actuator, double control, c
 
 void MjcfReader::note_others() {
     for (const mjcf::Tendon& tendon : spec_.tendons) {
-        const bool limited = tendon.limited == mjcf::Switch::On ||
-                             (tendon.limited == mjcf::Switch::Auto && tendon.range[0] < tendon.range[1]);
+        const std::string what = fmt::format("tendon \"{}\"", tendon.name);
+        const bool limited = mjcf::limits(tendon.limited, "range", tendon.range, spec_.compilers.front(), what, model_);
         const bool acts = tendon.stiffness[0] != 0.0 || tendon.damping[0] != 0.0 || tendon.friction_loss != 0.0 ||
                           tendon.armature != 0.0 || limited;
-        const std::string what = fmt::format("tendon \"{}\"", tendon.name);
         if (acts) {
             model_.lose(what, "its spring, damping, dry friction or limit");
         } else {

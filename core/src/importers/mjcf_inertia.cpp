@@ -259,17 +259,12 @@ void align(Body& body) {
 }
 
 void finish_joint(Joint& joint, const Compiler& compiler, model_import::Model& model) {
-    const auto is_limited = [&](Switch given, const std::array<double, 2>& range) {
-        return given == Switch::On || (given == Switch::Auto && compiler.auto_limits && range[0] < range[1]);
-    };
     const std::string what = fmt::format("joint \"{}\"", joint.name);
     const bool turns = joint.type == JointType::Hinge || joint.type == JointType::Ball;
-    joint.is_limited = joint.type != JointType::Free && is_limited(joint.limited, joint.range);
-    joint.is_force_limited = freedoms_of(joint.type) == 1 && is_limited(joint.force_limited, joint.force_range);
-    if (joint.is_limited && joint.type != JointType::Ball && !(joint.range[0] < joint.range[1])) {
-        model.lose(what, "a range whose ends are not in their order: it has no limits");
-        joint.is_limited = false;
-    }
+    joint.is_limited =
+        joint.type != JointType::Free && limits(joint.limited, "range", joint.range, compiler, what, model);
+    joint.is_force_limited = freedoms_of(joint.type) == 1 &&
+                             limits(joint.force_limited, "actuatorfrcrange", joint.force_range, compiler, what, model);
     if (compiler.degree && turns)
         for (double& end : joint.range) end *= pi / 180.0;
     if (compiler.degree && joint.type == JointType::Hinge) {
@@ -284,6 +279,16 @@ void finish_joint(Joint& joint, const Compiler& compiler, model_import::Model& m
 }
 
 }  // namespace
+
+bool limits(Switch given, const char* attribute, const std::array<double, 2>& range, const Compiler& compiler,
+            const std::string& what, model_import::Model& model) {
+    if (given == Switch::Off || (given == Switch::Auto && !compiler.auto_limits)) return false;
+    if (range[0] < range[1]) return true;
+    if (given == Switch::On || range[0] > range[1])
+        model.lose(what, fmt::format("{} {:.6g} {:.6g}, whose ends are not in their order: it limits nothing",
+                                     attribute, range[0], range[1]));
+    return false;
+}
 
 MassProperties moved(const MassProperties& of, const Frame& frame) {
     return {of.mass, frame * of.centre, frame.linear() * of.inertia * frame.linear().transpose()};

@@ -156,7 +156,11 @@ void Parser::take(const XmlElement& element, const char* kind, std::string& name
     if (name.empty()) return;
     if (!suffix.empty()) building_.replicas[prefix_ + name].push_back(suffix);
     name = full(name, suffix);
-    if (!building_.taken[kind].emplace(name, number).second)
+    take_alone(element, kind, name, number);
+}
+
+void Parser::take_alone(const XmlElement& element, const char* kind, const std::string& name, std::int32_t number) {
+    if (!name.empty() && !building_.taken[kind].emplace(name, number).second)
         element.refuse(fmt::format("there is another {} \"{}\"", kind, name));
 }
 

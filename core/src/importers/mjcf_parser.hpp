@@ -74,6 +74,8 @@ private:
     /// Notes a name, or makes one; refuses one that is there.
     void take(const XmlElement& element, const char* kind, std::string& name, const std::string& suffix,
               std::int32_t number);
+    /// The same of a name that is complete; an empty one is none.
+    void take_alone(const XmlElement& element, const char* kind, const std::string& name, std::int32_t number = 0);
     [[nodiscard]] bool is_taken(const char* kind, const std::string& name) const;
     void count(const XmlElement& element);
     /// Elements and attributes that nobody read.

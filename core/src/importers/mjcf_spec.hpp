@@ -272,6 +272,7 @@ struct Spec {
 };
 
 /// The rotation that an element's quat, axisangle, xyaxes, zaxis or euler describes; nothing where it has none of them.
+/// Throws InputError where it has two of them, or one without a direction.
 [[nodiscard]] std::optional<Quaterniond> orientation_of(const XmlElement& element, const Compiler& compiler);
 /// Turns the z axis to a direction by the least angle, as MuJoCo does: about x where they are opposite.
 [[nodiscard]] Quaterniond z_towards(const Vector3d& direction);
@@ -293,7 +294,7 @@ void read_option(const XmlElement& element, Option& option);
 [[nodiscard]] bool is_actuator(const std::string& name);
 void read_actuator(const XmlElement& element, Actuator& actuator);
 /// Finds the joints of actuators, their ranges, and the damping that a ratio stands for. Needs finish().
-void finish_actuators(Spec& spec);
+void finish_actuators(Spec& spec, model_import::Model& model);
 
 // mjcf_mesh.cpp
 /// A mesh in a file, or in the element. Never throws for what a file has: the mesh then has its trouble.
@@ -306,6 +307,9 @@ void finish_actuators(Spec& spec);
 void complete(Geom& geom, const XmlElement& element, const Compiler& compiler);
 /// Masses of bodies, and what the compiler's settings do to them; bodies that are welded; limits; addresses of joints.
 void finish(Spec& spec, model_import::Model& model);
+/// Whether a range limits something. One whose ends are not in their order does not, with a loss.
+[[nodiscard]] bool limits(Switch given, const char* attribute, const std::array<double, 2>& range,
+                          const Compiler& compiler, const std::string& what, model_import::Model& model);
 /// By another frame: of parent ← of child.
 [[nodiscard]] MassProperties moved(const MassProperties& of, const Frame& frame);
 /// The mass and mass centre of all, and their moments about it.

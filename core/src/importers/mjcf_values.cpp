@@ -58,11 +58,18 @@ Quaterniond z_towards(const Vector3d& direction) {
 
 std::optional<Quaterniond> orientation_of(const XmlElement& element, const Compiler& compiler) {
     const double unit = compiler.degree ? std::numbers::pi / 180.0 : 1.0;
+    const char* given = nullptr;
+    for (const char* one : {"quat", "axisangle", "xyaxes", "zaxis", "euler"}) {
+        if (element.find(one) == nullptr) continue;
+        if (given != nullptr) element.refuse(fmt::format("it has two orientations, {} and {}", given, one));
+        given = one;
+    }
     std::optional<Quaterniond> result;
     std::array<double, 4> four{};
     if (element.read("quat", four.data(), 4, 4) > 0) {
-        Quaterniond q(four[0], four[1], four[2], four[3]);
-        result = q.norm() < least_length ? Quaterniond::Identity() : q.normalized();
+        const Quaterniond q(four[0], four[1], four[2], four[3]);
+        if (!(q.norm() >= least_length)) element.refuse("quat is no rotation: its numbers are all 0");
+        result = q.normalized();
     }
     if (element.read("axisangle", four.data(), 4, 4) > 0)
         result = Quaterniond(
@@ -192,6 +199,7 @@ void read_equality(const XmlElement& element, Equality& equality) {
         equality.type = element.name == "weld" ? EqualityType::Weld : EqualityType::Connect;
         const bool anchored = element.read("anchor", data.data(), 3, 3) > 0;
         if (equality.type == EqualityType::Weld) {
+            data[10] = 1.0;
             equality.has_pose = element.read("relpose", data.data() + 3, 7, 7) > 0;
             element.read("torquescale", data[10]);
         }

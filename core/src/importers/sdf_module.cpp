@@ -8,6 +8,7 @@
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
 #include "importers/sdf_reader.hpp"
+#include "importers/sdf_unread.hpp"
 
 namespace {
 
@@ -39,5 +40,6 @@ extern "C" DELASSUS_API void delassus_import_sdf_read(const std::filesystem::pat
         throw InputError(fmt::format("libsdformat refuses the model: {}", error.what()));
     }
     if (!errors.empty()) throw InputError("libsdformat refuses the model: " + messages_of(errors));
+    delassus::importers::note_unread_sdf(root, file, model);
     delassus::importers::SdfReader(file, model).read(root);
 }

@@ -175,8 +175,11 @@ void SdfReader::read_link(const sdf::Link& link, const Placed& model, const std:
 
 std::int32_t SdfReader::material_of(const sdf::Collision& collision, const std::string& what) {
     const sdf::ElementPtr surface = element_at(collision.Element(), {"surface"});
-    const double along = number_at(surface, {"friction", "ode", "mu"}, 1.0);
-    const double across = number_at(surface, {"friction", "ode", "mu2"}, along);
+    const double of_bullet = number_at(surface, {"friction", "bullet", "friction"}, 1.0);
+    const double along = number_at(surface, {"friction", "ode", "mu"}, of_bullet);
+    const bool has_ode = element_at(surface, {"friction", "ode"}) != nullptr;
+    const double across = has_ode ? number_at(surface, {"friction", "ode", "mu2"}, along)
+                                  : number_at(surface, {"friction", "bullet", "friction2"}, along);
     const double friction = std::max(0.0, std::min(along, across));
     const double restitution = std::clamp(number_at(surface, {"bounce", "restitution_coefficient"}, 0.0), 0.0, 1.0);
     if (along != across)
@@ -197,7 +200,8 @@ std::int32_t SdfReader::material_of(const sdf::Collision& collision, const std::
         if (differs({"contact", "ode", name}, usual) || differs({"contact", "bullet", name}, usual))
             soft.push_back(name);
     if (!soft.empty()) model_.lose(what, fmt::format("{}: contacts are rigid", fmt::join(soft, ", ")));
-    if (element_at(surface, {"friction", "ode", "fdir1"})) model_.lose(what, "a direction of friction (fdir1)");
+    if (element_at(surface, {"friction", has_ode ? "ode" : "bullet", "fdir1"}))
+        model_.lose(what, "a direction of friction (fdir1)");
     auto& all = model_.materials;
     const auto known = std::find_if(all.begin(), all.end(), [&](const auto& one) {
         return one.friction == friction && one.restitution == restitution;

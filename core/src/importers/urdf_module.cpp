@@ -6,13 +6,16 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "delassus/error.hpp"
 #include "delassus/export.hpp"
+#include "importers/xml_known.hpp"
 #include "importers/xml_tree.hpp"
 #include "model_import/model.hpp"
 #include "support/text_file.hpp"
@@ -38,13 +41,12 @@ public:
     UrdfReports& operator=(const UrdfReports&) = delete;
     void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
         if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) {
-            if (error.empty()) error = text;
+            errors.push_back(text);
         } else if (level == console_bridge::CONSOLE_BRIDGE_LOG_WARN) {
             warnings.push_back(text);
         }
     }
-    std::string error;
-    std::vector<std::string> warnings;
+    std::vector<std::string> errors, warnings;
 };
 
 Vector3d vector_of(const urdf::Vector3& v) {
@@ -313,21 +315,77 @@ std::string with_name(const std::string& text, const std::string& name) {
     return printer.CStr();
 }
 
+constexpr std::array<KnownElement, 18> urdf_elements = {{
+    {"link", "name type~", "inertial collision visual~"},
+    {"inertial", "", "origin mass inertia"},
+    {"origin", "xyz rpy", ""},
+    {"mass", "value", ""},
+    {"inertia", "ixx ixy ixz iyy iyz izz", ""},
+    {"collision", "name group~", "origin geometry"},
+    {"geometry", "", "box sphere cylinder mesh"},
+    {"box", "size", ""},
+    {"sphere", "radius", ""},
+    {"cylinder", "radius length", ""},
+    {"mesh", "filename scale", ""},
+    {"joint", "name type", "origin parent child axis dynamics limit calibration~ mimic safety_controller~"},
+    {"parent", "link", ""},
+    {"child", "link", ""},
+    {"axis", "xyz", ""},
+    {"dynamics", "damping friction", ""},
+    {"limit", "lower upper effort velocity", ""},
+    {"mimic", "joint multiplier offset", ""},
+}};
+
+/// Nothing where the file is no XML, which urdfdom refuses in its words.
+std::optional<XmlElement> try_read_xml(const std::filesystem::path& file) {
+    try {
+        return read_xml(file, "");
+    } catch (const InputError&) {
+        return std::nullopt;
+    }
+}
+
+/// Whether it is a text for xacro, which puts other texts in the place of macros and of ${…} and $(…).
+bool has_macros(const XmlElement& element) {
+    const auto has = [](const std::string& text, const char* sign) { return text.find(sign) != std::string::npos; };
+    return element.name.starts_with("xacro:") || has(element.content, "${") ||
+           std::any_of(element.attributes.begin(), element.attributes.end(),
+                       [&](const XmlAttribute& one) { return has(one.value, "${") || has(one.value, "$("); }) ||
+           std::any_of(element.children.begin(), element.children.end(), has_macros);
+}
+
+void refuse_macros(const XmlElement& robot, const std::filesystem::path& file) {
+    if (!has_macros(robot)) return;
+    std::filesystem::path expanded = file.filename();
+    if (expanded.extension() == ".xacro") expanded.replace_extension();
+    expanded.replace_extension(expanded == file.filename() ? ".expanded.urdf" : ".urdf");
+    throw InputError(fmt::format("it has macros of xacro; expand it first: xacro {} > {}", file.filename().string(),
+                                 expanded.string()));
+}
+
+/// urdfdom leaves the mass of such a link out.
+void refuse_masses_without_numbers(const XmlElement& robot) {
+    for (const XmlElement& link : robot.children) {
+        if (link.name != "link") continue;
+        for (const XmlElement& inertial : link.children) {
+            if (inertial.name != "inertial") continue;
+            for (const XmlElement& part : inertial.children)
+                for (const char* name : {"value", "xyz", "rpy", "ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) try {
+                        (void)part.numbers(name);
+                    } catch (const InputError& error) {
+                        throw InputError(fmt::format("link \"{}\": {}", link.text("name"), error.what()));
+                    }
+        }
+    }
+}
+
 /// What urdfdom passes over without a word.
 void note_unread(const XmlElement& robot, Model& model) {
-    static const std::set<std::string> of_link = {"inertial", "visual", "collision"};
-    static const std::set<std::string> of_joint = {
-        "origin", "parent", "child", "axis", "dynamics", "limit", "calibration", "mimic", "safety_controller"};
     static const std::set<std::string> looks = {"material", "sensor", "visual", "dynamic_shadows", "laser_retro"};
-    const auto lose = [&](const XmlElement& element, const std::string& of) {
-        model.lose(fmt::format("element <{}> of {}", element.name, of), "URDF as it is read here does not have it");
-    };
     for (const XmlElement& part : robot.children) {
         const std::string name = part.text("name");
         if (part.name == "link" || part.name == "joint") {
-            const auto& known = part.name == "link" ? of_link : of_joint;
-            for (const XmlElement& child : part.children)
-                if (!known.contains(child.name)) lose(child, fmt::format("{} \"{}\"", part.name, name));
+            note_unknown(part, urdf_elements, "URDF", model);
         } else if (part.name == "gazebo") {
             std::vector<std::string> acts;
             for (const XmlElement& child : part.children)
@@ -352,14 +410,19 @@ extern "C" DELASSUS_API void delassus_import_urdf_read(const std::filesystem::pa
                                                        const delassus::ImportSettings& settings,
                                                        delassus::model_import::Model& model) {
     using namespace delassus;
+    const auto given = importers::try_read_xml(file);
+    if (given) {
+        importers::refuse_macros(*given, file);
+        importers::refuse_masses_without_numbers(*given);
+    }
     importers::UrdfReports reports;
     const urdf::ModelInterfaceSharedPtr robot =
         urdf::parseURDF(importers::with_name(read_file(file), file.stem().string()));
     if (!robot)
         throw InputError("urdfdom refuses the model: " +
-                         (reports.error.empty() ? "it gives no reason" : reports.error));
-    if (!reports.error.empty()) model.lose("error of urdfdom", reports.error);
+                         (reports.errors.empty() ? "it gives no reason" : reports.errors.front()));
+    for (const auto& error : reports.errors) model.lose("error of urdfdom", error);
     for (const auto& warning : reports.warnings) model.without_effect.push_back({"warning of urdfdom", warning});
-    importers::note_unread(importers::read_xml(file, ""), model);
+    if (given) importers::note_unread(*given, model);
     importers::UrdfReader(*robot, file, model).read(settings.floating);
 }

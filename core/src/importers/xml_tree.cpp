@@ -110,6 +110,7 @@ XmlElement element_of(const tinyxml2::XMLElement& from, const std::shared_ptr<co
     result.name = from.Name();
     result.file = file;
     result.line = from.GetLineNum();
+    if (const char* text = from.GetText()) result.content = text;
     for (const auto* one = from.FirstAttribute(); one != nullptr; one = one->Next())
         result.attributes.push_back({one->Name(), one->Value()});
     for (const auto* child = from.FirstChildElement(); child != nullptr; child = child->NextSiblingElement())

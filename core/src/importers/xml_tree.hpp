@@ -20,6 +20,7 @@ struct XmlAttribute {
 
 struct XmlElement {
     std::string name;
+    std::string content;  ///< its text, up to its first child
     std::vector<XmlAttribute> attributes;
     std::vector<XmlElement> children;
     std::shared_ptr<const std::string> file;  ///< its name, empty for the first file

@@ -21,6 +21,8 @@ namespace {
 
 void must_be_there(const std::filesystem::path& file) {
     std::error_code error;
+    if (std::filesystem::is_directory(file, error))
+        throw InputError(fmt::format("{}: it is a folder, where a file of a mesh belongs", file.string()));
     if (!std::filesystem::is_regular_file(file, error))
         throw InputError(fmt::format("{}: there is no such file", file.string()));
 }

@@ -51,8 +51,9 @@ std::vector<NotCarriedOver> grouped(const std::vector<NotCarriedOver>& all) {
     for (const Group& group : groups) {
         std::string what = fmt::format("{}", fmt::join(group.items, ", "));
         if (group.count > group.items.size()) what += fmt::format(" and {} more", group.count - group.items.size());
-        result.push_back({group.count == 1 ? group.items.front() : fmt::format("{} × {}", group.count, what),
-                          group.alike ? group.why : group.why + " (of the first; the others alike)"});
+        result.push_back(
+            {group.count == 1 ? group.items.front() : fmt::format("{} × {}", group.count, what),
+             group.alike ? group.why : group.why + " (the first; the others have other numbers or names)"});
     }
     return result;
 }

@@ -200,7 +200,10 @@ void merge_fixed(Model& model) {
     drop_empty_ends(model);
     for (const ModelBody& body : model.bodies)
         if (!body.fixed && body.mass > 0.0) return;
-    throw InputError("nothing in the model moves that has mass");
+    std::string lost;
+    for (const NotCarriedOver& one : grouped(model.lost))
+        lost += fmt::format("{}{}: {}", lost.empty() ? "; not carried over: " : "; ", one.what, one.why);
+    throw InputError("nothing in the model moves that has mass" + lost);
 }
 
 }  // namespace delassus::model_import

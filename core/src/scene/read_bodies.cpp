@@ -286,6 +286,16 @@ BodyMotion SystemReader::read_body_motion(const YAML::Node& node, const Copy& co
     return result;
 }
 
+void SystemReader::refuse_endless_shape(const ShapeOfBody& shape, const std::string& body) {
+    const ShapeKind kind = shape.shape.kind;
+    if (kind == ShapeKind::Plane)
+        source_.refuse(shape.node,
+                       fmt::format("a plane is for fixed bodies only, and body \"{}\" moves; use a box", body));
+    if (kind == ShapeKind::Terrain || kind == ShapeKind::HeightField)
+        source_.refuse(shape.node,
+                       fmt::format("terrain is for fixed bodies only, and body \"{}\" moves; use convex shapes", body));
+}
+
 void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
     BodyParameters body;
     body.pose.position = copy.offset;
@@ -333,6 +343,8 @@ void SystemReader::read_body(const YAML::Node& item, const Copy& copy) {
     if (body.massless && (mass || density || inertia))
         source_.refuse(item,
                        fmt::format("body \"{}\" is massless, and has a mass, a density or an inertia", body.name));
+    if (!body.fixed)
+        for (const ShapeOfBody& one : shapes) refuse_endless_shape(one, body.name);
     if (mass && density) source_.refuse(item, "a body has either \"mass\" or \"density\", not both");
     if (!body.fixed && !body.motion && !body.massless) {
         if (!mass && !density)

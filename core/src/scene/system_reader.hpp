@@ -68,6 +68,8 @@ private:
         YAML::Node node;
     };
     std::vector<ShapeOfBody> read_shapes(const YAML::Node& node);
+    /// Planes and terrain, which have no volume, on a body that moves.
+    void refuse_endless_shape(const ShapeOfBody& shape, const std::string& body);
     /// A file's surface as convex shapes, one for each part.
     std::vector<Shape> read_mesh_shapes(const YAML::Node& node);
     Shape read_terrain_shape(const YAML::Node& node);

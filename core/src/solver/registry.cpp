@@ -19,6 +19,7 @@
 #include "solver/auto_solver.hpp"
 #include "solver/installed_files.hpp"
 #include "solver/python_solvers.hpp"
+#include "solver/rejection.hpp"
 #include "support/library_location.hpp"
 #include "support/nearest_name.hpp"
 #include "support/platform.hpp"
@@ -183,8 +184,7 @@ const PluginInfo& Registry::find(const std::string& name) const {
         if (plugin.name == name) return plugin;
     for (const auto& row : rejected_)
         if (!row.name.empty() && (row.name == name || row.path.stem() == name))
-            throw InputError(
-                fmt::format("the plugin \"{}\" was rejected: {}: {}", name, row.path.string(), row.reason));
+            throw InputError(fmt::format("the plugin \"{}\" was rejected: {}", name, sentence_of(row)));
     if (const auto plugin = find_packaged(name)) return plugin->info();
     for (const auto& plugin : unbuilt_)
         if (plugin.name == name)
