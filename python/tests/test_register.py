@@ -151,6 +151,20 @@ class Registered(unittest.TestCase):
         liar = delassus.solve(problem, "liar")  # x = 0: u = 0, and only the momentum is not balanced
         self.assertIn("balance error", repr(liar))
 
+    def test_a_scene_says_why_a_solver_failed(self):
+        delassus.register(type("Raiser_in_scenes", (), {"solve": Raiser.solve}))
+        scene = ("step: 0.01\nend: 0.1\nmaterials: {m: {friction: 0.3}}\nbodies:\n"
+                 "  - {name: floor, fixed: true, shapes: [{plane: {}, material: m}]}\n"
+                 "  - {name: box, density: 1000, position: [0, 0, 0.05], shapes: [{box: {size: [0.2, 0.2, 0.1]}, "
+                 "material: m}]}\n")
+        for name, reason in (("raiser_in_scenes", "no idea"), ("liar", "claim")):
+            simulation = delassus.Simulation(delassus.Scene(scene, solver=name))
+            while not simulation.finished:
+                simulation.step()
+            found = [one for one in simulation.warnings() if f"solver {name} failed in" in one]
+            self.assertEqual(len(found), 1, simulation.warnings())
+            self.assertIn(reason, found[0])
+
     def test_works_in_a_scene(self):
         scene = ("step: 0.01\nend: 0.5\nmaterials: {m: {friction: 0.3}}\nbodies:\n"
                  "  - {name: slope, fixed: true, shapes: [{plane: {}, material: m}]}\n"

@@ -200,7 +200,7 @@ TEST(LinearizationLimit, EndsARunThatWouldHangBack) {
     const std::string sentence = failure_of(run);
     EXPECT_TRUE(says(sentence, "linear model is off")) << sentence;
     EXPECT_TRUE(says(sentence, "linearization_limit")) << sentence;
-    EXPECT_TRUE(says(sentence, "64 parts of it are too long as well")) << sentence;
+    EXPECT_TRUE(says(sentence, "64 substeps of it are too long as well")) << sentence;
     EXPECT_LE(run.simulation.totals().worst_linearization, 0.1);
     for (const char* method : {"euler_implicit_linearized", "trapezoidal_linearized"}) {
         Running unwatched = running(spring_pendulum(1e10), std::string(method) + "(linearization_limit=inf)", 0.001);

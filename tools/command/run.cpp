@@ -177,9 +177,9 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
                                                     : system.solver.name,
                        totals.plugin_solves, totals.solver_iterations, totals.solver_seconds, totals.worst_natural);
         }
-        if (totals.repeated_solves > 0)
-            fmt::print("  {} solves missed the tolerance with {} and were repeated with auto\n", totals.repeated_solves,
-                       system.solver.name);
+        if (totals.repeated_solves > totals.failed_solves)
+            fmt::print("  {} solves missed the tolerance with {} and were repeated with auto\n",
+                       totals.repeated_solves - totals.failed_solves, system.solver.name);
         if (totals.near_goal_solves > 0)
             fmt::print("  {} solves ended above the tolerance that their steps are worth, within what is good enough\n",
                        totals.near_goal_solves);

@@ -71,6 +71,8 @@ struct SimulationTotals {
     std::int64_t newton_iterations = 0, solver_iterations = 0, plugin_solves = 0;
     std::int64_t resting_parts = 0;     ///< parts of problems that were left out because their bodies sleep
     std::int64_t repeated_solves = 0;   ///< by `auto`, since the solver that was asked for missed its tolerance
+    std::int64_t failed_solves = 0;     ///< of these, those in which it failed or made a false claim
+    std::string first_failure;          ///< its sentence in the first of them
     std::int64_t near_goal_solves = 0;  ///< that ended somewhat above what their steps are worth (docs/tolerance.md)
     std::int64_t divided_steps = 0;     ///< fixed steps that the method could not take in one
     std::int64_t most_substeps = 0;     ///< that one of them was divided into

@@ -30,6 +30,8 @@ struct SolverEffort {
     std::int64_t iterations = 0;     ///< of the plugin
     double seconds = 0.0;            ///< set-up and solve
     std::int64_t repeated = 0;       ///< solves that `auto` repeated, since the configured solver missed its tolerance
+    std::int64_t failed = 0;         ///< of these, those in which the configured solver failed or made a false claim
+    std::string failure;             ///< its sentence in the first of them
     /// Solves that ended above the tolerance that their step is worth, but within what a stage of `auto` allows.
     std::int64_t near_goal = 0;
     double worst_natural = 0.0;  ///< largest natural error of an answer that was used

@@ -134,6 +134,9 @@ void IslandSolver::run_again(const Prepared& problem, SolveSettings settings, So
         other.options.clear();
         fallback_ = make_solver(registry_, other);
     }
+    const bool failed = report.status == Status::Error || report.status == Status::NumericalFailure ||
+                        report.status == Status::FalseClaim;
+    if (failed && ++spent.failed == 1) spent.failure = report.message;
     settings.max_iterations = SolveSettings{}.max_iterations;
     Solution other = settings.warm_start ? before_ : Solution{};
     SolveReport second = run(*fallback_, problem, other, settings, spent);

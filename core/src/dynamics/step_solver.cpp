@@ -276,6 +276,8 @@ bool StepSolver::Implementation::take(const IslandResult& result) {
     effort.iterations += part.iterations;
     effort.seconds += part.seconds;
     effort.repeated += part.repeated;
+    effort.failed += part.failed;
+    if (effort.failure.empty()) effort.failure = part.failure;
     effort.near_goal += part.near_goal;
     effort.worst_natural = std::max(effort.worst_natural, part.worst_natural);
     effort.worst_miss = std::max(effort.worst_miss, part.worst_miss);

@@ -428,6 +428,8 @@ const StepRecord& Simulation::step() {
     totals.plugin_solves += effort.plugin_solves;
     totals.resting_parts += effort.resting_parts;
     totals.repeated_solves += effort.repeated;
+    totals.failed_solves += effort.failed;
+    if (totals.first_failure.empty()) totals.first_failure = effort.failure;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
     if (system_->steps_by_accuracy && taken.error > 1.0) ++totals.inexact_steps;
@@ -565,6 +567,10 @@ std::vector<std::string> Simulation::warnings() const {
     }
     if (const auto& totals = now_.totals; totals.method_changes > 0)
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
+    if (const auto& totals = now_.totals; totals.failed_solves > 0)
+        sentences.push_back(
+            fmt::format("system \"{}\": solver {} failed in {} solves, which auto repeated; the first time: {}",
+                        system_->name, system_->solver.name, totals.failed_solves, totals.first_failure));
     if (overlaps_ && !overlaps_->at_start().empty())
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
     if (!beyond_stops_.empty()) sentences.push_back(fmt::format("system \"{}\": {}", system_->name, beyond_stops_));

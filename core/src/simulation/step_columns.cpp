@@ -30,8 +30,8 @@ constexpr bool fit_together(const StepColumn& column) {
     return std::holds_alternative<std::monostate>(column.total) || column.integer();
 }
 static_assert(std::all_of(step_columns.begin(), step_columns.end(), fit_together));
-// Every total has a row: all but the three texts are of eight bytes.
-static_assert(sizeof(SimulationTotals) == (total_columns.size() - 3) * sizeof(double) + 3 * sizeof(std::string));
+// Every total has a row: all but the four texts are of eight bytes.
+static_assert(sizeof(SimulationTotals) == (total_columns.size() - 4) * sizeof(double) + 4 * sizeof(std::string));
 
 }  // namespace
 

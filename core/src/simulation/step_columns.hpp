@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 36> total_columns = {{
+inline constexpr std::array<TotalColumn, 38> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -120,6 +120,10 @@ inline constexpr std::array<TotalColumn, 36> total_columns = {{
      &SimulationTotals::resting_parts, "/sleeping/resting_parts"},
     {"repeated_solves", "1", "solves that `auto` repeated, since the solver that was asked for missed its tolerance",
      &SimulationTotals::repeated_solves, "/repeated_solves"},
+    {"failed_solves", "1", "of these, those in which the solver that was asked for failed or made a false claim",
+     &SimulationTotals::failed_solves, "/effort/failed_solves"},
+    {"first_failure", "", "its sentence in the first of them", &SimulationTotals::first_failure,
+     "/effort/first_failure"},
     {"near_goal_solves", "1", "solves that ended somewhat above the tolerance that their steps are worth",
      &SimulationTotals::near_goal_solves, "/effort/near_goal_solves"},
     {"divided_steps", "1", "fixed steps that the method could not take in one", &SimulationTotals::divided_steps,
