@@ -242,7 +242,8 @@ TEST(TerrainScene, BadTerrainIsRefusedInASentence) {
     EXPECT_TRUE(has(refusal("height_field: {size: [1, 1], file: none.csv}"), "none.csv"));
     EXPECT_TRUE(has(refusal("terrain: none.obj"), "none.obj"));
     EXPECT_TRUE(has(refusal("terrain: {scale: 2}"), "lacks the key \"file\""));
-    EXPECT_TRUE(has(refusal("height_field: {size: [1, 1], heights: [[0, 0], [0, 0]]}", "mass: 1"), "for fixed bodies only"));
+    EXPECT_TRUE(
+        has(refusal("height_field: {size: [1, 1], heights: [[0, 0], [0, 0]]}", "mass: 1"), "for fixed bodies only"));
     EXPECT_TRUE(has(
         refusal("height_field: {size: [1, 1], heights: [[0, 0], [0, 0]]}", "mass: 1, inertia: {xx: 1, yy: 1, zz: 1}"),
         "fixed bodies"));
