@@ -30,8 +30,8 @@ struct Made {
         scene = YAML::Load(text.yaml);
     }
     [[nodiscard]] YAML::Node named(const char* list, const std::string& name) const {
-        for (const auto& one : scene[list])
-            if (one["name"].as<std::string>() == name) return one;
+        for (std::size_t i = 0; i < scene[list].size(); ++i)
+            if (scene[list][i]["name"].as<std::string>() == name) return scene[list][i];
         ADD_FAILURE() << "no " << name << " among " << list << "\n" << text.yaml;
         return {};
     }

@@ -23,9 +23,9 @@ namespace delassus {
 // (τ* = τ for a single bounce with a' = a; with e = 0 and a' < 0 what then presses the bodies together is in it).
 //
 // What is flush meets everywhere at once. Where that is the end of the step, rounding lets one corner meet and not
-// another one, so that a gap within its resolution there is none.
-std::optional<Impact> impact_within(double h, const Approach& approach, double after, double restitution,
-                                    double resolution) {
+// another one, so that times within `rounding` of it count.
+std::optional<Impact> impact_within(double h, const Approach& approach, double after, double restitution) {
+    constexpr double rounding = 1e-9;
     const auto& [gap, speed, acceleration] = approach;
     const double square = speed * speed - 2.0 * acceleration * gap;
     if (!(square > 0.0)) return std::nullopt;
@@ -38,7 +38,7 @@ std::optional<Impact> impact_within(double h, const Approach& approach, double a
     } else {
         return std::nullopt;
     }
-    if (!(h - impact.meets >= -resolution / impact.closing)) return std::nullopt;
+    if (!(impact.meets <= (1.0 + rounding) * h)) return std::nullopt;
     impact.meets = std::min(impact.meets, h);
     const double rest = h - impact.meets;
     double left = rest, leaves = restitution * impact.closing;

@@ -25,9 +25,9 @@ struct Impact {
     double acts = 0.0;       ///< when in the step one impulse of that size would lead to the same gap at its end, s
 };
 
-/// Nothing if the contact does not meet in the step of size h > 0, nor misses that by more than a gap of `resolution`.
-/// after: acceleration of the row from then on; restitution in [0, 1].
+/// Nothing if the contact does not meet in the step of size h > 0. after: acceleration of the row from then on;
+/// restitution in [0, 1].
 [[nodiscard]] DELASSUS_API std::optional<Impact> impact_within(double h, const Approach& approach, double after,
-                                                               double restitution, double resolution = 0.0);
+                                                               double restitution);
 
 }  // namespace delassus

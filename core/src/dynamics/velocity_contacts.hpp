@@ -204,7 +204,8 @@ private:
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
     void find_struck(const Problem& problem, double last_h, std::span<const double> last_struck);
-    /// What others do to the speed of an impact's row after it, beside what they did before it, m/s or rad/s.
+    /// What the friction of others does to the speed of an impact's row after it, less what it would if it went on as
+    /// before, m/s or rad/s.
     [[nodiscard]] double change_of_others(const Problem& problem, const Solution& solution,
                                           const Contact& impact) const;
     /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.

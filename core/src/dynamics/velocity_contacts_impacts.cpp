@@ -148,8 +148,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
             contact.before_impact = {from, begin, acceleration() + turning};
-            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, block.restitution,
-                                 contact.resolution);
+            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, block.restitution);
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
@@ -181,14 +180,14 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
     find_struck(problem, last_h, last_struck);
 }
 
-// What other contacts do after an impact is not what they did before it: friction turns round where a body bounces off
-// a wall. Until τ they push as in the step before; the solver finds the rest P. Of that as much is force as they would
-// push with if they went on, P_o, and the remainder is of the impact itself. So the row's acceleration after τ is
+// The friction of other contacts after an impact is not that before it: it turns round where a body bounces off a wall.
+// Until τ they push as in the step before; the solver finds the rest P. Of that as much is force as they would push
+// with if they went on, P_o, and the remainder is of the impact itself. So the row's acceleration after τ is
 //
-//     a' = a + W (P_f − P_o)/(h − τ),      P_f = min(1, Σ P_o,n/Σ P_n) P,      W = D diag(H)⁻¹ Dᵀ
+//     a' = a + W_t (P_f,t − P_o,t)/(h − τ),      P_f,t = min(1, Σ P_o,n/Σ P_n) P_t,      W = D diag(H)⁻¹ Dᵀ
 //
-// in which P is that of the first answer. Only what slows it down counts: in a stack, where several impacts meet, one
-// that is left faster could gain energy.
+// in which P is that of the first answer. Only what slows it down counts, and no normal force: in a stack, where
+// several impacts meet, one that is left faster could gain energy.
 bool VelocityContacts::follow_others(const Problem& problem, const Solution& solution) {
     constexpr double faint = 1e-9;
     bool any = false;
@@ -198,7 +197,7 @@ bool VelocityContacts::follow_others(const Problem& problem, const Solution& sol
         const double rest = h_ - contact.impact->meets, change = change_of_others(problem, solution, contact);
         if (!(rest > 0.0) || !(-change > faint * contact.impact->closing)) continue;
         contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change / rest,
-                                       rows_.blocks()[k].restitution, contact.resolution);
+                                       rows_.blocks()[k].restitution);
         contact.normal = -contact.impact->end_speed;
         any = true;
     }
@@ -212,7 +211,7 @@ double VelocityContacts::change_of_others(const Problem& problem, const Solution
         const Contact& other = contacts_[k];
         if (other.goes_on == 0.0) continue;
         bool coupled = false;
-        for (std::size_t i = 0; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
+        for (std::size_t i = 1; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
             const std::size_t row = first_row_ + other.row + i;
             const double W = coupling(problem.D, diagonal_, first_row_ + impact.row, row);
             found += W * solution.lambda[row];
