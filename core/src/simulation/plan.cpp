@@ -28,7 +28,11 @@ constexpr const char* everything = "leave_out is false: as if the scene needed e
 class Planner {
 public:
     Planner(SceneSystem& system, const Registry& registry)
-        : system_(system), registry_(registry), simulation_(system, registry), touching_(system) {
+        : system_(system),
+          registry_(registry),
+          end_(std::exchange(system.end, std::max(system.end, system.step))),
+          simulation_(system, registry),
+          touching_(system) {
         plan_.name = system.name;
         const JointCoordinates* joints = simulation_.joint_coordinates();
         plan_.velocities = joints ? joints->n() : system.system->n();
@@ -56,7 +60,6 @@ private:
     void leave(std::string what, std::string reason) { plan_.left_out.push_back({std::move(what), std::move(reason)}); }
 
     void first_step() {
-        const double end = std::exchange(system_.end, std::max(system_.end, system_.step));  // at least one step
         simulation_.solver().watch([this](const Problem& problem) {
             std::int32_t parts = 0;
             for (const auto& part : simulation_.solver().parts(problem)) {
@@ -68,7 +71,7 @@ private:
             plan_.parts = std::max(plan_.parts, parts);
         });
         simulation_.step();
-        system_.end = end;
+        system_.end = end_;
         plan_.solvers = simulation_.solver().loaded();
     }
 
@@ -335,6 +338,7 @@ private:
 
     SceneSystem& system_;
     const Registry& registry_;
+    double end_;  // of the system, which has at least one step while the plan is made
     Simulation simulation_;
     Touching touching_;
     SystemPlan plan_;
