@@ -156,10 +156,8 @@ private:
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
         record.t = state.t;
         record.energy = system_.energy(state);
-        std::vector<double> momentum(state.v.size(), 0.0);
-        system_.multiply_mass(state, 1.0, state.v.data(), momentum.data());
-        record.kinetic = 0.0;
-        for (std::size_t i = 0; i < momentum.size(); ++i) record.kinetic += 0.5 * state.v[i] * momentum[i];
+        std::vector<double> momentum;
+        record.kinetic = kinetic_energy(system_, state, state.v, momentum);
         record.momentum = record.angular_momentum = {unknown, unknown, unknown};
         std::vector<double> C(static_cast<std::size_t>(system_.m()), 0.0);
         system_.constraint(state, C.data());

@@ -28,7 +28,7 @@ struct StepControl {
     /// ones. Not in steps of the smallest size, which can pass a jump of velocities.
     bool of_way = false;
 
-    /// How steps of size h are divided into parts that err by a `limit` of a method at most.
+    /// How steps of size h are divided into substeps that err by a method's error limit at most.
     [[nodiscard]] DELASSUS_API static StepControl within(double limit, double h);
 };
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "dynamics/linear_problem.hpp"
@@ -38,10 +37,14 @@ void Linearization::judge(const State& begin, const State& end, double h, std::s
     for (const auto* q : {&begin.q, &end.q})
         for (const double value : *q) largest = std::max(largest, std::abs(value));
     const double digits = 10.0 * std::numeric_limits<double>::epsilon() * largest;
+    bool definite = true;  // M
     double difference = 0.0, rounding = 0.0, before = 0.0, after = 0.0, forces = 0.0;
     for (std::int32_t i = 0; i < n; ++i) {
         const double mass = diagonal_entry(M, i);
-        if (!(mass > 0.0)) continue;
+        if (!(mass > 0.0)) {
+            definite = false;
+            continue;
+        }
         const auto squared = [](double value) { return value * value; };
         const auto k = static_cast<std::size_t>(i);
         difference += squared(force[k] - linear[k]) / mass;
@@ -54,13 +57,23 @@ void Linearization::judge(const State& begin, const State& end, double h, std::s
         return value > 0.0 ? value / std::sqrt(std::max({before, after, forces})) : 0.0;
     };
     const auto error_now = [&] { return share(std::sqrt(difference) - std::sqrt(rounding)); };
-    if (error_now() > limit_ && system_.m() > 0 && !solver.is_shared()) {
+    if (error_now() > limit_ && system_.m() > 0 && definite && !solver.is_shared()) {
+        Problem held;
+        held.H = M;
+        D_.begin(system_.m(), n);
+        system_.add_constraint_jacobian(end, 0, D_);
+        held.D = D_.finish();
+        held.b.assign(static_cast<std::size_t>(system_.m()), 0.0);
+        held.cones = free_cones(system_);
+        const auto square = [&](std::span<const double> impulse) {
+            held.a.assign(impulse.begin(), impulse.end());
+            const Vector change = solve_linear(held, solver, report, "linearisation").x;
+            return std::max(change.dot(Eigen::Map<const Vector>(impulse.data(), n)), 0.0);
+        };
         std::vector<double> off(force.begin(), force.end());
         for (std::size_t i = 0; i < off.size(); ++i) off[i] -= linear[i];
-        difference = norm_beside_joints(end, std::move(off), solver, report);
-        forces = norm_beside_joints(end, {linear.begin(), linear.end()}, solver, report);
-        difference *= difference;
-        forces *= forces;
+        difference = square(off);
+        forces = square(linear);
     }
     const double error = error_now();
     report.linearization = error;
@@ -71,24 +84,6 @@ void Linearization::judge(const State& begin, const State& end, double h, std::s
         "the velocities in a step, where linearization_limit is {:.2g}; take shorter steps, a method that iterates "
         "(euler_implicit), or a joint in place of a very stiff part",
         method, begin.t, h, error, limit_));
-}
-
-double Linearization::norm_beside_joints(const State& end, std::vector<double> impulse, StepSolver& solver,
-                                         StepReport& report) {
-    Problem problem;
-    const auto n = static_cast<std::int32_t>(impulse.size());
-    M_.begin(n, n);
-    system_.add_mass(end, 1.0, M_);
-    problem.H = M_.finish();
-    D_.begin(system_.m(), n);
-    system_.add_constraint_jacobian(end, 0, D_);
-    problem.D = D_.finish();
-    problem.b.assign(static_cast<std::size_t>(system_.m()), 0.0);
-    problem.cones = free_cones(system_);
-    problem.a = impulse;
-    const LinearSolution change = solve_linear(std::move(problem), solver, report, "linearisation");
-    const double square = change.x.dot(Eigen::Map<const Vector>(impulse.data(), n));
-    return std::sqrt(std::max(square, 0.0));
 }
 
 OptionInfo linearization_option() {

@@ -22,7 +22,8 @@ namespace delassus {
 // stiffness T/l, as h² T/l beside m, slows the bob by η φ, and a radian has 1/φ steps. (M is taken by its diagonal.)
 //
 // What joints and attachments hold does not change the velocities: a light node that hangs on a heavy body moves with
-// it. So where η is beyond a limit, both numerators are measured again by the changes that they allow,
+// it. So where η is beyond a limit and M is definite, both numerators are measured again by the changes that they
+// allow,
 //
 //     M δ − C_qᵀ λ = h (f − f_lin),      C_q δ = 0,      ‖h (f − f_lin)‖² = δᵀ M δ
 //
@@ -43,10 +44,6 @@ public:
                StepReport& report);
 
 private:
-    /// The norm in M⁻¹ of what joints let an impulse change at a state.
-    [[nodiscard]] double norm_beside_joints(const State& end, std::vector<double> impulse, StepSolver& solver,
-                                            StepReport& report);
-
     DynamicalSystem& system_;
     double limit_;
     bool wanted_;

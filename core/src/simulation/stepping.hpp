@@ -35,7 +35,7 @@ struct SteppingSettings {
 //
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
-//     in 2, 4, … equal substeps         where the method or the watch calls it too long
+//     in 2, 4, … equal substeps       where the method or the watch calls it too long
 //   or
 //     in substeps by their error      AdaptiveStepping, where there is an error limit, an accuracy or a tolerance
 //     longer than what is shown       LookAhead, where the method knows the way of its steps
