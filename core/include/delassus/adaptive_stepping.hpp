@@ -125,6 +125,7 @@ private:
     double next_;
     double last_error_ = 1.0;
     double impacts_ = 0.0;  // short steps for impacts since the last long one
+    double fastest_ = 0.0;  // of all velocities up to now, over the sizes of their coordinates
     // With of_way: how far each coordinate is from where it began, and was at most.
     std::vector<double> gone_, longest_;
     // Of the step that is being taken:

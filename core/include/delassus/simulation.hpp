@@ -60,6 +60,7 @@ struct SimulationTotals {
     double start_kinetic = 0.0;               ///< J
     double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
     double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
+    double damped = 0.0;                      ///< energy that forces too stiff for the steps lost in them, J
     double start_overlap = 0.0;  ///< what is left of the deepest overlap of the start, m; 0 once it has not shrunk
     double credit = 0.0;         ///< rise of the energy while the overlaps of the start shrank, J
     double lowest = 0.0;         ///< least energy up to now but for `recovered`, J
@@ -117,6 +118,7 @@ struct SteppingMethod {
     std::string integrator;
     OptionTexts options;
     Coordinates coordinates = Coordinates::Maximal;
+    bool by_accuracy = false;  ///< its steps are divided by their error (SceneSystem::steps_by_accuracy)
 };
 
 class EnergyGuard;

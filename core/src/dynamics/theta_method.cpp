@@ -164,6 +164,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     }
     end_.v = solution_.x;
     require_finite(state, end_, h, settings_.name);
+    if (!stiff_.empty()) report.damped = lost_by_stiff_forces(state, h, result_);
     if (linearization_.wanted()) judge_linearization(state, h, result_, solver, report);
     if (!settings_.linearly_implicit || struck || contacts_.landed(solution_))
         projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
@@ -345,23 +346,35 @@ void ThetaMethod::set_constraint_rows(const State& begin, double h) {
         problem_.b[static_cast<std::size_t>(row)] = rate_[row] - problem_.D.row_times(row, guess_.data());
 }
 
+/// What the impulse of stiff forces differs by from that of at_theta_, which is at the middle of the motion.
+void ThetaMethod::add_stiff_impulse(const State& begin, double h, const Vector& last, Vector& impulse) {
+    move(begin, h, last, 1.0, beyond_);
+    delta_ = (1.0 - theta_) * h * last;
+    system_.increment(beyond_.q.data(), delta_.data(), beyond_.q.data());
+    beyond_.v.assign(last.begin(), last.end());
+    beyond_.t += (1.0 - theta_) * h;
+    system_.stiff_tensions(beyond_, stiff_, tensions_);
+    system_.stiff_tensions(at_theta_, stiff_, tensions_at_theta_);
+    for (std::size_t i = 0; i < stiff_.size(); ++i) tensions_[i] -= tensions_at_theta_[i];
+    system_.add_stiff_forces(at_theta_, stiff_, tensions_, h, impulse.data());
+}
+
+// At θ = ½ a spring gets back what it gives, and a dashpot takes c u²: the tension at θ times the way is what changes
+// its energy. What the tension beyond the step adds to that is lost to its length.
+double ThetaMethod::lost_by_stiff_forces(const State& begin, double h, const Vector& last) {
+    move(begin, h, last, theta_, at_theta_);
+    linear_.setZero(n_);
+    add_stiff_impulse(begin, h, last, linear_);
+    return -linear_.dot((1.0 - theta_) * Eigen::Map<const Vector>(begin.v.data(), n_) + theta_ * last);
+}
+
 /// force_ ← h f for the velocities `last` at the end, at at_theta_, where spinning bodies have their own impulse
 /// instead of what they feel alone.
 void ThetaMethod::impulse_of_forces(const State& begin, double h, const Vector& last) {
     move(begin, h, last, theta_, at_theta_);
     force_.setZero(n_);
     system_.add_force(at_theta_, h, force_.data());
-    if (!stiff_.empty()) {
-        move(begin, h, last, 1.0, beyond_);
-        delta_ = (1.0 - theta_) * h * last;
-        system_.increment(beyond_.q.data(), delta_.data(), beyond_.q.data());
-        beyond_.v.assign(last.begin(), last.end());
-        beyond_.t += (1.0 - theta_) * h;
-        system_.stiff_tensions(beyond_, stiff_, tensions_);
-        system_.stiff_tensions(at_theta_, stiff_, tensions_at_theta_);
-        for (std::size_t i = 0; i < stiff_.size(); ++i) tensions_[i] -= tensions_at_theta_[i];
-        system_.add_stiff_forces(at_theta_, stiff_, tensions_, h, force_.data());
-    }
+    if (!stiff_.empty()) add_stiff_impulse(begin, h, last, force_);
     for (std::size_t k = 0; k < spins_.size(); ++k)
         for (std::size_t i = 0; i < 3; ++i)
             force_[spins_[k].column + static_cast<std::int32_t>(i)] +=

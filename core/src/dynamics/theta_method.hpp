@@ -63,8 +63,10 @@ private:
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
     void set_constraint_rows(const State& begin, double h);
+    void add_stiff_impulse(const State& begin, double h, const Vector& last, Vector& impulse);
     void impulse_of_forces(const State& begin, double h, const Vector& last);
     void set_b_of_contacts(int iteration, const StepReport& report);
+    [[nodiscard]] double lost_by_stiff_forces(const State& begin, double h, const Vector& last);
     [[nodiscard]] bool contacts_gain(const State& begin);
     void scale();
     [[nodiscard]] bool unchanged() const;

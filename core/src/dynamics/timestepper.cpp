@@ -54,6 +54,7 @@ void StepReport::follow(const StepReport& before) {
     linearization = std::max(linearization, before.linearization);
     linearization_rounding = std::max(linearization_rounding, before.linearization_rounding);
     recovered += before.recovered;
+    damped += before.damped;
     natural = std::max(natural, before.natural);
     if (before.solved) return;
     solved = false;

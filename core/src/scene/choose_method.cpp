@@ -26,6 +26,9 @@ constexpr double most_explicit_rate = 50.0;
 /// With elements: they vibrate in as many ways as they have nodes or bodies, without damping, and a share of each
 /// tolerance feeds all of them where steps are near the stability limit.
 constexpr double most_explicit_rate_of_elements = 1.0;
+/// h ω up to which fixed steps are right: of the rates of springs and dashpots the trapezoidal rule is off by the share
+/// (h ω)²/12, which is the accuracy where nothing is said.
+constexpr double most_rate_of_fixed_steps = 0.1;
 /// h ω up to which the trapezoidal rule, which damps nothing, has a faint error of the fastest motion.
 constexpr double most_rate_of_order_2 = 2.0;
 /// The same where steps are divided until their error is small.
@@ -57,11 +60,12 @@ public:
         M_.compute(assembled(n_, n_, [&](MatrixAssembler& target) { mechanics_.add_metric(1.0, target); }));
     }
 
-    /// The fastest that stiffness and spins make, and that damping does, 1/s.
+    /// The fastest of vibrations, spins and decays, 1/s.
     struct Fastest {
-        double motion, damping;
+        double stiffness, spin, damping;
         [[nodiscard]] bool within(const Fastest& limits, double step) const {
-            return motion * step <= limits.motion && damping * step <= limits.damping;
+            return stiffness * step <= limits.stiffness && spin * step <= limits.spin &&
+                   damping * step <= limits.damping;
         }
     };
     [[nodiscard]] Fastest fastest() const {
@@ -73,8 +77,7 @@ public:
         for (BodyIndex body = 0; body < mechanics_.body_count(); ++body)
             if (const auto column = mechanics_.body_column(body); column >= 0)
                 spin = std::max(spin, Eigen::Map<const Eigen::Vector3d>(start_.v.data() + column + 3).norm());
-        return {std::max(std::sqrt(radius(&MultibodySystem::add_stiffness)), spin),
-                radius(&MultibodySystem::add_damping)};
+        return {std::sqrt(radius(&MultibodySystem::add_stiffness)), spin, radius(&MultibodySystem::add_damping)};
     }
 
     /// From now on velocities are those that joints allow, if that can be found out. Rows that repeat each other make
@@ -176,7 +179,7 @@ bool mostly_without_joints(const SceneSystem& system) {
 }
 
 /// How fast forces are, for a method that takes h ω up to these limits; empty: it takes them.
-std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
+std::string how_fast(const SceneSystem& system, const Rates::Fastest& most) {
     // A tolerance chooses its steps; these are as long as its users take them.
     const double step = system.control             ? std::min(system.control->largest, 0.01)
                         : system.steps_by_accuracy ? std::min(system.step, 0.01)
@@ -186,8 +189,14 @@ std::string why_stiff(const SceneSystem& system, const Rates::Fastest& most) {
     if (system.system->m() > 0) rates.hold_joints();
     const Rates::Fastest found = rates.fastest();
     if (found.within(most, step)) return {};
-    const double rate = std::max(found.motion, found.damping);
-    return fmt::format("forces are stiff: rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
+    const double rate = std::max({found.stiffness, std::isfinite(most.spin) ? found.spin : 0.0, found.damping});
+    return fmt::format("rates of up to {:.2g}/s, {:.2g} in a step", rate, rate * step);
+}
+
+/// The same, of motions with spins.
+std::string why_stiff(const SceneSystem& system, double most_motion, double most_damping) {
+    const std::string fast = how_fast(system, {most_motion, most_motion, most_damping});
+    return fast.empty() ? fast : "forces are stiff: " + fast;
 }
 
 /// For bodies that may touch, stops and dry friction in maximal coordinates. Between impacts a method of order 2 takes
@@ -214,11 +223,10 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         return;
     }
     const bool flies = !chosen_steps && !always_acts(system);
-    const Rates::Fastest most = chosen_steps ? Rates::Fastest{most_rate_of_chosen_steps, most_rate_of_chosen_steps}
-                                : touching && flies
-                                    ? Rates::Fastest{most_motion_beside_contacts, most_damping_beside_contacts}
-                                    : Rates::Fastest{most_rate_of_order_2, most_rate_of_order_2};
-    const std::string stiff = why_stiff(system, most);
+    const std::string stiff = chosen_steps ? why_stiff(system, most_rate_of_chosen_steps, most_rate_of_chosen_steps)
+                              : touching && flies
+                                  ? why_stiff(system, most_motion_beside_contacts, most_damping_beside_contacts)
+                                  : why_stiff(system, most_rate_of_order_2, most_rate_of_order_2);
     system.coordinates = Coordinates::Joint;
     system.method_reason =
         (touching ? "bodies with joints may touch, and "
@@ -237,12 +245,28 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
     if (!stiff.empty()) system.integrator_options.insert_or_assign("flight", "radau_iia");
 }
 
-}  // namespace
+/// What a method would do to the motion in fixed steps; empty: too little to matter. Those of order 2 do not follow
+/// what vibrates or decays within a few of them. The one of order 1 damps everything; with joints its estimate wants
+/// steps in proportion to the accuracy, which nobody could pay.
+std::string why_divided(const SceneSystem& system) {
+    if (system.integrator == "euler_implicit_linearized")
+        return system.sleeping || system.system->n() == 0 || system.system->m() > 0 ? std::string()
+                                                                                    : "its method is of order 1";
+    if (system.integrator != "linearly_implicit_trapezoidal" && system.integrator != "moreau_jean") return {};
+    constexpr double any = std::numeric_limits<double>::infinity();
+    const std::string fast = how_fast(system, {most_rate_of_fixed_steps, any, most_rate_of_fixed_steps});
+    return fast.empty() ? fast : "forces have " + fast;
+}
 
-void choose_method(SceneSystem& system) {
-    if (system.coordinates_chosen && !system.system->needs_joint_coordinates().empty())
-        system.coordinates = Coordinates::Joint;
-    if (system.integrator != chosen) return;
+void divide_by_error(SceneSystem& system) {
+    if (system.control || system.steps_by_accuracy) return;
+    const std::string why = why_divided(system);
+    if (why.empty()) return;
+    system.steps_by_accuracy = system.accuracy_chosen = true;
+    system.method_reason += fmt::format("; {}, so steps are divided by their error", why);
+}
+
+void choose_of_all(SceneSystem& system) {
     system.integrator = "euler_implicit_linearized";
     system.method_reason = why_default(system);
     if (!system.method_reason.empty()) return;
@@ -261,13 +285,23 @@ void choose_method(SceneSystem& system) {
         return;
     }
     const double most = has_elements(system) ? most_explicit_rate_of_elements : most_explicit_rate;
-    const std::string stiff = why_stiff(system, {most, most});
+    const std::string stiff = why_stiff(system, most, most);
     if (in_joints) system.coordinates = Coordinates::Joint;
     system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";
     system.method_reason = "nothing can touch, and " + (stiff.empty() ? "no force is stiff" : stiff);
     if (!system.control && !system.steps_by_accuracy)
         system.integrator_options.insert_or_assign("error_limit",
                                                    stiff.empty() ? error_limit_of_explicit : error_limit);
+}
+
+}  // namespace
+
+void choose_method(SceneSystem& system) {
+    if (system.coordinates_chosen && !system.system->needs_joint_coordinates().empty())
+        system.coordinates = Coordinates::Joint;
+    if (system.integrator != chosen) return;
+    choose_of_all(system);
+    divide_by_error(system);
 }
 
 }  // namespace delassus::scene

@@ -27,19 +27,29 @@ constexpr double shortest_impact = 1e-4;
 constexpr double share_of_solves = 0.1;
 
 std::string described(const SteppingMethod& method) {
-    return fmt::format("{} in {} coordinates", method.integrator,
-                       method.coordinates == Coordinates::Joint ? "joint" : "maximal");
+    return fmt::format("{} in {} coordinates{}", method.integrator,
+                       method.coordinates == Coordinates::Joint ? "joint" : "maximal",
+                       method.by_accuracy ? ", with divided steps" : "");
 }
 
 }  // namespace
 
 std::vector<SteppingMethod> methods_of(const SceneSystem& system) {
-    std::vector<SteppingMethod> methods = {{system.integrator, system.integrator_options, system.coordinates}};
+    std::vector<SteppingMethod> methods = {
+        {system.integrator, system.integrator_options, system.coordinates, system.steps_by_accuracy}};
     if (system.method_reason.empty() || system.control || system.sleeping) return methods;
-    if (system.coordinates == Coordinates::Joint && system.coordinates_chosen && system.system->detects_contacts())
+    const bool leaves_joints =
+        system.coordinates == Coordinates::Joint && system.coordinates_chosen && system.system->detects_contacts();
+    const bool given = system.steps_by_accuracy && !system.accuracy_chosen;
+    if (leaves_joints) {
         methods.push_back({system.integrator == of_stiff_forces ? of_stiff_forces : "linearly_implicit_trapezoidal",
                            {},
-                           Coordinates::Maximal});
+                           Coordinates::Maximal,
+                           given});
+    } else if (system.accuracy_chosen) {
+        methods.push_back(methods.front());
+        methods.back().by_accuracy = false;
+    }
     return methods;
 }
 
@@ -57,8 +67,8 @@ void Simulation::make_method() {
                               "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
                               method().integrator),
         .restitutes = restitutes_};
-    if (system_->steps_by_accuracy && !std::isfinite(timestepper->error_limit()))
-        settings.divided = control_of_accuracy();
+    solver_->bound_errors({});
+    if (method().by_accuracy && !std::isfinite(timestepper->error_limit())) settings.divided = control_of_accuracy();
     stepping_ = std::make_unique<Stepping>(dynamics(), std::move(timestepper), std::move(settings), shared_.get());
     if (shared_) {
         shared_->restart();
@@ -84,23 +94,29 @@ StepControl Simulation::control_of_accuracy() {
 
 void Simulation::change_method(std::size_t number) {
     stepping_.reset();
-    joint_.reset();
-    system_->system->assemble();
+    const Coordinates before = method().coordinates;
     now_.totals.method_changes = static_cast<std::int64_t>(number);
-    if (method().coordinates == Coordinates::Joint) joint_ = std::make_unique<JointCoordinates>(*system_->system);
+    if (method().coordinates != before) {
+        joint_.reset();
+        system_->system->assemble();
+        if (method().coordinates == Coordinates::Joint) joint_ = std::make_unique<JointCoordinates>(*system_->system);
+    }
     make_method();
 }
 
 bool Simulation::go_on(const std::string& why) {
     const auto next = static_cast<std::size_t>(now_.totals.method_changes) + 1;
     if (next >= methods_.size()) return false;
-    State bodies = bodies_;
+    State bodies = state();
     bodies.t = now_.state.t;
+    const Coordinates before = method().coordinates;
     now_.totals.last_change = fmt::format("from t = {:.6g} s on {} took the place of {}, which could not go on: {}",
                                           bodies.t, described(methods_[next]), described(method()), why);
     change_method(next);
-    now_.state = std::move(bodies);
-    system_->system->renew_rows(now_.state, 0);
+    if (method().coordinates != before) {
+        now_.state = std::move(bodies);
+        system_->system->renew_rows(now_.state, 0);
+    }
     report_ = {};
     return true;
 }

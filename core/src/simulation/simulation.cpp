@@ -98,7 +98,9 @@ bool shares_bodies(const SceneSystem& system, const Registry& registry) {
 
 /// Where bodies are shared and the scene does not name its method, one that can be shared.
 void choose_method_to_share(SceneSystem& system, const Registry& registry) {
-    if (!shares_bodies(system, registry) || can_be_shared(system.integrator) || system.method_reason.empty()) return;
+    if (!shares_bodies(system, registry)) return;
+    if (system.accuracy_chosen) system.steps_by_accuracy = system.accuracy_chosen = false;
+    if (can_be_shared(system.integrator) || system.method_reason.empty()) return;
     system.method_reason = fmt::format("several processes cannot share {}", system.integrator);
     system.integrator = methods_to_share().front();
     system.integrator_options.clear();
@@ -209,7 +211,7 @@ void Simulation::share(const Registry& registry) {
     if (system_->coordinates == Coordinates::Joint) refuse("in joint coordinates", "remove \"coordinates\", or ");
     if (system_->sleeping) refuse("in which bodies sleep", "remove \"sleeping\", or ");
     if (system_->control) refuse("with steps chosen by a tolerance", "give a fixed \"step\", or ");
-    if (system_->steps_by_accuracy) refuse("with steps that follow from an accuracy", "remove \"accuracy\", or ");
+    if (method().by_accuracy) refuse("with steps that follow from an accuracy", "remove \"accuracy\", or ");
     if (!system_->leave_out) refuse("of which nothing is left out", "");
     shared_ = std::make_unique<SharedRun>(*system_, communicator_of_run(), registry, *solver_);
 }
@@ -303,6 +305,7 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
             fmt::format("the constraints have drifted by {:.3g}, where limits.drift is {:.3g}: the step of {:.3g} s is "
                         "too long for {}",
                         record_.drift, limits.drift, taken.h, method().integrator));
+    totals.damped += taken.step.damped;
     if (!guard_->watches(totals)) return;
     const double start_potential = totals.start_energy - totals.start_kinetic;
     totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
@@ -432,7 +435,7 @@ const StepRecord& Simulation::step() {
     if (totals.first_failure.empty()) totals.first_failure = effort.failure;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
-    if (system_->steps_by_accuracy && taken.error > 1.0) ++totals.inexact_steps;
+    if (method().by_accuracy && taken.error > 1.0) ++totals.inexact_steps;
     if (!deep_.empty()) {
         ++totals.deep_steps;
         if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
@@ -565,6 +568,12 @@ std::vector<std::string> Simulation::warnings() const {
                             system_->name, fall, 100.0 * share, method().integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
     }
+    if (const auto& totals = now_.totals; totals.damped > visible_share * guard_->scale(totals, totals.largest_step))
+        sentences.push_back(fmt::format(
+            "system \"{}\": {} took {:.3g} J, {:.0f} % of what can have moved, from springs that are too stiff for the "
+            "steps; shorter ones resolve their vibrations",
+            system_->name, method().integrator, totals.damped,
+            100.0 * totals.damped / guard_->scale(totals, totals.largest_step)));
     if (const auto& totals = now_.totals; totals.method_changes > 0)
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
     if (const auto& totals = now_.totals; totals.failed_solves > 0)

@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 38> total_columns = {{
+inline constexpr std::array<TotalColumn, 39> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -102,6 +102,8 @@ inline constexpr std::array<TotalColumn, 38> total_columns = {{
      "/energy/growth_share"},
     {"recovered", "J", "energy that contacts gave by pushing apart what penetrated", &SimulationTotals::recovered,
      "/energy/recovered"},
+    {"damped", "J", "energy that forces too stiff for the steps lost in them", &SimulationTotals::damped,
+     "/energy/damped"},
     {"start_kinetic", "J", "kinetic energy at the start", &SimulationTotals::start_kinetic},
     {"potential_drop", "J", "largest fall of the potential energy below its start", &SimulationTotals::potential_drop},
     {"worst_drift", "m, rad", "largest violation of a bilateral constraint", &SimulationTotals::worst_drift,
