@@ -159,7 +159,7 @@ private:
     /// By what factor a step of contact from `begin` to `end` errs more than it may; 0 where the system does not know
     /// its accelerations.
     [[nodiscard]] double error_of_contact(const State& begin, const State& end) {
-        constexpr double most = 1e-3;
+        constexpr double most = 1e-4;
         const double h = end.t - begin.t;
         trial_ = begin;
         trial_.t += 0.5 * h;

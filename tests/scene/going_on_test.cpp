@@ -50,7 +50,7 @@ std::string chain_over_drum() {
         if (i > 1) apart += fmt::format("- [l{}, l{}]\n", i - 2, i);
     }
     return fmt::format(
-        "step: 0.002\nend: 0.2\nmaterials: {{m: {{friction: 0.4}}}}\nbodies:\n"
+        "step: 0.004\nend: 0.2\nmaterials: {{m: {{friction: 0.1}}}}\nbodies:\n"
         "- {{name: drum, fixed: true, orientation: {{axis: [1, 0, 0], angle: 90}}, shapes: [{{cylinder: {{radius: {}, "
         "length: 0.4}}, material: m}}]}}\n{}joints:\n{}keep_apart:\n{}",
         drum, bodies, joints, apart);

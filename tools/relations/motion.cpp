@@ -29,6 +29,7 @@ struct Running {
 };
 
 double error_limit_of(const SceneSystem& system) {
+    if (system.steps_by_accuracy) return system.accuracy;
     for (const auto& [key, value] : system.integrator_options)
         if (key == "error_limit") return std::strtod(value.c_str(), nullptr);
     // The default of the only method that has one without being told.
