@@ -245,13 +245,15 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
     if (!stiff.empty()) system.integrator_options.insert_or_assign("flight", "radau_iia");
 }
 
-/// What a method would do to the motion in fixed steps; empty: too little to matter. Those of order 2 do not follow
-/// what vibrates or decays within a few of them. The one of order 1 damps everything; with joints its estimate wants
-/// steps in proportion to the accuracy, which nobody could pay.
+/// What a method would do to the motion in fixed steps; empty: too little to matter, or what nobody could pay to avoid.
+/// Those of order 2 do not follow what vibrates or decays within a few of them. The one of order 1 damps everything;
+/// but with joints its estimate wants steps in proportion to the accuracy, and where elements touch, forty times the
+/// time.
 std::string why_divided(const SceneSystem& system) {
-    if (system.integrator == "euler_implicit_linearized")
-        return system.sleeping || system.system->n() == 0 || system.system->m() > 0 ? std::string()
-                                                                                    : "its method is of order 1";
+    if (system.integrator == "euler_implicit_linearized") {
+        const bool dear = system.system->m() > 0 || !system.elastic_blocks.empty() || !system.beams.empty();
+        return dear || system.sleeping || system.system->n() == 0 ? std::string() : "its method is of order 1";
+    }
     if (system.integrator != "linearly_implicit_trapezoidal" && system.integrator != "moreau_jean") return {};
     constexpr double any = std::numeric_limits<double>::infinity();
     const std::string fast = how_fast(system, {most_rate_of_fixed_steps, any, most_rate_of_fixed_steps});

@@ -27,9 +27,8 @@ constexpr double shortest_impact = 1e-4;
 constexpr double share_of_solves = 0.1;
 
 std::string described(const SteppingMethod& method) {
-    return fmt::format("{} in {} coordinates{}", method.integrator,
-                       method.coordinates == Coordinates::Joint ? "joint" : "maximal",
-                       method.by_accuracy ? ", with divided steps" : "");
+    return fmt::format("{} in {} coordinates", method.integrator,
+                       method.coordinates == Coordinates::Joint ? "joint" : "maximal");
 }
 
 }  // namespace
@@ -110,8 +109,12 @@ bool Simulation::go_on(const std::string& why) {
     State bodies = state();
     bodies.t = now_.state.t;
     const Coordinates before = method().coordinates;
-    now_.totals.last_change = fmt::format("from t = {:.6g} s on {} took the place of {}, which could not go on: {}",
-                                          bodies.t, described(methods_[next]), described(method()), why);
+    now_.totals.last_change =
+        methods_[next].integrator == method().integrator && methods_[next].coordinates == before
+            ? fmt::format("from t = {:.6g} s on steps are not divided by their error, which could not go on: {}",
+                          bodies.t, why)
+            : fmt::format("from t = {:.6g} s on {} took the place of {}, which could not go on: {}", bodies.t,
+                          described(methods_[next]), described(method()), why);
     change_method(next);
     if (method().coordinates != before) {
         now_.state = std::move(bodies);
