@@ -38,6 +38,7 @@ TEST(StiffSprings, DampNothingElse) {
                              "- {{name: soft, second: c, first_point: [3, 0, 1], stiffness: {}, rest_length: "
                              "2}}\n",
                              soft));
+    EXPECT_EQ(run.scene.systems[0].integrator, "linearly_implicit_trapezoidal");
     EXPECT_NEAR(run.pose("c").position[0], 5.0 + 0.4 * std::cos(std::sqrt(soft / 1.3) * end), 2e-3);
     const auto a = run.velocities("a")[0], b = run.velocities("b")[0];
     EXPECT_NEAR(a[1], 0.5, 1e-9) << "they have stopped vibrating";

@@ -86,7 +86,7 @@ struct SceneSystem {
     double step = 0.0;                     ///< s, > 0; with `control` the first that is tried
     double accuracy = 1e-3;                ///< of positions a second, as a share of the extent of what moves, and rad
     bool steps_by_accuracy = false;        ///< `step` is then how often results are shown
-    bool accuracy_chosen = false;          ///< the scene gives no accuracy: its forces are too fast for fixed steps
+    bool accuracy_chosen = false;          ///< the scene gives no accuracy: fixed steps would change its motion
     std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
     std::optional<SleepingRule> sleeping;  ///< none: every body is awake
     std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given
