@@ -103,6 +103,24 @@ TEST(StiffSprings, AreHeldWhereStepsCannotFollow) {
     }
 }
 
+// A scene in milliseconds and millimetres is divided as one in seconds and metres.
+TEST(StiffSprings, AreDividedAlikeInAllUnits) {
+    const auto landing = [](double mm, double ms) {
+        const double stiffness = 7000.0 / (ms * ms);
+        auto run = finished(
+            fmt::format("gravity: [0, 0, {}]\nstep: {}\nend: {}\n", -9.81 * mm / (ms * ms), 0.0043 * ms, 0.43 * ms) +
+            "bodies:\n- {name: floor, fixed: true, shapes: [{plane: {}}]}\n" +
+            fmt::format("- {{name: foot, mass: 0.8, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}}}]}}\n",
+                        0.47 * mm, 0.1 * mm) +
+            fmt::format("- {{name: load, mass: 2.9, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}}}]}}\n",
+                        1.27 * mm, 0.1 * mm) +
+            fmt::format("springs: [{{name: leg, first: foot, second: load, stiffness: {}}}]\n", stiffness));
+        EXPECT_TRUE(run.scene.systems[0].accuracy_chosen);
+        return run.pose("load").position[2] / mm;
+    };
+    EXPECT_NEAR(landing(1000.0, 1000.0), landing(1.0, 1.0), 1e-6);
+}
+
 // A weight on a cable swings above a floor that it does not touch: nothing takes energy, nor does the method, whose
 // order is 1.
 TEST(StiffSprings, LetACableSwing) {

@@ -15,7 +15,8 @@ namespace delassus {
 /// What a step's size may be, and the error that chooses it (docs/integrators.md, "Steps by tolerance").
 struct StepControl {
     double absolute = 1e-4;     ///< in units of positions, as a rule m and rad, or a share of `sizes`; > 0
-    double relative = 0.0;      ///< of the way that a coordinate goes in a unit of time; ≥ 0
+    double relative = 0.0;      ///< of the way that a coordinate goes in `unit`; ≥ 0
+    double unit = 1.0;          ///< of time, as a rule s, in which positions may err by these; > 0
     double initial = 1e-4;      ///< first step to try, as a rule s; > 0
     double smallest = 1e-7;     ///< > 0. A smooth step below it fails; impacts closer together are not told apart
     double largest = 0.1;       ///< ≥ initial

@@ -111,7 +111,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
       resolution_(unilateral_ ? rounding_of_gaps : 0.0),
       next_(control.initial) {
     const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-    if (!positive(control.absolute) || !(control.relative >= 0.0) || !std::isfinite(control.relative))
+    if (!positive(control.absolute) || !positive(control.unit) || !(control.relative >= 0.0) || !std::isfinite(control.relative))
         throw InputError("a tolerance must be positive and finite");
     if (!positive(control.smallest) || !positive(control.largest) || !(control.smallest <= control.initial) ||
         !(control.initial <= control.largest))
@@ -128,7 +128,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
             "this one they "
             "oscillate for ever, and no step would be short enough; take hht, generalized_alpha or euler_implicit, or "
             "give a fixed \"step\"");
-    if (!(control.slow > 0.0)) control_.slow = control.absolute;
+    if (!(control.slow > 0.0)) control_.slow = control.absolute / control.unit;
     control_.of_way = control.of_way && embedded_ && !stepper.damps_at_once();
     if (control_.of_way) gone_.assign(static_cast<std::size_t>(system.n()), 0.0);
     longest_ = way_ = gone_;
@@ -145,7 +145,7 @@ double AdaptiveStepping::error_of(const State& begin, const State& whole, const 
         const double error = std::max(std::abs(delta[i]), h * std::abs(halves.v[i] - whole.v[i])) / share;
         const double speed = std::max(std::abs(begin.v[i]), std::abs(halves.v[i]));
         const double allowed = control_.absolute * size(i) + control_.relative * speed;
-        const double of_step = extrapolates_ ? allowed : allowed * h;
+        const double of_step = extrapolates_ ? allowed : allowed * h / control_.unit;
         const double ratio = std::max(error - (touches ? resolution_ * size(i) : 0.0), 0.0) / of_step;
         worst = std::isfinite(ratio) ? std::max(worst, ratio) : std::numeric_limits<double>::infinity();
     }
@@ -273,7 +273,7 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     const std::vector<double>& v = trial.end.v;
     double fastest = 0.0;
     for (std::size_t i = 0; i < v.size(); ++i) fastest = std::max(fastest, std::abs(v[i]) / size(i));
-    trial.slow = control_.slow * std::max(1.0, rounding_of_speed * fastest / control_.absolute);
+    trial.slow = control_.slow * std::max(1.0, rounding_of_speed * fastest * control_.unit / control_.absolute);
     pushed_.clear();
     for (const auto& [key, force] : trial.second.reactions)
         if (force[0] > 0.0) pushed_.push_back(key);
@@ -283,7 +283,7 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     };
     const double once = std::min(h / (share_of_event * control_.largest), 1.0);
     const auto note = [&](double speed) {
-        const double beyond = speed - resolution_ * control_.slow / (control_.absolute * h);
+        const double beyond = speed - resolution_ * control_.slow * control_.unit / (control_.absolute * h);
         trial.error = std::max(trial.error, once * share_of_wrong_speed * beyond / trial.slow);
     };
     system_.collect_unilateral(trial.end, moment(), rows_);
@@ -455,7 +455,7 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
             }
             if (!trial.touches) fell_below();
             // Where friction turns round in the shortest step, speeds err. Of a fast motion that is a small share.
-            report_.error /= std::max(fastest_, 1.0);
+            report_.error /= std::max(fastest_ * control_.unit, 1.0);
         }
         stepper_.load(trial.memory);
         // A step cut by the end or by an impact says less than the one that it was to be.

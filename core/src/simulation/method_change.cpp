@@ -25,6 +25,8 @@ constexpr auto of_stiff_forces = "euler_implicit_linearized";
 constexpr double shortest_impact = 1e-4;
 /// Of an accuracy: what solves may err by.
 constexpr double share_of_solves = 0.1;
+/// In which positions may err by a chosen accuracy, where the scene has no time of its own.
+constexpr double steps_of_time = 200.0;
 
 std::string described(const SteppingMethod& method) {
     return fmt::format("{} in {} coordinates", method.integrator,
@@ -83,10 +85,11 @@ StepControl Simulation::control_of_accuracy() {
     SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
     StepControl control = StepControl::within(system_->accuracy, system_->step);
     control.sizes = std::move(sizes.of_velocities);
-    control.slow = control.absolute * sizes.least;
+    if (system_->accuracy_chosen) control.unit = sizes.time > 0.0 ? sizes.time : steps_of_time * system_->step;
+    control.slow = control.absolute * sizes.least / control.unit;
     if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
     std::vector<double> bounds = control.sizes;
-    for (double& bound : bounds) bound *= share_of_solves * control.absolute;
+    for (double& bound : bounds) bound *= share_of_solves * control.absolute / control.unit;
     solver_->bound_errors(std::move(bounds));
     return control;
 }

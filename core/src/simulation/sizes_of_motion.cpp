@@ -91,6 +91,22 @@ std::int32_t slides(const SceneSystem& scene, const TreeJoint& joint) {
     }
 }
 
+/// SizesOfMotion::time for the size L.
+double time_of_motion(const MultibodySystem& system, double L) {
+    constexpr double times = 3.0;
+    const State start = system.initial_state();
+    const auto& g = system.gravity();
+    double rate = std::sqrt(std::hypot(g[0], g[1], g[2]) / L);
+    const auto note = [&](std::int32_t column) {
+        if (column < 0) return;
+        const double* v = start.v.data() + column;
+        rate = std::max(rate, std::hypot(v[0], v[1], v[2]) / L);
+    };
+    for (BodyIndex body = 0; body < system.body_count(); ++body) note(system.body_column(body));
+    for (std::int32_t node = 0; node < system.node_count(); ++node) note(system.node_column(node));
+    return rate > 0.0 ? times / rate : 0.0;
+}
+
 }  // namespace
 
 SizesOfMotion sizes_of_motion(const SceneSystem& scene, const JointCoordinates* joints) {
@@ -98,9 +114,11 @@ SizesOfMotion sizes_of_motion(const SceneSystem& scene, const JointCoordinates* 
     const Mechanisms mechanisms(scene);
     SizesOfMotion sizes{std::vector<double>(static_cast<std::size_t>(joints ? joints->n() : system.n()), 1.0),
                         HUGE_VAL};
+    double largest = 0.0;
     const auto set = [&](std::int32_t column, std::int32_t count, double size) {
         if (!(size > 0.0)) return;
         sizes.least = std::min(sizes.least, size);
+        largest = std::max(largest, size);
         std::fill_n(sizes.of_velocities.begin() + column, count, size);
     };
     if (joints) {
@@ -115,6 +133,7 @@ SizesOfMotion sizes_of_motion(const SceneSystem& scene, const JointCoordinates* 
                 set(column, 3, mechanisms.size_with_nodes());
     }
     if (!std::isfinite(sizes.least)) sizes.least = 1.0;
+    sizes.time = time_of_motion(system, largest > 0.0 ? largest : 1.0);
     return sizes;
 }
 

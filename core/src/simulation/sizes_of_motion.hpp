@@ -15,6 +15,9 @@ namespace delassus {
 struct SizesOfMotion {
     std::vector<double> of_velocities;  ///< StepControl::sizes: of angles 1, of lengths that of the mechanism
     double least = 1.0;                 ///< of a mechanism, m
+    /// In which the largest mechanism, of size L, falls some of its sizes or goes them as fast as the fastest body
+    /// starts: 3 min(√(L/g), L/v), s. 0: there is no gravity, and nothing moves at the start.
+    double time = 0.0;
 };
 
 /// joints: of the system, or null: coordinates are maximal.
