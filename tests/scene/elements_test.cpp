@@ -248,6 +248,27 @@ TEST(ElasticScene, WrongLoadsAreToldInOneSentence) {
     EXPECT_EQ(load("node: q"), "s.yaml, line 7: \"node\" names \"q\", but there is no such node; there are none");
 }
 
+// Beyond the speed of its waves, √(E/ρ), an impact folds a block up, of which its linear material knows nothing.
+TEST(ElasticScene, ElementsThatTurnInsideOutAreTold) {
+    const auto turned = [](double speed) {
+        Running run(parse_scene(
+            fmt::format("step: 0.003\nend: 0.12\nmaterials: {{m: {{friction: 0.5}}}}\nbodies: [{{name: ground, fixed: "
+                        "true, shapes: [{{plane: {{}}, material: m}}]}}]\nelastic_blocks: [{{name: jelly, corner: [0, "
+                        "0, 0.05], edges: [0.2, 0.2, 0.2], cells: [2, 2, 2], young: 3.0e+4, poisson: 0.4, density: "
+                        "1000, velocity: [0, 0, {}], contact: {{radius: 0.004, material: m}}}}]\n",
+                        -speed),
+            "s.yaml"));
+        run.finish();
+        std::int64_t sentences = 0;
+        for (const std::string& warning : run.simulation.warnings())
+            sentences += warning.find("turned inside out") == std::string::npos ? 0 : 1;
+        EXPECT_EQ(sentences, run.simulation.totals().most_inverted > 0 ? 1 : 0);
+        return run.simulation.totals().most_inverted;
+    };
+    EXPECT_EQ(turned(0.3), 0);
+    EXPECT_GT(turned(9.0), 0);
+}
+
 TEST(ElasticScene, WrongOnesAreToldInOneSentence) {
     EXPECT_EQ(refusal(head + block + ", yong: 1}\n"),
               "s.yaml, line 4: an elastic block has no key \"yong\"; did you mean \"young\"?");

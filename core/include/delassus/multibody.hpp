@@ -586,6 +586,8 @@ public:
     /// node. world_body for the world.
     [[nodiscard]] std::array<std::int32_t, 2> contact_bodies(const ContactPoint& contact) const;
     [[nodiscard]] double kinetic_energy(const State& state) const;
+    /// How many elastic solids are turned inside out somewhere, which no material can be.
+    [[nodiscard]] std::int64_t inverted_solids(const State& state) const;
     /// Linear momentum (kg m/s), and angular momentum about the origin (kg m²/s), world frame.
     [[nodiscard]] std::array<Vector3, 2> momentum(const State& state) const;
 

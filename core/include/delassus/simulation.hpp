@@ -60,7 +60,7 @@ struct SimulationTotals {
     double start_kinetic = 0.0;               ///< J
     double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
     double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
-    double damped = 0.0;                      ///< energy that forces too stiff for the steps lost in them, J
+    double damped = 0.0;                      ///< energy that the method took from vibrations, J
     double start_overlap = 0.0;  ///< what is left of the deepest overlap of the start, m; 0 once it has not shrunk
     double credit = 0.0;         ///< rise of the energy while the overlaps of the start shrank, J
     double lowest = 0.0;         ///< least energy up to now but for `recovered`, J
@@ -87,6 +87,8 @@ struct SimulationTotals {
     /// which the first time.
     std::int64_t deep_steps = 0;
     std::string first_deep;
+    std::int64_t most_inverted = 0;  ///< solid elements that are turned inside out after a step
+    std::string first_inverted;      ///< when the first time
     /// How often the method that was chosen could not go on, and the next one took its place; when and why the last
     /// time.
     std::int64_t method_changes = 0;

@@ -44,7 +44,7 @@ struct StepReport {
     double linearization = 0.0;
     double linearization_rounding = 0.0;   ///< what the last digits of positions may make of it; not part of it
     double recovered = 0.0;                ///< energy that contacts gave by pushing apart what penetrated, J; ≥ 0
-    double damped = 0.0;                   ///< energy that forces too stiff for the step lost in it, J; < 0: gained
+    double damped = 0.0;                   ///< energy that the method took from vibrations, J; < 0: gave
     std::vector<BlockReaction> reactions;  ///< one for each unilateral block of the problem, in its order
     std::vector<ContactPoint> contacts;    ///< UnilateralRows::contacts(): the last of these blocks are theirs
     std::vector<double> multipliers;       ///< λ of the bilateral constraints at the end of the step, forces; m

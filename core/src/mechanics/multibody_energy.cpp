@@ -109,4 +109,15 @@ double MultibodySystem::energy(const State& state) const {
     return energy;
 }
 
+std::int64_t MultibodySystem::inverted_solids(const State& state) const {
+    const auto& self = *implementation_;
+    if (self.solids_count() == 0) return 0;
+    self.place(state);
+    std::int64_t inverted = 0;
+    self.for_each_element(state, [&](const auto& element, const auto& at) {
+        if constexpr (requires { element.inverted(at); }) inverted += element.inverted(at) ? 1 : 0;
+    });
+    return inverted;
+}
+
 }  // namespace delassus

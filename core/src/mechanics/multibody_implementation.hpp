@@ -140,6 +140,9 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] double rate_of(const mechanics::Row& coordinate) const;
     [[nodiscard]] mechanics::NodePlacement node_at(std::int32_t node, const double* q, const double* v) const;
     [[nodiscard]] mechanics::NodePlacement node_of_reduced(std::int32_t node, const double* q, const double* v) const;
+    [[nodiscard]] std::size_t solids_count() const {
+        return linear_tetrahedra.size() + quadratic_tetrahedra.size() + bricks.size();
+    }
     /// Visits all elements with the placements of their nodes or bodies: visit(element, placements). After place().
     template <class Visitor>
     void for_each_element(const State& state, Visitor&& visit) const {

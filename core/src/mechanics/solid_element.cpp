@@ -250,6 +250,11 @@ ElasticSolid::Strain ElasticSolid::strain(const NodeColumns& x, const NodeColumn
     return result;
 }
 
+bool ElasticSolid::inverted(const NodeColumns& x) const {
+    return std::any_of(shape_.points.begin(), shape_.points.end(),
+                       [&](const auto& point) { return gradient_of(x, point.gradient).determinant() <= 0.0; });
+}
+
 double ElasticSolid::energy(const NodeColumns& x) const {
     const Strain now = strain(x, NodeColumns::Zero(3, x.cols()));
     double result = 0.5 * lambda_ * now.squares;

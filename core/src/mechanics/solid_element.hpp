@@ -77,6 +77,8 @@ public:
 
     /// x, v: positions and velocities of the nodes. Results have three entries for each node, matrices are by rows.
     [[nodiscard]] double energy(const NodeColumns& x) const;
+    /// Whether the material is turned inside out somewhere: det F ≤ 0 at a point.
+    [[nodiscard]] bool inverted(const NodeColumns& x) const;
     void force(const NodeColumns& x, const NodeColumns& v, double* result) const;
     /// −∂f/∂x and −∂f/∂v.
     void stiffness(const NodeColumns& x, const NodeColumns& v, double* result) const;
@@ -110,6 +112,9 @@ public:
     [[nodiscard]] double mass(std::size_t a) const { return solid_.mass(a); }
     [[nodiscard]] bool damped() const { return solid_.damped(); }
     [[nodiscard]] double energy(const Placements& at) const { return solid_.energy(columns(at, &NodePlacement::x)); }
+    [[nodiscard]] bool inverted(const Placements& at) const {
+        return solid_.inverted(columns(at, &NodePlacement::x));
+    }
     void force(const Placements& at, Forces& result) const {
         solid_.force(columns(at, &NodePlacement::x), columns(at, &NodePlacement::v), result.data());
     }

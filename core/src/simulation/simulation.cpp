@@ -440,6 +440,9 @@ const StepRecord& Simulation::step() {
         ++totals.deep_steps;
         if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
     }
+    const std::int64_t inverted = system_->system->inverted_solids(state());
+    totals.most_inverted = std::max(totals.most_inverted, inverted);
+    if (inverted > 0 && totals.first_inverted.empty()) totals.first_inverted = place;
     if (!report.solved) {
         ++totals.unsolved_steps;
         if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
@@ -567,13 +570,18 @@ std::vector<std::string> Simulation::warnings() const {
                             "higher order, {}",
                             system_->name, fall, 100.0 * share, method().integrator,
                             in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
+    } else if (totals.damped > visible_share * guard_->scale(totals, totals.largest_step)) {
+        sentences.push_back(
+            fmt::format("system \"{}\": {} took {:.3g} J, {:.0f} % of what can have moved, from vibrations that are "
+                        "too fast for its steps; shorter ones follow them",
+                        system_->name, method().integrator, totals.damped,
+                        100.0 * totals.damped / guard_->scale(totals, totals.largest_step)));
     }
-    if (const auto& totals = now_.totals; totals.damped > visible_share * guard_->scale(totals, totals.largest_step))
+    if (const auto& totals = now_.totals; totals.most_inverted > 0)
         sentences.push_back(fmt::format(
-            "system \"{}\": {} took {:.3g} J, {:.0f} % of what can have moved, from springs that are too stiff for the "
-            "steps; shorter ones resolve their vibrations",
-            system_->name, method().integrator, totals.damped,
-            100.0 * totals.damped / guard_->scale(totals, totals.largest_step)));
+            "{}: solid elements are turned inside out, up to {} at once, which no material can be: it is hit too hard "
+            "for its stiffness, or needs smaller elements or shorter steps",
+            totals.first_inverted, totals.most_inverted));
     if (const auto& totals = now_.totals; totals.method_changes > 0)
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
     if (const auto& totals = now_.totals; totals.failed_solves > 0)

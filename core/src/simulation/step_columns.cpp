@@ -31,7 +31,7 @@ constexpr bool fit_together(const StepColumn& column) {
 }
 static_assert(std::all_of(step_columns.begin(), step_columns.end(), fit_together));
 // Every total has a row: all but the four texts are of eight bytes.
-static_assert(sizeof(SimulationTotals) == (total_columns.size() - 4) * sizeof(double) + 4 * sizeof(std::string));
+static_assert(sizeof(SimulationTotals) == (total_columns.size() - 5) * sizeof(double) + 5 * sizeof(std::string));
 
 }  // namespace
 

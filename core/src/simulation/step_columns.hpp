@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 39> total_columns = {{
+inline constexpr std::array<TotalColumn, 41> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -102,7 +102,7 @@ inline constexpr std::array<TotalColumn, 39> total_columns = {{
      "/energy/growth_share"},
     {"recovered", "J", "energy that contacts gave by pushing apart what penetrated", &SimulationTotals::recovered,
      "/energy/recovered"},
-    {"damped", "J", "energy that forces too stiff for the steps lost in them", &SimulationTotals::damped,
+    {"damped", "J", "energy that the method took from vibrations", &SimulationTotals::damped,
      "/energy/damped"},
     {"start_kinetic", "J", "kinetic energy at the start", &SimulationTotals::start_kinetic},
     {"potential_drop", "J", "largest fall of the potential energy below its start", &SimulationTotals::potential_drop},
@@ -136,6 +136,9 @@ inline constexpr std::array<TotalColumn, 39> total_columns = {{
     {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",
      &SimulationTotals::deep_steps, "/deep_steps"},
     {"first_deep", "", "when and which the first time", &SimulationTotals::first_deep, "/first_deep"},
+    {"most_inverted", "1", "solid elements that are turned inside out after a step", &SimulationTotals::most_inverted,
+     "/most_inverted"},
+    {"first_inverted", "", "when the first time", &SimulationTotals::first_inverted, "/first_inverted"},
     {"method_changes", "1", "methods that were chosen, could not go on, and had another take their place",
      &SimulationTotals::method_changes, "/method_changes"},
     {"last_change", "", "when and why the last time", &SimulationTotals::last_change, "/last_change"},
