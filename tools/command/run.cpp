@@ -166,6 +166,10 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
             fmt::print("  {} steps taken in up to {} parts: as one they are too long for {}{}\n", totals.divided_steps,
                        totals.most_substeps, simulation.method().integrator,
                        system.steps_by_accuracy ? fmt::format(" to be right to {:.3g} a second", system.accuracy) : "");
+        if (totals.located_steps > 0) fmt::print("  impacts located in {} steps\n", totals.located_steps);
+        if (totals.unlocated_steps > 0)
+            fmt::print("  impacts within {} steps not located, as that would take too long: \"accuracy\" locates all\n",
+                       totals.unlocated_steps);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {

@@ -28,6 +28,7 @@ struct StepControl {
     /// that the coordinate has gone from where it began, so that small motions are as exact, for their size, as large
     /// ones. Not in steps of the smallest size, which can pass a jump of velocities.
     bool of_way = false;
+    bool always = true;  ///< false: others call Timestepper::choose_steps(), as steps of fixed sizes lie between
 
     /// How steps of size h are divided into substeps that err by a method's error limit at most.
     [[nodiscard]] DELASSUS_API static StepControl within(double limit, double h);
@@ -42,6 +43,8 @@ struct AdaptiveStepReport {
     std::int32_t rejected = 0;  ///< trials that were thrown away
     bool impact = false;        ///< a short step for a contact that closed at its beginning
     std::int64_t substeps = 1;  ///< in which it was taken
+    bool located = false;       ///< a fixed step with an impact, divided by its error
+    bool unlocated = false;     ///< one with an impact that was not located, or not to the accuracy
 };
 
 /// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves, and the halves are
@@ -82,7 +85,11 @@ private:
         /// closed that no step of it knew, as it was too far to be found where the last one began.
         double closes_in = std::numeric_limits<double>::infinity();
 
-        [[nodiscard]] bool missed() const { return closes_in < 0.0; }
+        /// Whether a contact closed in it that the method did not know of, or closed by what another impact did: the
+        /// whole and its halves may err alike.
+        [[nodiscard]] bool missed() const {
+            return closes_in < 0.0 || whole.cut > 0.0 || first.cut > 0.0 || second.cut > 0.0;
+        }
     };
     [[nodiscard]] Trial take(const State& begin, double h, StepSolver& solver);
     /// When the first impact comes, after the beginning of a trial of size h; infinity if none does.

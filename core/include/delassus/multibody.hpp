@@ -532,6 +532,8 @@ public:
     void expect_nothing();
     /// Whether shapes or nodes could meet, so that contacts are looked for; after finish().
     [[nodiscard]] bool detects_contacts() const;
+    /// Whether some of them bounce: materials that touch have restitution.
+    [[nodiscard]] bool restitutes() const;
     /// Rows of joint `index` within all_constraints() and all_multipliers(): first row and count.
     [[nodiscard]] std::array<std::int32_t, 2> joint_rows(std::int32_t index) const;
 

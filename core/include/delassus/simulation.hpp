@@ -77,6 +77,9 @@ struct SimulationTotals {
     std::int64_t near_goal_solves = 0;  ///< that ended somewhat above what their steps are worth (docs/tolerance.md)
     std::int64_t divided_steps = 0;     ///< fixed steps that the method could not take in one
     std::int64_t most_substeps = 0;     ///< that one of them was divided into
+    std::int64_t located_steps = 0;     ///< fixed steps with impacts that were located
+    std::int64_t unlocated_steps =
+        0;  ///< with impacts that would have taken too much work, or that no substep resolves
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;
@@ -279,7 +282,7 @@ private:
     std::unique_ptr<EnergyGuard> guard_;
     std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or processes share bodies
     std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or processes share them
-    bool restitutes_ = false;                 // a material does
+    bool restitutes_ = false;                 // MultibodySystem::restitutes()
     std::string deep_;                        // of this step: what came to overlap whatever its substeps; or empty
     std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies
     std::unique_ptr<Stepping> stepping_;

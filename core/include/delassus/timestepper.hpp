@@ -121,7 +121,7 @@ public:
     /// Says that the next steps are parts of one that was cut (StepReport::cut), or no longer: what velocities change
     /// by in so short a time says nothing of accelerations. Default: nothing.
     virtual void follow_impacts(bool /*follow*/) {}
-    /// Says, before the first step, that steps of sizes follow that a tolerance chooses (StepControl::absolute): what
+    /// Says that steps of sizes follow that a tolerance chooses (StepControl::absolute), infinite: no longer. What
     /// the method lets depend on h besides its error, as the height at which a sliding contact of the associated law
     /// floats, has to go, and what it leaves of its iterations may follow the tolerance. Default: nothing.
     virtual void choose_steps(double /*tolerance*/) {}

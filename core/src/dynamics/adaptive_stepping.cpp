@@ -132,7 +132,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
     control_.of_way = control.of_way && embedded_ && !stepper.damps_at_once();
     if (control_.of_way) gone_.assign(static_cast<std::size_t>(system.n()), 0.0);
     longest_ = way_ = gone_;
-    stepper.choose_steps(std::min(control.absolute, control_.slow));
+    if (control.always) stepper.choose_steps(std::min(control.absolute, control_.slow));
 }
 
 double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h,
@@ -290,7 +290,7 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     const bool steady = trial.second.impact_speed == 0.0;
     for_each_normal(rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
         if (pushed(block)) {
-            if (steady) note(speed);
+            if (steady || block.restitution == 0.0) note(steady ? speed : std::abs(speed));
         } else if (-speed > trial.slow) {
             trial.closes_in = std::min(trial.closes_in, -gap / speed);
         }
@@ -347,7 +347,7 @@ double AdaptiveStepping::impact_in(const Trial& trial, double h) {
     if (trial.first.impact_speed > trial.slow) return trial.first.impact_time;
     if (trial.second.impact_speed > trial.slow) return 0.5 * h + trial.second.impact_time;
     if (trial.whole.impact_speed > trial.slow) return trial.whole.impact_time;
-    return trial.missed() ? std::max(h + trial.closes_in, 0.0) : std::numeric_limits<double>::infinity();
+    return trial.closes_in < 0.0 ? std::max(h + trial.closes_in, 0.0) : std::numeric_limits<double>::infinity();
 }
 
 // Trials from the open side: at speeds that stay, an open end says when the contact closes, and speeds change little in
@@ -430,8 +430,10 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
                 if (impact <= impact_step()) return take_impact(state, impact_step(), end, solver);
                 trial = until_impact(state, impact, h, solver);
                 // What comes before the impact or what would remain is no step by itself.
-                if (h < control_.smallest || remaining - h < control_.smallest)
-                    return take_impact(state, h + impact_step(), end, solver);
+                const bool shorter = remaining - h < control_.smallest;
+                if (shorter) h = remaining - control_.smallest;
+                if (h < control_.smallest) return take_impact(state, h + impact_step(), end, solver);
+                if (shorter) trial = take(state, h, solver);
             }
         } catch (const StepFailure& error) {
             if (smallest && impact_step() <= control_.smallest) throw;

@@ -75,9 +75,9 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
     for (; next < n_; ++next) vectors_.push_back({next, 1});
 }
 
-void ThetaMethod::choose_steps(double /*tolerance*/) {
-    chooses_steps_ = true;
-    resolved_rate_ = rate_that_errors_show;
+void ThetaMethod::choose_steps(double tolerance) {
+    chooses_steps_ = std::isfinite(tolerance);
+    resolved_rate_ = chooses_steps_ ? rate_that_errors_show : rate_of_faint_error;
     resolve_up_to(longest_h_);
 }
 

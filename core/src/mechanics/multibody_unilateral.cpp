@@ -64,6 +64,19 @@ bool MultibodySystem::detects_contacts() const {
     return implementation_->detector || implementation_->mesh_touching;
 }
 
+bool MultibodySystem::restitutes() const {
+    const auto& self = *implementation_;
+    std::set<std::int32_t> used(self.shape_material.begin(), self.shape_material.end());
+    if (self.mesh_touching)
+        for (std::size_t k = 0; k < self.materials.size(); ++k) used.insert(static_cast<std::int32_t>(k));
+    return std::any_of(used.begin(), used.end(), [&](std::int32_t one) {
+        return std::any_of(used.begin(), used.end(), [&](std::int32_t other) {
+            const ContactMaterial between = self.material_between(one, other);
+            return between.touch && between.restitution > 0.0;
+        });
+    });
+}
+
 bool MultibodySystem::has_unilateral() const {
     const auto& self = *implementation_;
     return self.unilateral_whole || detects_contacts() || !self.bounded_motors.empty() ||

@@ -268,6 +268,14 @@ void divide_by_error(SceneSystem& system) {
     system.method_reason += fmt::format("; {}, so steps are divided by their error", why);
 }
 
+/// Impacts within fixed steps are early or late by up to a step. Where bodies sleep, what a step did is not undone.
+void locate_impacts(SceneSystem& system) {
+    const bool fixed = !system.control && !system.steps_by_accuracy && !system.sleeping;
+    system.locates_impacts =
+        fixed && system.system->has_unilateral() &&
+        (system.integrator == "linearly_implicit_trapezoidal" || system.integrator == "moreau_jean");
+}
+
 void choose_of_all(SceneSystem& system) {
     system.integrator = "euler_implicit_linearized";
     system.method_reason = why_default(system);
@@ -304,6 +312,7 @@ void choose_method(SceneSystem& system) {
     if (system.integrator != chosen) return;
     choose_of_all(system);
     divide_by_error(system);
+    locate_impacts(system);
 }
 
 }  // namespace delassus::scene

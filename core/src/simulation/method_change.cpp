@@ -69,7 +69,17 @@ void Simulation::make_method() {
                               method().integrator),
         .restitutes = restitutes_};
     solver_->bound_errors({});
-    if (method().by_accuracy && !std::isfinite(timestepper->error_limit())) settings.divided = control_of_accuracy();
+    if (!std::isfinite(timestepper->error_limit())) {
+        if (method().by_accuracy) {
+            settings.divided = control_of_accuracy();
+            std::vector<double> bounds = settings.divided->sizes;
+            for (double& bound : bounds) bound *= share_of_solves * settings.divided->absolute / settings.divided->unit;
+            solver_->bound_errors(std::move(bounds));
+        } else if (system_->locates_impacts && !shared_ && !restitutes_) {
+            settings.at_impacts = control_of_accuracy();
+            settings.at_impacts->always = false;
+        }
+    }
     stepping_ = std::make_unique<Stepping>(dynamics(), std::move(timestepper), std::move(settings), shared_.get());
     if (shared_) {
         shared_->restart();
@@ -85,12 +95,10 @@ StepControl Simulation::control_of_accuracy() {
     SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
     StepControl control = StepControl::within(system_->accuracy, system_->step);
     control.sizes = std::move(sizes.of_velocities);
-    if (system_->accuracy_chosen) control.unit = sizes.time > 0.0 ? sizes.time : steps_of_time * system_->step;
+    if (!system_->steps_by_accuracy || system_->accuracy_chosen)
+        control.unit = sizes.time > 0.0 ? sizes.time : steps_of_time * system_->step;
     control.slow = control.absolute * sizes.least / control.unit;
     if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;
-    std::vector<double> bounds = control.sizes;
-    for (double& bound : bounds) bound *= share_of_solves * control.absolute / control.unit;
-    solver_->bound_errors(std::move(bounds));
     return control;
 }
 

@@ -99,6 +99,7 @@ bool shares_bodies(const SceneSystem& system, const Registry& registry) {
 /// Where bodies are shared and the scene does not name its method, one that can be shared.
 void choose_method_to_share(SceneSystem& system, const Registry& registry) {
     if (!shares_bodies(system, registry)) return;
+    system.locates_impacts = false;
     if (system.accuracy_chosen) system.steps_by_accuracy = system.accuracy_chosen = false;
     if (can_be_shared(system.integrator) || system.method_reason.empty()) return;
     system.method_reason = fmt::format("several processes cannot share {}", system.integrator);
@@ -144,9 +145,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         if (solver.name.empty()) solver.name = auto_name;
         check_solver(registry, solver);
         require_law(system, registry, solver_->law());
-        const auto restitutes = [](const auto& one) { return one.contact.restitution > 0.0; };
-        restitutes_ = std::any_of(system.materials.begin(), system.materials.end(), restitutes) ||
-                      std::any_of(system.material_pairs.begin(), system.material_pairs.end(), restitutes);
+        restitutes_ = system.system->restitutes();
         assembly_ = system.system->assemble();
         share(registry);
         if (!in_joints) make_method();
@@ -420,7 +419,9 @@ const StepRecord& Simulation::step() {
 
     auto& totals = now_.totals;
     add_step(record_, totals);
-    if (record_.substeps > 1) {
+    if (taken.located) {
+        ++totals.located_steps;
+    } else if (record_.substeps > 1) {
         ++totals.divided_steps;
         totals.most_substeps = std::max(totals.most_substeps, record_.substeps);
     }
@@ -435,6 +436,7 @@ const StepRecord& Simulation::step() {
     if (totals.first_failure.empty()) totals.first_failure = effort.failure;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
+    if (taken.unlocated) ++totals.unlocated_steps;
     if (method().by_accuracy && taken.error > 1.0) ++totals.inexact_steps;
     if (!deep_.empty()) {
         ++totals.deep_steps;

@@ -85,7 +85,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 41> total_columns = {{
+inline constexpr std::array<TotalColumn, 43> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -102,8 +102,7 @@ inline constexpr std::array<TotalColumn, 41> total_columns = {{
      "/energy/growth_share"},
     {"recovered", "J", "energy that contacts gave by pushing apart what penetrated", &SimulationTotals::recovered,
      "/energy/recovered"},
-    {"damped", "J", "energy that the method took from vibrations", &SimulationTotals::damped,
-     "/energy/damped"},
+    {"damped", "J", "energy that the method took from vibrations", &SimulationTotals::damped, "/energy/damped"},
     {"start_kinetic", "J", "kinetic energy at the start", &SimulationTotals::start_kinetic},
     {"potential_drop", "J", "largest fall of the potential energy below its start", &SimulationTotals::potential_drop},
     {"worst_drift", "m, rad", "largest violation of a bilateral constraint", &SimulationTotals::worst_drift,
@@ -131,6 +130,11 @@ inline constexpr std::array<TotalColumn, 41> total_columns = {{
     {"divided_steps", "1", "fixed steps that the method could not take in one", &SimulationTotals::divided_steps,
      "/divided_steps"},
     {"most_substeps", "1", "that one of them was divided into", &SimulationTotals::most_substeps, "/most_substeps"},
+    {"located_steps", "1", "fixed steps with impacts that were located", &SimulationTotals::located_steps,
+     "/located_steps"},
+    {"unlocated_steps", "1",
+     "fixed steps with impacts that would have taken too much work, or that no substep resolves",
+     &SimulationTotals::unlocated_steps, "/unlocated_steps"},
     {"inexact_steps", "1", "steps with a part that errs by more than the accuracy asks, however short it is",
      &SimulationTotals::inexact_steps, "/inexact_steps"},
     {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",

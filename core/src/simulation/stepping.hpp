@@ -2,6 +2,7 @@
 // How a system comes from one state that is shown to the next (internal).
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -23,9 +24,10 @@ class SharedRun;
 
 /// What the steps of a system follow from.
 struct SteppingSettings {
-    double step = 0.0, end = 0.0;        ///< between states that are shown, and of the run, s
-    std::optional<StepControl> chosen;   ///< steps follow from a tolerance; `step` means nothing then
-    std::optional<StepControl> divided;  ///< how fixed steps are divided, where the method has no error_limit()
+    double step = 0.0, end = 0.0;             ///< between states that are shown, and of the run, s
+    std::optional<StepControl> chosen;        ///< steps follow from a tolerance; `step` means nothing then
+    std::optional<StepControl> divided;       ///< how fixed steps are divided, where the method has no error_limit()
+    std::optional<StepControl> at_impacts{};  ///< how those with an impact are, while that is cheap
     double accuracy = 0.0;    ///< off constraints by no more, a state is shown where it cannot be returned to them
     std::string advice;       ///< what to do where no substep is short enough
     bool restitutes = false;  ///< there is restitution: steps are cut between impacts
@@ -36,6 +38,7 @@ struct SteppingSettings {
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
+//     again, by their error           where an impact was in it, and locating it costs little
 //   or
 //     in substeps by their error      AdaptiveStepping, where there is an error limit, an accuracy or a tolerance
 //     longer than what is shown       LookAhead, where the method knows the way of its steps
@@ -85,7 +88,13 @@ private:
                           const StepTooLong& failure);
     void try_substeps(std::int64_t substeps, State& state, StepSolver& solver, AdaptiveStepReport& report,
                       StepWatch* watch);
-    void step_within_error(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
+    /// Steps of `control` to `end`, or until they have taken more than this work.
+    void step_within_error(AdaptiveStepping& control, State& state, double end, StepSolver& solver,
+                           AdaptiveStepReport& report, double most_work = HUGE_VAL);
+    [[nodiscard]] double work_of(const StepReport& report) const;
+    void locate_impacts(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    void take_located(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    static void judge(const State& state, const AdaptiveStepReport& report, StepWatch& watch);
     void step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
     void show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
     void go_back(State& state);
@@ -96,11 +105,15 @@ private:
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<ImpactCuts> cuts_;           // or empty
     std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the substeps of fixed ones; or empty
+    std::unique_ptr<AdaptiveStepping> impacts_;  // of the substeps of fixed ones with an impact; or empty
+    std::vector<double> impacts_before_any_;     // its memory, with which it begins each time
+    double work_ = 0.0;                          // that may be spent on impacts now
     std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
     // Of the last advance(), before it:
     State begin_;
     bool reads_ = false;  // all was known already, and nothing has changed
     std::vector<double> method_before_, control_before_;
+    double work_before_ = 0.0;
     std::optional<LookAhead::Memory> ahead_before_;
     StepReport substep_;  // memory
 };
