@@ -278,9 +278,11 @@ private:
     // less what else stands in H v⁺: a − H v⁺ + h² G v⁺ + M (v⁺ − v), with a and H as they were assembled.
     void judge_linearization(const State& begin, double h, StepSolver& solver, StepReport& report) {
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = end_.v[i] - begin.v[i];
-        impulse_.assign(problem_.a.begin(), problem_.a.end());
-        problem_.H.multiply_add(-1.0, end_.v.data(), impulse_.data());
-        G_.finish().multiply_add(1.0, end_.v.data(), impulse_.data());
+        force_.assign(static_cast<std::size_t>(n_), 0.0);
+        problem_.H.multiply_add(1.0, end_.v.data(), force_.data());
+        G_.finish().multiply_add(-1.0, end_.v.data(), force_.data());
+        impulse_.resize(static_cast<std::size_t>(n_));
+        for (std::int32_t i = 0; i < n_; ++i) impulse_[i] = problem_.a[i] - force_[i];
         system_.multiply_mass(begin, 1.0, delta_.data(), impulse_.data());
         report.damped = damped(begin);
         force_.assign(static_cast<std::size_t>(n_), 0.0);
@@ -301,14 +303,11 @@ private:
     //     ½ (v⁺ − v) · h f + ½ h² v⁺ · K v⁺
     //
     // of the energy, beside what contacts, joints and dampers do. A fall from rest loses by the first what the landing
-    // gives back.
+    // gives back. force_: (M + h R + h² K) v⁺; impulse_: of f; delta_: v⁺ − v.
     double damped(const State& begin) {
         const std::vector<double>& v = end_.v;
-        force_.assign(static_cast<std::size_t>(n_), 0.0);
-        problem_.H.multiply_add(1.0, v.data(), force_.data());
         system_.multiply_mass(begin, -1.0, v.data(), force_.data());
         if (system_.has_stiffness()) R_.finish().multiply_add(-1.0, v.data(), force_.data());
-        G_.finish().multiply_add(-1.0, v.data(), force_.data());
         double twice = 0.0;
         for (std::int32_t i = 0; i < n_; ++i) twice += delta_[i] * impulse_[i] + v[i] * force_[i];
         return 0.5 * twice;

@@ -116,26 +116,5 @@ TEST(LocatedImpacts, ResumeToTheSameBits) {
     }
 }
 
-// Each ball gives all of its speed to the next one, within less than a step.
-TEST(LocatedImpacts, ByAccuracyARowOfBallsLosesNothing) {
-    const double push = 0.31, mass = 0.17, speed = 3.0;
-    for (const double step : {0.0013, 0.0047, 1.0 / 60.0}) {
-        SCOPED_TRACE(step);
-        auto run = run_of(fmt::format(
-            "step: {}\naccuracy: 1.0e-3\nend: 0.4\ngravity: [0, 0, 0]\nmaterials: {{m: {{restitution: 1}}}}\nbodies:\n"
-            "- {{name: cue, mass: {}, position: [-0.5, 0, 0], velocity: [{}, 0, 0], shapes: [{{sphere: {{radius: "
-            "0.03}}, "
-            "material: m}}]}}\n"
-            "- {{name: 'ball_{{i}}', mass: {}, position: [0, 0, 0], shapes: [{{sphere: {{radius: 0.03}}, material: "
-            "m}}], "
-            "repeat: {{count: 3, spacing: [0.061, 0, 0]}}}}\nloads: [{{name: push, body: cue, force: [{}, 0, 0]}}]\n",
-            step, mass, speed, mass, push));
-        const double start = run.simulation.record().energy;
-        run.finish();
-        const double work = push * (run.pose("cue").position[0] + 0.5);
-        EXPECT_NEAR(run.simulation.record().energy, start + work, 1e-6 * start);
-    }
-}
-
 }  // namespace
 }  // namespace delassus::tests::located_impacts_test

@@ -168,7 +168,7 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
                        system.steps_by_accuracy ? fmt::format(" to be right to {:.3g} a second", system.accuracy) : "");
         if (totals.located_steps > 0) fmt::print("  impacts located in {} steps\n", totals.located_steps);
         if (totals.unlocated_steps > 0)
-            fmt::print("  impacts within {} steps not located, as that would take too long: \"accuracy\" locates all\n",
+            fmt::print("  impacts within {} steps not located: they take too much work, or no substep resolves them\n",
                        totals.unlocated_steps);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");

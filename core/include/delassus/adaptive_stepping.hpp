@@ -28,7 +28,6 @@ struct StepControl {
     /// that the coordinate has gone from where it began, so that small motions are as exact, for their size, as large
     /// ones. Not in steps of the smallest size, which can pass a jump of velocities.
     bool of_way = false;
-    bool always = true;  ///< false: others call Timestepper::choose_steps(), as steps of fixed sizes lie between
 
     /// How steps of size h are divided into substeps that err by a method's error limit at most.
     [[nodiscard]] DELASSUS_API static StepControl within(double limit, double h);

@@ -78,8 +78,7 @@ struct SimulationTotals {
     std::int64_t divided_steps = 0;     ///< fixed steps that the method could not take in one
     std::int64_t most_substeps = 0;     ///< that one of them was divided into
     std::int64_t located_steps = 0;     ///< fixed steps with impacts that were located
-    std::int64_t unlocated_steps =
-        0;  ///< with impacts that would have taken too much work, or that no substep resolves
+    std::int64_t unlocated_steps = 0;   ///< with impacts that take too much work, or that no substep resolves
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;

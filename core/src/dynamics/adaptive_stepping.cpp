@@ -111,7 +111,8 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
       resolution_(unilateral_ ? rounding_of_gaps : 0.0),
       next_(control.initial) {
     const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-    if (!positive(control.absolute) || !positive(control.unit) || !(control.relative >= 0.0) || !std::isfinite(control.relative))
+    if (!positive(control.absolute) || !positive(control.unit) || !(control.relative >= 0.0) ||
+        !std::isfinite(control.relative))
         throw InputError("a tolerance must be positive and finite");
     if (!positive(control.smallest) || !positive(control.largest) || !(control.smallest <= control.initial) ||
         !(control.initial <= control.largest))
@@ -132,7 +133,7 @@ AdaptiveStepping::AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper
     control_.of_way = control.of_way && embedded_ && !stepper.damps_at_once();
     if (control_.of_way) gone_.assign(static_cast<std::size_t>(system.n()), 0.0);
     longest_ = way_ = gone_;
-    if (control.always) stepper.choose_steps(std::min(control.absolute, control_.slow));
+    stepper.choose_steps(std::min(control.absolute, control_.slow));
 }
 
 double AdaptiveStepping::error_of(const State& begin, const State& whole, const State& halves, double h,
@@ -239,8 +240,10 @@ void AdaptiveStepping::count(const StepReport& report) {
 // step it is late by up to h. So steps are cut where a contact or stop closes, faster than the tolerance a unit of
 // time; a step of size `smallest` follows, in which the impact happens. What bounces ever sooner, as a ball that comes
 // to rest, has impacts closer than `smallest`, and these steps double while nothing else lies between them: time goes
-// on. Contacts that close slowly, or pushed already, are part of the smooth motion. So is an impact by which the step
-// does not err, since its method takes it at its own time or it does not matter.
+// time. Contacts that close slowly, or pushed already, are part of the smooth motion. So is an impact by which the step
+// does not err, since its method takes it at its own time or it does not matter. If that time is in the second half,
+// the whole and the halves are one and the same after it, and do not show how a contact that stays turns until the end:
+// it must neither open nor close there, by the rows of the end. Nor do they show an impact that another one leads to.
 //
 // ---- Edges ----
 //
@@ -290,7 +293,11 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     const bool steady = trial.second.impact_speed == 0.0;
     for_each_normal(rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
         if (pushed(block)) {
-            if (steady || block.restitution == 0.0) note(steady ? speed : std::abs(speed));
+            if (steady) {
+                note(speed);
+            } else if (block.restitution == 0.0) {
+                note(std::abs(speed));
+            }
         } else if (-speed > trial.slow) {
             trial.closes_in = std::min(trial.closes_in, -gap / speed);
         }

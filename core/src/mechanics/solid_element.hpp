@@ -112,9 +112,7 @@ public:
     [[nodiscard]] double mass(std::size_t a) const { return solid_.mass(a); }
     [[nodiscard]] bool damped() const { return solid_.damped(); }
     [[nodiscard]] double energy(const Placements& at) const { return solid_.energy(columns(at, &NodePlacement::x)); }
-    [[nodiscard]] bool inverted(const Placements& at) const {
-        return solid_.inverted(columns(at, &NodePlacement::x));
-    }
+    [[nodiscard]] bool inverted(const Placements& at) const { return solid_.inverted(columns(at, &NodePlacement::x)); }
     void force(const Placements& at, Forces& result) const {
         solid_.force(columns(at, &NodePlacement::x), columns(at, &NodePlacement::v), result.data());
     }

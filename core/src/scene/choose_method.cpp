@@ -245,6 +245,11 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
     if (!stiff.empty()) system.integrator_options.insert_or_assign("flight", "radau_iia");
 }
 
+/// Whether it has one of the two methods that take contacts at the speeds of both ends of a step.
+bool is_of_order_2(const SceneSystem& system) {
+    return system.integrator == "linearly_implicit_trapezoidal" || system.integrator == "moreau_jean";
+}
+
 /// What a method would do to the motion in fixed steps; empty: too little to matter, or what nobody could pay to avoid.
 /// Those of order 2 do not follow what vibrates or decays within a few of them. The one of order 1 damps everything;
 /// but with joints its estimate wants steps in proportion to the accuracy, and where elements touch, forty times the
@@ -254,7 +259,7 @@ std::string why_divided(const SceneSystem& system) {
         const bool dear = system.system->m() > 0 || !system.elastic_blocks.empty() || !system.beams.empty();
         return dear || system.sleeping || system.system->n() == 0 ? std::string() : "its method is of order 1";
     }
-    if (system.integrator != "linearly_implicit_trapezoidal" && system.integrator != "moreau_jean") return {};
+    if (!is_of_order_2(system)) return {};
     constexpr double any = std::numeric_limits<double>::infinity();
     const std::string fast = how_fast(system, {most_rate_of_fixed_steps, any, most_rate_of_fixed_steps});
     return fast.empty() ? fast : "forces have " + fast;
@@ -271,9 +276,7 @@ void divide_by_error(SceneSystem& system) {
 /// Impacts within fixed steps are early or late by up to a step. Where bodies sleep, what a step did is not undone.
 void locate_impacts(SceneSystem& system) {
     const bool fixed = !system.control && !system.steps_by_accuracy && !system.sleeping;
-    system.locates_impacts =
-        fixed && system.system->has_unilateral() &&
-        (system.integrator == "linearly_implicit_trapezoidal" || system.integrator == "moreau_jean");
+    system.locates_impacts = fixed && system.system->has_unilateral() && is_of_order_2(system);
 }
 
 void choose_of_all(SceneSystem& system) {

@@ -77,7 +77,6 @@ void Simulation::make_method() {
             solver_->bound_errors(std::move(bounds));
         } else if (system_->locates_impacts && !shared_ && !restitutes_) {
             settings.at_impacts = control_of_accuracy();
-            settings.at_impacts->always = false;
         }
     }
     stepping_ = std::make_unique<Stepping>(dynamics(), std::move(timestepper), std::move(settings), shared_.get());

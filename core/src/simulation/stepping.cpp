@@ -17,9 +17,21 @@ namespace {
 // Work is counted in velocities and rows of problems that were solved. A box that lands takes some 2000, a hundredth of
 // a second. Each fixed step adds what may be spent on impacts, up to what some landings take; to locate one takes this
 // many solves as a rule, and nothing is begun that cannot be ended.
-constexpr double work_of_a_step = 300.0, most_work = 3e4, solves_of_an_impact = 120.0;
+constexpr double work_of_a_step = 300.0, most_saved_work = 3e4, solves_of_an_impact = 120.0;
 /// Of the accuracy: how far a step goes at the speed of an impact that is not worth it.
 constexpr double faint_impact = 0.1;
+
+/// A method whose steps follow from a tolerance for a while.
+class ChosenSteps {
+public:
+    ChosenSteps(Timestepper& stepper, double tolerance) : stepper_(stepper) { stepper.choose_steps(tolerance); }
+    ~ChosenSteps() { stepper_.choose_steps(HUGE_VAL); }
+    ChosenSteps(const ChosenSteps&) = delete;
+    ChosenSteps& operator=(const ChosenSteps&) = delete;
+
+private:
+    Timestepper& stepper_;
+};
 
 }  // namespace
 
@@ -39,7 +51,8 @@ Stepping::Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timeste
     if (settings_.at_impacts) {
         impacts_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.at_impacts);
         impacts_before_any_ = impacts_->save();
-        work_ = most_work;
+        timestepper_->choose_steps(HUGE_VAL);
+        work_ = most_saved_work;
     }
 }
 Stepping::~Stepping() = default;
@@ -201,7 +214,7 @@ double Stepping::work_of(const StepReport& report) const {
 }
 
 void Stepping::locate_impacts(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
-    work_ = std::min(work_ + work_of_a_step, most_work);
+    work_ = std::min(work_ + work_of_a_step, most_saved_work);
     const StepControl& control = *settings_.at_impacts;
     if (report.step.impact_speed * report.h <= faint_impact * control.slow * control.unit) return;
     report.unlocated = true;
@@ -210,8 +223,7 @@ void Stepping::locate_impacts(State& state, StepSolver& solver, AdaptiveStepRepo
     const State whole = state;
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
-    const std::shared_ptr<void> fixed_again(nullptr, [&](void*) { timestepper_->choose_steps(HUGE_VAL); });
-    timestepper_->choose_steps(control.absolute / control.unit);
+    const ChosenSteps chosen(*timestepper_, control.absolute / control.unit);
     go_back(state);
     try {
         take_located(state, solver, report, watch);
