@@ -74,6 +74,7 @@ public:
 
     [[nodiscard]] int order() const override { return 1; }
     [[nodiscard]] bool damps_at_once() const override { return true; }
+    [[nodiscard]] bool estimates_error() const override { return true; }
     void choose_steps(double /*tolerance*/) override { follows_sliding_ = true; }
     void restart() override {
         multipliers_.clear();
@@ -143,12 +144,21 @@ private:
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
+        report_error(state, h, report);
         if (linearization_.wanted()) judge_linearization(state, h, solver, report);
         report_reactions(solution_.lambda, h, report);
         keep(solution_.lambda, h);
         report.contacts.swap(rows_.contacts());
         state = end_;
         report.multipliers = multipliers_;
+    }
+
+    // A step errs in positions by ½ h² q̈ (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, sec.
+    // II.1).
+    void report_error(const State& begin, double h, StepReport& report) const {
+        report.error.resize(static_cast<std::size_t>(n_));
+        for (std::size_t i = 0; i < report.error.size(); ++i)
+            report.error[i] = 0.5 * h * std::abs(end_.v[i] - begin.v[i]);
     }
 
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.

@@ -49,7 +49,8 @@ public:
     Switching(DynamicalSystem& system, const std::vector<OptionValue>& values)
         : system_(system),
           flight_name_(values[0].text),
-          limit_(values[1].real),
+          given_limit_(values[1].real),
+          limit_(given_limit_),
           contact_(system, ThetaSettings{.name = "switching",
                                          .holds_stiff = false,  // flights resolve what a step would leave in them
                                          .iterations = static_cast<int>(values[2].integer),
@@ -64,7 +65,8 @@ public:
     }
 
     [[nodiscard]] int order() const override { return 2; }
-    void choose_steps(double tolerance) override { limit_ = tolerance; }
+    [[nodiscard]] bool estimates_error() const override { return true; }
+    void choose_steps(double tolerance) override { limit_ = std::isfinite(tolerance) ? tolerance : given_limit_; }
 
     void restart() override {
         multipliers_.clear();
@@ -136,6 +138,8 @@ private:
         h_ = h;
         end_ = state.t + h;
         acted_.clear();
+        errors_.assign(state.v.size(), 0.0);
+        errors_known_ = true;
         impacts_ = 0;
         while (now_.t < end_) {
             const double rest = end_ - now_.t;
@@ -216,6 +220,8 @@ private:
             if (force[0] > 0.0) pushed_.push_back(key);
         std::sort(pushed_.begin(), pushed_.end());
         add(part_, h / h_);
+        errors_known_ = errors_known_ && (h <= impact_share * h_ || !part_.error.empty());
+        for (std::size_t i = 0; i < part_.error.size(); ++i) errors_[i] += part_.error[i];
         part_.follow(report);
         std::swap(part_, report);
         multipliers_ = report.multipliers;
@@ -250,6 +256,8 @@ private:
                 if (one.reaction.force[0] != 0.0) ++report.active_blocks;
             }
         report.impact_speed = report.impact_time = 0.0;  // nobody has to look for them
+        report.error.clear();
+        if (errors_known_) report.error = errors_;
     }
 
     // ---- Gaps ----
@@ -415,7 +423,7 @@ private:
 
     DynamicalSystem& system_;
     std::string flight_name_;
-    double limit_;
+    double given_limit_, limit_;
     std::unique_ptr<Timestepper> flight_;
     ThetaMethod contact_;
     double resolution_, fall_;
@@ -429,6 +437,8 @@ private:
     State now_;
     std::vector<std::uint64_t> deep_;  // keys of gaps that are below 0 where a flight begins; ascending
     std::vector<Acted> acted_;
+    std::vector<double> errors_;  // of steps of contact; flights err by less than they may
+    bool errors_known_ = true;    // of all
     StepReport part_;
     State trial_;
     std::vector<double> change_, given_, acceleration_;

@@ -31,7 +31,9 @@ TEST(TurnOfFriction, OfAJointHasItsTimeInAStep) {
                             "position: [0, 0, 0]}}]\njoints:\n- "
                             "{{name: j, kind: prismatic, second: b, point: [0, 0, 0], axis: [1, 0, 0], friction: 3, "
                             "spring: {{stiffness: 40}}, start: 1}}\n",
-                            step, bodies ? "integrator: linearly_implicit_trapezoidal\ncoordinates: maximal\n" : ""),
+                            step,
+                            bodies ? "integrator: linearly_implicit_trapezoidal\ncoordinates: maximal\n"
+                                   : "integrator: moreau_jean\ncoordinates: joint\n"),
                 "test.yaml"));
             double worst = 0.0;
             while (!run.simulation.finished()) {

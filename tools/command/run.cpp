@@ -133,6 +133,19 @@ void print_shares(const std::vector<Simulation::Share>& shares, std::int64_t div
                    static_cast<double>(shares[p].bytes_sent) / MiB);
 }
 
+/// What the steps are estimated to err by.
+void print_error(const Simulation& simulation) {
+    const auto& totals = simulation.totals();
+    const double accuracy = simulation.system().accuracy;
+    if (totals.refined_steps > 0)
+        fmt::print("  {} steps were divided to be right to {:.3g} a second\n", totals.refined_steps, accuracy);
+    if (!std::isfinite(totals.error)) return;
+    fmt::print("  estimated error of all steps {:.1e} of the size of what moves, or rad", totals.error);
+    if (totals.inexact_steps > 0)
+        fmt::print("; {} steps err by more than {:.3g} a second", totals.inexact_steps, accuracy);
+    fmt::print("\n");
+}
+
 void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& shares, RunStatus status) {
     auto of_system = shares.begin();
     for (auto& simulation : simulations) {
@@ -166,10 +179,7 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
             fmt::print("  {} steps taken in up to {} parts: as one they are too long for {}{}\n", totals.divided_steps,
                        totals.most_substeps, simulation.method().integrator,
                        system.steps_by_accuracy ? fmt::format(" to be right to {:.3g} a second", system.accuracy) : "");
-        if (totals.located_steps > 0) fmt::print("  impacts located in {} steps\n", totals.located_steps);
-        if (totals.unlocated_steps > 0)
-            fmt::print("  impacts within {} steps not located: they take too much work, or no substep resolves them\n",
-                       totals.unlocated_steps);
+        print_error(simulation);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");
         } else {

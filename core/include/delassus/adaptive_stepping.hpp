@@ -42,8 +42,7 @@ struct AdaptiveStepReport {
     std::int32_t rejected = 0;  ///< trials that were thrown away
     bool impact = false;        ///< a short step for a contact that closed at its beginning
     std::int64_t substeps = 1;  ///< in which it was taken
-    bool located = false;       ///< a fixed step with an impact, divided by its error
-    bool unlocated = false;     ///< one with an impact that was not located, or not to the accuracy
+    bool refined = false;       ///< a fixed step that was divided by its error
 };
 
 /// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves, and the halves are

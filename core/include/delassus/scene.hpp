@@ -87,7 +87,7 @@ struct SceneSystem {
     double accuracy = 1e-3;                ///< of positions a second, as a share of the extent of what moves, and rad
     bool steps_by_accuracy = false;        ///< `step` is then how often results are shown
     bool accuracy_chosen = false;          ///< the scene gives no accuracy: fixed steps would change its motion
-    bool locates_impacts = false;          ///< fixed steps with an impact are divided so while that is cheap; chosen
+    bool refines_steps = false;            ///< fixed steps that err by more are divided while that is cheap; chosen
     std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
     std::optional<SleepingRule> sleeping;  ///< none: every body is awake
     std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given

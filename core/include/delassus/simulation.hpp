@@ -35,9 +35,12 @@ struct StepRecord {
     std::int64_t sleeping = 0;   ///< bodies and nodes that sleep
     std::int64_t newton_iterations = 0;
     std::int64_t solver_iterations = 0;
-    double natural = 0.0;        ///< largest natural error of the step's solves by a plugin
-    double h = 0.0;              ///< size of the step, s
-    std::int64_t substeps = 1;   ///< in which the step was taken
+    double natural = 0.0;       ///< largest natural error of the step's solves by a plugin
+    double h = 0.0;             ///< size of the step, s
+    std::int64_t substeps = 1;  ///< in which the step was taken
+    /// Of positions that the step is estimated to add, as a share of the size of what moves and in rad; NaN: nobody
+    /// estimates it.
+    double error = 0.0;
     std::int64_t rejected = 0;   ///< trials of the step control that were thrown away
     bool impact = false;         ///< a short step of the step control, for a contact that closed
     double seconds = 0.0;        ///< of wall time, everything included
@@ -77,14 +80,14 @@ struct SimulationTotals {
     std::int64_t near_goal_solves = 0;  ///< that ended somewhat above what their steps are worth (docs/tolerance.md)
     std::int64_t divided_steps = 0;     ///< fixed steps that the method could not take in one
     std::int64_t most_substeps = 0;     ///< that one of them was divided into
-    std::int64_t located_steps = 0;     ///< fixed steps with impacts that were located
-    std::int64_t unlocated_steps = 0;   ///< with impacts that take too much work, or that no substep resolves
+    std::int64_t refined_steps = 0;     ///< fixed steps that were divided by their error
     double smallest_step = 0.0, largest_step = 0.0;  ///< s, of those taken; short steps for impacts apart
     std::int64_t rejected = 0, impacts = 0;          ///< of the step control
     double seconds = 0.0, solver_seconds = 0.0;
     std::int64_t unsolved_steps = 0;  ///< steps with a solve that missed its tolerance
     std::string first_unsolved;       ///< when and why the first did
-    std::int64_t inexact_steps = 0;   ///< with a part that errs by more than the accuracy asks, however short it is
+    double error = 0.0;               ///< sum of StepRecord::error
+    std::int64_t inexact_steps = 0;   ///< with a part that errs by more than the accuracy asks
     /// Steps in which bodies came to overlap by more than the accuracy allows, and shorter ones did not help; when and
     /// which the first time.
     std::int64_t deep_steps = 0;

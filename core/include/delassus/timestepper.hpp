@@ -48,13 +48,16 @@ struct StepReport {
     std::vector<BlockReaction> reactions;  ///< one for each unilateral block of the problem, in its order
     std::vector<ContactPoint> contacts;    ///< UnilateralRows::contacts(): the last of these blocks are theirs
     std::vector<double> multipliers;       ///< λ of the bilateral constraints at the end of the step, forces; m
+    /// Where Timestepper::estimates_error(): what the step errs by along increments of the positions, n, as the last
+    /// steps show it; empty where none before it says anything, as after an impact.
+    std::vector<double> error;
 
     /// Counts a solve of the step; whether it was solved.
     DELASSUS_API bool take(const StepAnswer& answer);
     /// Back to the beginning; the memory stays.
     DELASSUS_API void clear();
     /// Of a part of a step ← of the step so far, of which `before` is the rest: sums and extremes of both. Reactions,
-    /// contacts and multipliers stay those of this part.
+    /// contacts, multipliers and the error stay those of this part.
     DELASSUS_API void follow(const StepReport& before);
 };
 
@@ -106,6 +109,8 @@ public:
     [[nodiscard]] virtual int embedded_order() const { return order() - 1; }
     /// The estimate for the last step; valid until the next. Empty by default.
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
+    /// Whether StepReport::error says what a step errs by, which costs no solve. Default: no.
+    [[nodiscard]] virtual bool estimates_error() const { return false; }
     /// The tolerance, as StepControl::absolute, by which steps of a fixed size are to be taken in parts, or several at
     /// once where the method has an extension. Infinity by default: every step is one.
     [[nodiscard]] virtual double error_limit() const { return std::numeric_limits<double>::infinity(); }

@@ -20,7 +20,8 @@ namespace delassus {
 //
 //     −s (h − τ) + ½ a (h − τ)² + (h − τ*) (u⁺ + s − a (h − τ)) = g⁺
 //
-// (τ* = τ for a single bounce with a' = a; with e = 0 and a' < 0 what then presses the bodies together is in it).
+// (τ* = τ for a single bounce with a' = a; with e = 0 and a' < 0 what then presses the bodies together is in it). Where
+// a alone would nearly stop what meets, so small an impulse had to act long before the step: it acts when it meets.
 //
 // What is flush meets everywhere at once. Where that is the end of the step, rounding lets one corner meet and not
 // another one, so that times within `rounding` of it count.
@@ -62,7 +63,8 @@ std::optional<Impact> impact_within(double h, const Approach& approach, double a
     const double end_gap = (leaves + 0.5 * after * left) * left;
     impact.change = impact.end_speed + impact.closing - acceleration * rest;
     const double alone = (-impact.closing + 0.5 * acceleration * rest) * rest;
-    impact.acts = impact.change > 0.0 ? h - (end_gap - alone) / impact.change : impact.meets;
+    impact.acts =
+        impact.change > 0.0 ? std::clamp(h - (end_gap - alone) / impact.change, impact.meets, h) : impact.meets;
     return impact;
 }
 

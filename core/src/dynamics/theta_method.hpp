@@ -39,6 +39,7 @@ public:
     ThetaMethod(DynamicalSystem& system, ThetaSettings settings);
 
     [[nodiscard]] int order() const override { return settings_.theta == 0.5 ? 2 : 1; }
+    [[nodiscard]] bool estimates_error() const override { return true; }
     void choose_steps(double tolerance) override;
     void restart() override;
     void follow_impacts(bool follow) override { contacts_.follow_impacts(follow); }
@@ -59,6 +60,7 @@ private:
     void move_late(double h);
     void mark_struck(bool struck);
     void remember_change(const Vector& result, double h);
+    void report_error(const State& begin, double h, StepReport& report);
     void resolve_up_to(double h);
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
@@ -111,6 +113,7 @@ private:
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
     /// implicit.
     std::array<std::vector<double>, 2> changes_;
+    std::vector<double> acceleration_;           // (v⁺ − v)/h of the last step, but for impacts; n, or empty
     bool timed_ = false;                         // whether contacts got the times of their meetings in this step
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end

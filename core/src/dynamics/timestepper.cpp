@@ -34,9 +34,11 @@ void StepReport::clear() {
     empty.reactions.swap(reactions);
     empty.contacts.swap(contacts);
     empty.multipliers.swap(multipliers);
+    empty.error.swap(error);
     empty.reactions.clear();
     empty.contacts.clear();
     empty.multipliers.clear();
+    empty.error.clear();
     *this = std::move(empty);
 }
 

@@ -119,6 +119,11 @@ public:
     /// energy only. Whether that changes anything.
     bool only_take();
 
+    /// error += what the step errs by in positions, n, because contacts and stops that push until its end let go within
+    /// it, as their forces in this step and in the one before, of size last_h, show. solution: of the whole problem.
+    void add_release_error(const Problem& problem, const Solution& solution, double last_h,
+                           std::vector<double>& error) const;
+
     /// result += D_Aᵀ P of what pushed steadily: not of impacts. P: impulses, `lambda` of the whole problem; n.
     void add_steady_impulse(const Problem& problem, const std::vector<double>& lambda, double* result) const;
 

@@ -334,8 +334,9 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
 }
 
 // An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
-// impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s. Bodies that rest on
-// others are not among them: there impacts have no order.
+// impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s. Or it has an impact
+// of its own, after one on another contact of its bodies, and counts on a speed that it will not have. Bodies that rest
+// on others are not among them: there impacts have no order.
 double VelocityContacts::cut_between_impacts(const Problem& problem, const Solution& solution) const {
     constexpr double faint = 1e-2, least_part = 1e-6;
     const auto is_loaded = [&](std::size_t row) {
@@ -356,18 +357,26 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
         }
         return *known;
     };
+    const auto first_strike = [&](const Contact& contact) {
+        double first = contact.struck;
+        if (contact.impact && !struck_.empty())
+            for_each_entry(problem.D, first_row_ + contact.row, 1,
+                           [&](std::size_t, std::size_t column, double) { first = std::min(first, struck_[column]); });
+        return first;
+    };
     double cut = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const std::size_t row = first_row_ + contact.row;
-        const double gap = contact.resolved_gap(), closing = contact.change - contact.end_speed;
-        if (contact.pushed || !(contact.struck < h_) || rows_.blocks()[k].restitution == 0.0 ||
-            !(solution.lambda[row] > 0.0) || !(closing > 0.0))
+        const double gap = contact.resolved_gap(), struck = first_strike(contact);
+        const double closing = contact.impact ? contact.impact->closing : contact.change - contact.end_speed;
+        if (contact.pushed || !(struck < h_) || rows_.blocks()[k].restitution == 0.0 || !(solution.lambda[row] > 0.0) ||
+            !(closing > 0.0))
             continue;
         const double e = rows_.blocks()[k].restitution, mobility = contact.change / solution.lambda[row];
         if (0.5 * e * e * closing * closing <= faint * mobility * kinetic() || is_loaded(row)) continue;
-        const double struck = contact.struck;
-        const double meets = struck + std::max(gap - contact.approach * struck, 0.0) / closing;
+        const double meets =
+            contact.impact ? contact.impact->meets : struck + std::max(gap - contact.approach * struck, 0.0) / closing;
         if (!(meets < h_) || meets - struck < least_part * h_) continue;
         const double between = 0.5 * (struck + meets);
         if (cut == 0.0 || between < cut) cut = between;

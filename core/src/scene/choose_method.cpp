@@ -273,10 +273,12 @@ void divide_by_error(SceneSystem& system) {
     system.method_reason += fmt::format("; {}, so steps are divided by their error", why);
 }
 
-/// Impacts within fixed steps are early or late by up to a step. Where bodies sleep, what a step did is not undone.
-void locate_impacts(SceneSystem& system) {
+/// What happens within a fixed step is early or late by up to its length. Where bodies sleep, what it did is not
+/// undone.
+void refine_steps(SceneSystem& system) {
     const bool fixed = !system.control && !system.steps_by_accuracy && !system.sleeping;
-    system.locates_impacts = fixed && system.system->has_unilateral() && is_of_order_2(system);
+    const bool switches = system.integrator == "switching";
+    system.refines_steps = fixed && system.system->has_unilateral() && (switches || is_of_order_2(system));
 }
 
 void choose_of_all(SceneSystem& system) {
@@ -315,7 +317,7 @@ void choose_method(SceneSystem& system) {
     if (system.integrator != chosen) return;
     choose_of_all(system);
     divide_by_error(system);
-    locate_impacts(system);
+    refine_steps(system);
 }
 
 }  // namespace delassus::scene

@@ -63,6 +63,7 @@ void Simulation::make_method() {
         .end = system_->end,
         .chosen = system_->control,
         .divided = std::nullopt,
+        .judged = std::nullopt,
         .accuracy = system_->accuracy,
         .advice = fmt::format("{} cannot follow the motion there, as where a mechanism jams or branches; "
                               "euler_implicit_linearized with \"coordinates: maximal\" is less exact and may go on",
@@ -75,8 +76,9 @@ void Simulation::make_method() {
             std::vector<double> bounds = settings.divided->sizes;
             for (double& bound : bounds) bound *= share_of_solves * settings.divided->absolute / settings.divided->unit;
             solver_->bound_errors(std::move(bounds));
-        } else if (system_->locates_impacts && !shared_ && !restitutes_) {
-            settings.at_impacts = control_of_accuracy();
+        } else if (!shared_) {
+            settings.judged = control_of_accuracy();
+            settings.refines = system_->refines_steps && !restitutes_;
         }
     }
     stepping_ = std::make_unique<Stepping>(dynamics(), std::move(timestepper), std::move(settings), shared_.get());

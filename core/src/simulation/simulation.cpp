@@ -99,7 +99,7 @@ bool shares_bodies(const SceneSystem& system, const Registry& registry) {
 /// Where bodies are shared and the scene does not name its method, one that can be shared.
 void choose_method_to_share(SceneSystem& system, const Registry& registry) {
     if (!shares_bodies(system, registry)) return;
-    system.locates_impacts = false;
+    system.refines_steps = false;
     if (system.accuracy_chosen) system.steps_by_accuracy = system.accuracy_chosen = false;
     if (can_be_shared(system.integrator) || system.method_reason.empty()) return;
     system.method_reason = fmt::format("several processes cannot share {}", system.integrator);
@@ -414,13 +414,14 @@ const StepRecord& Simulation::step() {
     record_.substeps = taken.substeps;
     record_.rejected = taken.rejected;
     record_.impact = taken.impact;
+    record_.error = stepping_->allowed() * taken.h * (std::isnan(taken.error) ? 0.0 : taken.error);
     record_.linearization = report.linearization;
     record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
     auto& totals = now_.totals;
     add_step(record_, totals);
-    if (taken.located) {
-        ++totals.located_steps;
+    if (taken.refined) {
+        ++totals.refined_steps;
     } else if (record_.substeps > 1) {
         ++totals.divided_steps;
         totals.most_substeps = std::max(totals.most_substeps, record_.substeps);
@@ -436,8 +437,7 @@ const StepRecord& Simulation::step() {
     if (totals.first_failure.empty()) totals.first_failure = effort.failure;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
-    if (taken.unlocated) ++totals.unlocated_steps;
-    if (method().by_accuracy && taken.error > 1.0) ++totals.inexact_steps;
+    if (taken.error > 1.0) ++totals.inexact_steps;
     if (!deep_.empty()) {
         ++totals.deep_steps;
         if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
@@ -593,7 +593,7 @@ std::vector<std::string> Simulation::warnings() const {
     if (overlaps_ && !overlaps_->at_start().empty())
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
     if (!beyond_stops_.empty()) sentences.push_back(fmt::format("system \"{}\": {}", system_->name, beyond_stops_));
-    if (const auto& totals = now_.totals; totals.inexact_steps > 0)
+    if (const auto& totals = now_.totals; method().by_accuracy && totals.inexact_steps > 0)
         sentences.push_back(fmt::format(
             "system \"{}\": {} of {} steps are less exact than accuracy: {:.3g} asks, however short their parts: what "
             "touches there comes and goes by rounding",

@@ -35,7 +35,7 @@ struct StepColumn {
     }
 };
 
-inline constexpr std::array<StepColumn, 16> step_columns = {{
+inline constexpr std::array<StepColumn, 17> step_columns = {{
     {"t", "s", "time at the end of the step; the first row is the initial state", &StepRecord::t},
     {"energy", "J", "kinetic and potential energy", &StepRecord::energy, Summary::Last, &SimulationTotals::energy,
      "energy"},
@@ -58,6 +58,10 @@ inline constexpr std::array<StepColumn, 16> step_columns = {{
     {"solved", "1", "1 if every solve reached its tolerance", &StepRecord::solved},
     {"linearization", "1", "what the forces of a linearised method were off by, as a share of the velocities",
      &StepRecord::linearization, Summary::Largest, &SimulationTotals::worst_linearization},
+    {"error", "1",
+     "error of positions that the step is estimated to add, as a share of the size of what moves and in rad; NaN: not "
+     "estimated",
+     &StepRecord::error, Summary::Sum, &SimulationTotals::error},
     {.name = "rejected",
      .unit = "1",
      .description = "trials of the step control that were thrown away",
@@ -130,11 +134,11 @@ inline constexpr std::array<TotalColumn, 43> total_columns = {{
     {"divided_steps", "1", "fixed steps that the method could not take in one", &SimulationTotals::divided_steps,
      "/divided_steps"},
     {"most_substeps", "1", "that one of them was divided into", &SimulationTotals::most_substeps, "/most_substeps"},
-    {"located_steps", "1", "fixed steps with impacts that were located", &SimulationTotals::located_steps,
-     "/located_steps"},
-    {"unlocated_steps", "1", "fixed steps with impacts that take too much work, or that no substep resolves",
-     &SimulationTotals::unlocated_steps, "/unlocated_steps"},
-    {"inexact_steps", "1", "steps with a part that errs by more than the accuracy asks, however short it is",
+    {"refined_steps", "1", "fixed steps that were divided by their error", &SimulationTotals::refined_steps,
+     "/refined_steps"},
+    {"error", "1", "sum of what steps are estimated to add to the error of positions, as in the trajectory",
+     &SimulationTotals::error, "/error"},
+    {"inexact_steps", "1", "steps with a part that errs by more than the accuracy asks",
      &SimulationTotals::inexact_steps, "/inexact_steps"},
     {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",
      &SimulationTotals::deep_steps, "/deep_steps"},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "delassus/error.hpp"
@@ -14,12 +15,13 @@
 namespace delassus {
 namespace {
 
-// Work is counted in velocities and rows of problems that were solved. A box that lands takes some 2000, a hundredth of
-// a second. Each fixed step adds what may be spent on impacts, up to what some landings take; to locate one takes this
-// many solves as a rule, and nothing is begun that cannot be ended.
-constexpr double work_of_a_step = 300.0, most_saved_work = 3e4, solves_of_an_impact = 120.0;
-/// Of the accuracy: how far a step goes at the speed of an impact that is not worth it.
-constexpr double faint_impact = 0.1;
+// Work is counted in velocities and rows of problems that were solved, and a tenth of them for each iteration of their
+// solver. A box that lands takes some 2000, a hundredth of a second. Each fixed step adds what may be spent on those
+// that err, up to what some landings take.
+constexpr double work_of_a_step = 300.0, most_saved_work = 3e4, iterations_of_a_solve = 10.0;
+// Nothing is begun that cannot be ended: as a rule a step that errs by e over the accuracy takes √e substeps of three
+// solves, twice as many with the trials that are thrown away, and to locate an impact takes so many solves.
+constexpr double solves_of_a_substep = 6.0, solves_of_an_impact = 120.0;
 
 /// A method whose steps follow from a tolerance for a while.
 class ChosenSteps {
@@ -48,9 +50,10 @@ Stepping::Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timeste
         settings_.divided = StepControl::within(limit, settings_.step);
     if (settings_.divided)
         control_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.divided, settings_.advice);
-    if (settings_.at_impacts) {
-        impacts_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.at_impacts);
-        impacts_before_any_ = impacts_->save();
+    if (control_ || !timestepper_->estimates_error()) settings_.judged.reset();
+    if (settings_.judged && settings_.refines) {
+        refined_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.judged);
+        refined_anew_ = refined_->save();
         timestepper_->choose_steps(HUGE_VAL);
         work_ = most_saved_work;
     }
@@ -83,7 +86,7 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
     report.h = step.h;
     report.error = 0.0;
     report.rejected = 0;
-    report.impact = report.located = report.unlocated = false;
+    report.impact = report.refined = false;
     if (ahead_) {
         step_ahead(state, step.end, solver, report);
     } else if (control_) {
@@ -128,8 +131,10 @@ void Stepping::try_substeps(std::int64_t substeps, State& state, StepSolver& sol
     const double h = report.h / static_cast<double>(substeps);
     if (watch) watch->begin_trial(substeps);
     report.step.clear();
+    report.error = 0.0;
     for (std::int64_t i = 1; i <= substeps; ++i) {
         take(state, h, solver, substep_);
+        if (const double error = error_of(substep_, h); !(error <= report.error)) report.error = error;
         if (watch) watch->judge(state, h, substep_, i == substeps);
         if (substeps > 1 && substep_.linearization_rounding > most_rounding)
             throw StepTooLong("the last digits of positions are as large as what a step errs by");
@@ -169,7 +174,7 @@ void Stepping::step_fixed(State& state, StepSolver& solver, AdaptiveStepReport& 
         try {
             step_whole(state, solver, report, watch);
             taken = true;
-            if (impacts_) locate_impacts(state, solver, report, watch);
+            if (refined_) refine(state, solver, report, watch);
         } catch (const StepTooLong& failure) {
             try {
                 step_in_substeps(state, solver, report, watch, failure);
@@ -193,7 +198,9 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
                                  AdaptiveStepReport& report, double most_work) {
     report.step.clear();
     report.substeps = 0;
-    for (; state.t < end && work_of(report.step) <= most_work; ++report.substeps) {
+    const std::int64_t before = solver.effort().iterations;
+    const auto work = [&] { return work_of(report.step, solver.effort().iterations - before); };
+    for (; state.t < end && work() <= most_work; ++report.substeps) {
         AdaptiveStepReport part = control.step(state, end, solver);
         part.step.follow(report.step);
         std::swap(report.step, part.step);
@@ -202,31 +209,39 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
     }
 }
 
-// ---- Fixed steps with an impact ----
+// ---- Fixed steps that err ----
 //
-// A fixed step knows the speeds of an impact and not its time: what meets is at rest on it from the beginning of the
-// step to its end, or half of it, and what follows the impact within the step, as the second corner of a box that
-// lands, is one with it. That is an error of order 1, where all else is of order 2, and such steps are few. So they are
-// taken again by their error.
+// A fixed step is of order 2 where motion is smooth, and of order 1 where something meets, lets go, goes over an edge
+// or turns round: it knows the speeds and not the time. Such steps are few as a rule, and their estimate tells them
+// all. They are taken again by their error.
 
-double Stepping::work_of(const StepReport& report) const {
-    return report.newton_iterations * (system_.n() + 3.0 * report.unilateral_blocks);
+double Stepping::work_of(const StepReport& report, std::int64_t iterations) const {
+    const double solves = report.newton_iterations + static_cast<double>(iterations) / iterations_of_a_solve;
+    return solves * (system_.n() + 3.0 * report.unilateral_blocks);
 }
 
-void Stepping::locate_impacts(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
+double Stepping::error_of(const StepReport& report, double h) const {
+    if (!settings_.judged || report.error.empty()) return std::numeric_limits<double>::quiet_NaN();
+    const std::vector<double>& sizes = settings_.judged->sizes;
+    double largest = 0.0;
+    for (std::size_t i = 0; i < report.error.size(); ++i)
+        largest = std::max(largest, report.error[i] / (sizes.empty() ? 1.0 : sizes[i]));
+    return largest / (h * allowed());
+}
+
+void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
     work_ = std::min(work_ + work_of_a_step, most_saved_work);
-    const StepControl& control = *settings_.at_impacts;
-    if (report.step.impact_speed * report.h <= faint_impact * control.slow * control.unit) return;
-    report.unlocated = true;
-    const double usual = work_of(report.step) * solves_of_an_impact;
+    if (!(report.error > 1.0)) return;
+    const double solves = std::min(solves_of_a_substep * std::sqrt(report.error), solves_of_an_impact);
+    const double usual = work_of(report.step, solver.effort().iterations) * solves;
     if (usual > work_) return;
     const State whole = state;
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
-    const ChosenSteps chosen(*timestepper_, control.absolute / control.unit);
+    const ChosenSteps chosen(*timestepper_, allowed());
     go_back(state);
     try {
-        take_located(state, solver, report, watch);
+        take_refined(state, solver, report, watch);
     } catch (const StepFailure&) {
         work_ -= usual;
         state = whole;
@@ -237,15 +252,18 @@ void Stepping::locate_impacts(State& state, StepSolver& solver, AdaptiveStepRepo
 }
 
 // What is left when the work is used up is one step.
-void Stepping::take_located(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
+void Stepping::take_refined(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
     const double end = begin_.t + report.h;
-    impacts_->load(impacts_before_any_);
-    step_within_error(*impacts_, state, end, solver, report, work_);
-    report.unlocated = report.error > 1.0 || state.t < end;
-    report.located = !report.unlocated;
-    work_ -= work_of(report.step);
+    refined_->load(refined_anew_);
+    report.error = 0.0;
+    const std::int64_t before = solver.effort().iterations;
+    step_within_error(*refined_, state, end, solver, report, work_);
+    report.refined = true;
+    work_ -= work_of(report.step, solver.effort().iterations - before);
     if (state.t < end) {
-        take(state, end - state.t, solver, substep_);
+        const double h = end - state.t;
+        take(state, h, solver, substep_);
+        if (const double error = error_of(substep_, h); error > report.error) report.error = error;
         substep_.follow(report.step);
         std::swap(report.step, substep_);
         ++report.substeps;
@@ -316,7 +334,7 @@ std::vector<double> Stepping::multipliers(const State& state, StepSolver& solver
 SteppingMemory Stepping::save() const {
     SteppingMemory memory{.method = timestepper_->save(), .control = {}, .ahead = {}};
     if (control_) memory.control = control_->save();
-    if (impacts_) memory.control = {work_};
+    if (refined_) memory.control = {work_};
     if (ahead_) memory.ahead = ahead_->save();
     return memory;
 }
@@ -324,8 +342,8 @@ SteppingMemory Stepping::save() const {
 void Stepping::load(const SteppingMemory& memory, const State& state) {
     timestepper_->load(memory.method);
     if (control_) control_->load(memory.control);
-    if (impacts_) {
-        if (memory.control.size() != 1) throw InputError("the memory of located impacts is not one number");
+    if (refined_) {
+        if (memory.control.size() != 1) throw InputError("the memory of divided steps is not one number");
         work_ = memory.control.front();
     }
     if (!ahead_) return;
@@ -333,8 +351,15 @@ void Stepping::load(const SteppingMemory& memory, const State& state) {
     ahead_->load(memory.ahead);
 }
 
+double Stepping::allowed() const {
+    const auto& control = settings_.judged ? settings_.judged : settings_.divided;
+    const bool by_accuracy = control && !control->sizes.empty();
+    return by_accuracy ? control->absolute / control->unit : std::numeric_limits<double>::quiet_NaN();
+}
+
 void Stepping::keep_control_of(const Stepping& other) {
     if (control_ && other.control_) control_->load(other.control_->save());
+    if (refined_ && other.refined_) work_ = other.work_;
 }
 
 }  // namespace delassus

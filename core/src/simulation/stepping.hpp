@@ -24,10 +24,11 @@ class SharedRun;
 
 /// What the steps of a system follow from.
 struct SteppingSettings {
-    double step = 0.0, end = 0.0;             ///< between states that are shown, and of the run, s
-    std::optional<StepControl> chosen;        ///< steps follow from a tolerance; `step` means nothing then
-    std::optional<StepControl> divided;       ///< how fixed steps are divided, where the method has no error_limit()
-    std::optional<StepControl> at_impacts{};  ///< how those with an impact are, while that is cheap
+    double step = 0.0, end = 0.0;        ///< between states that are shown, and of the run, s
+    std::optional<StepControl> chosen;   ///< steps follow from a tolerance; `step` means nothing then
+    std::optional<StepControl> divided;  ///< how fixed steps are divided, where the method has no error_limit()
+    std::optional<StepControl> judged;   ///< what others may err by, where the method is of order 1 or 2
+    bool refines = false;                ///< those that err by more are divided by their error while that is cheap
     double accuracy = 0.0;    ///< off constraints by no more, a state is shown where it cannot be returned to them
     std::string advice;       ///< what to do where no substep is short enough
     bool restitutes = false;  ///< there is restitution: steps are cut between impacts
@@ -38,7 +39,7 @@ struct SteppingSettings {
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
-//     again, by their error           where an impact was in it, and locating it costs little
+//     again, by their error           where it errs by more than the accuracy, and that costs little
 //   or
 //     in substeps by their error      AdaptiveStepping, where there is an error limit, an accuracy or a tolerance
 //     longer than what is shown       LookAhead, where the method knows the way of its steps
@@ -72,6 +73,10 @@ public:
     /// Shows states by steps that are longer; null: there are none such.
     [[nodiscard]] LookAhead* ahead() { return ahead_.get(); }
     void look_ahead(std::unique_ptr<LookAhead> ahead) { ahead_ = std::move(ahead); }
+    /// What positions may err by a second, as a share of the size of what moves and in rad: AdaptiveStepReport::error
+    /// is over it. NaN where nobody says so: the method follows a limit of its own, or a tolerance, or is of high
+    /// order.
+    [[nodiscard]] double allowed() const;
     /// Whether fixed steps are divided by their error.
     [[nodiscard]] bool has_limit() const { return control_ && !settings_.chosen; }
 
@@ -91,9 +96,11 @@ private:
     /// Steps of `control` to `end`, or until they have taken more than this work.
     void step_within_error(AdaptiveStepping& control, State& state, double end, StepSolver& solver,
                            AdaptiveStepReport& report, double most_work = HUGE_VAL);
-    [[nodiscard]] double work_of(const StepReport& report) const;
-    void locate_impacts(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
-    void take_located(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    [[nodiscard]] double work_of(const StepReport& report, std::int64_t iterations) const;
+    /// What a step of size h errs by, over what is allowed; NaN where it is not known.
+    [[nodiscard]] double error_of(const StepReport& report, double h) const;
+    void refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    void take_refined(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
     static void judge(const State& state, const AdaptiveStepReport& report, StepWatch& watch);
     void step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
     void show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
@@ -105,9 +112,9 @@ private:
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<ImpactCuts> cuts_;           // or empty
     std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the substeps of fixed ones; or empty
-    std::unique_ptr<AdaptiveStepping> impacts_;  // of the substeps of fixed ones with an impact; or empty
-    std::vector<double> impacts_before_any_;     // its memory, with which it begins each time
-    double work_ = 0.0;                          // that may be spent on impacts now
+    std::unique_ptr<AdaptiveStepping> refined_;  // of the substeps of those that err by too much; or empty
+    std::vector<double> refined_anew_;           // its memory before any
+    double work_ = 0.0;                          // that may be spent on them now
     std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
     // Of the last advance(), before it:
     State begin_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Plain scenes of few bodies that hit each other, without options: fixed steps are divided where an impact is in them.
+// Plain scenes of few bodies, without options: fixed steps that err by more than the accuracy are divided.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "support/scenes.hpp"
 
-namespace delassus::tests::located_impacts_test {
+namespace delassus::tests::refined_steps_test {
 namespace {
 
 Running run_of(const std::string& text) {
@@ -54,7 +54,7 @@ struct Landing {
     }
 };
 
-TEST(LocatedImpacts, ACubeTurnsOnTheEdgeThatItLandsOn) {
+TEST(RefinedSteps, ACubeTurnsOnTheEdgeThatItLandsOn) {
     const Landing landing;
     const double after = 0.043, end = landing.meets + after, tilt = landing.tilt_after(after);
     ASSERT_GT(tilt, 0.02) << "before it is flat";
@@ -67,17 +67,18 @@ TEST(LocatedImpacts, ACubeTurnsOnTheEdgeThatItLandsOn) {
             EXPECT_NEAR(2.0 * std::asin(run.pose("cube").orientation[2]), tilt, 1e-3);
             EXPECT_TRUE(run.simulation.warnings().empty());
             const auto& totals = run.simulation.totals();
-            EXPECT_EQ(totals.located_steps > 0, *options == '\0');
-            EXPECT_EQ(totals.unlocated_steps, 0);
+            EXPECT_EQ(totals.refined_steps > 0, *options == '\0');
+            EXPECT_EQ(totals.inexact_steps, 0);
         }
 }
 
-TEST(LocatedImpacts, AMethodThatIsNamedKeepsItsSteps) {
+TEST(RefinedSteps, AMethodThatIsNamedKeepsItsSteps) {
     const Landing landing;
     auto run = run_of(landing.scene(1.0 / 60.0, landing.meets + 0.043, "integrator: linearly_implicit_trapezoidal\n"));
     run.finish();
-    EXPECT_EQ(run.simulation.totals().located_steps, 0);
-    EXPECT_EQ(run.simulation.totals().unlocated_steps, 0);
+    EXPECT_EQ(run.simulation.totals().refined_steps, 0);
+    EXPECT_GT(run.simulation.totals().inexact_steps, 0);
+    EXPECT_GT(run.simulation.totals().error, 1e-3);
 }
 
 /// So many cubes that fall on edges, one beside the other.
@@ -90,21 +91,21 @@ std::string cubes(int count) {
         count);
 }
 
-TEST(LocatedImpacts, CostNoMoreThanASharePerStep) {
+TEST(RefinedSteps, CostNoMoreThanASharePerStep) {
     auto few = run_of(cubes(2));
     few.finish();
-    EXPECT_GT(few.simulation.totals().located_steps, 0);
+    EXPECT_GT(few.simulation.totals().refined_steps, 0);
     auto many = run_of(cubes(40));
     many.finish();
-    EXPECT_EQ(many.simulation.totals().located_steps, 0);
-    EXPECT_GT(many.simulation.totals().unlocated_steps, 0);
+    EXPECT_EQ(many.simulation.totals().refined_steps, 0);
+    EXPECT_GT(many.simulation.totals().inexact_steps, 0);
     EXPECT_TRUE(many.simulation.warnings().empty());
 }
 
-TEST(LocatedImpacts, ResumeToTheSameBits) {
+TEST(RefinedSteps, ResumeToTheSameBits) {
     auto whole = run_of(cubes(3));
     whole.finish();
-    ASSERT_GT(whole.simulation.totals().located_steps + whole.simulation.totals().unlocated_steps, 3);
+    ASSERT_GT(whole.simulation.totals().refined_steps + whole.simulation.totals().inexact_steps, 3);
     for (const double until : {0.1, 0.29, 0.35, 0.41}) {
         SCOPED_TRACE(until);
         auto first = run_of(cubes(3)), second = run_of(cubes(3));
@@ -112,9 +113,9 @@ TEST(LocatedImpacts, ResumeToTheSameBits) {
         second.simulation.load(first.simulation.save());
         second.finish();
         EXPECT_EQ(second.simulation.coordinates().q, whole.simulation.coordinates().q);
-        EXPECT_EQ(second.simulation.totals().located_steps, whole.simulation.totals().located_steps);
+        EXPECT_EQ(second.simulation.totals().refined_steps, whole.simulation.totals().refined_steps);
     }
 }
 
 }  // namespace
-}  // namespace delassus::tests::located_impacts_test
+}  // namespace delassus::tests::refined_steps_test
