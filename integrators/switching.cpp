@@ -255,7 +255,7 @@ private:
                 if (contacts) report.contacts.push_back(one.contact);
                 if (one.reaction.force[0] != 0.0) ++report.active_blocks;
             }
-        report.impact_speed = report.impact_time = 0.0;  // nobody has to look for them
+        report.impact_speed = report.impact_time = report.cut = 0.0;  // nobody has to look for them
         report.error.clear();
         if (errors_known_) report.error = errors_;
     }

@@ -52,6 +52,7 @@ public:
             .end = set_.end,
             .chosen = set_.control,
             .divided = std::nullopt,
+            .judged = std::nullopt,
             .accuracy = set_.accuracy,
             .advice = fmt::format("{} cannot follow the motion there; take an implicit method, or "
                                   "euler_implicit_linearized, which is less exact and may go on",

@@ -61,6 +61,17 @@ TEST(Impact, ComesToRestWhereAllFlightsAreOver) {
     EXPECT_NEAR(alone + (0.1 - impact->acts) * impact->change, 0.0, 1e-15);
 }
 
+// What hardly meets, as its acceleration stops it, needs a small impulse: at a time long before the step it would move
+// bodies by as far.
+TEST(Impact, ActsWithinTheStepWhereItHardlyMeets) {
+    for (const double acceleration : {180.0, 199.9, 199.9999}) {
+        const auto impact = impact_within(0.01, {0.0, -1.0, acceleration}, -9.81, 0.0);
+        ASSERT_TRUE(impact) << acceleration;
+        EXPECT_GE(impact->acts, impact->meets);
+        EXPECT_LE(impact->acts, 0.01);
+    }
+}
+
 TEST(Impact, IsNoneWhereTheContactDoesNotMeet) {
     EXPECT_FALSE(impact_within(0.01, {0.02, -1.0, 0.0}, 0.0, 0.5));
     EXPECT_FALSE(impact_within(0.01, {0.02, -1.0, 200.0}, 200.0, 0.5));

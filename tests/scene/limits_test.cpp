@@ -333,5 +333,25 @@ TEST(Limits, AreRefusedWhereTheyMakeNoSense) {
     EXPECT_EQ(sentence_of("{energy_growth: 0.5, drift: null}"), "");
 }
 
+// The step is solved once without the stop, which is no row then; the servo keeps its place in what is left.
+TEST(Limits, AServoActsBesideAStop) {
+    Running run(parse_scene(
+        "step: 0.005\nend: 0.6\ngravity: [0, 0, 0]\nbodies:\n"
+        "- {name: arm, mass: 2, inertia: {xx: 0.02, yy: 0.2, zz: 0.2}, position: [0.5, 0, 1]}\n"
+        "- {name: fore, mass: 1, inertia: {xx: 0.01, yy: 0.05, zz: 0.05}, position: [1.3, 0, 1]}\njoints:\n"
+        "- {name: j, kind: revolute, second: arm, point: [0, 0, 1], axis: [0, -1, 0]}\n"
+        "- {name: k, kind: revolute, first: arm, second: fore, point: [1, 0, 1], axis: [0, -1, 0], lower: -0.3}\n"
+        "actuators: [{name: s, joint: j, position: 1.1, kp: 80, kd: 6, limit: 30}]\n",
+        "test.yaml"));
+    while (!run.simulation.finished()) {
+        run.simulation.step();
+        const auto& q = run.simulation.coordinates().q;
+        ASSERT_EQ(q.size(), 2u);
+        ASSERT_GT(q[1], -0.3 - 1e-6);
+    }
+    EXPECT_GT(run.simulation.coordinates().q[0], 0.3);
+    EXPECT_GT(run.simulation.totals().most_contacts, 1);
+}
+
 }  // namespace
 }  // namespace delassus::tests::limits_test

@@ -297,6 +297,45 @@ TEST(PlainMotion, WhatRestsOrSlidesDoesNotBounce) {
     }
 }
 
+// A ball meets two others half a millisecond apart, within a step: the second one after the first has turned it.
+TEST(PlainMotion, ABallHitsTwoOneAfterTheOther) {
+    constexpr double radius = 0.028, e = 0.9, end = 0.21;
+    const std::array<std::array<double, 2>, 2> others = {{{0.0490, 0.0290}, {0.0490, -0.0285}}};
+    std::array<double, 2> place = {-0.1, 0.0}, speed = {2.0, 0.0};
+    std::array<std::array<double, 2>, 2> given{};
+    double t = 0.0;
+    for (const std::size_t one : {1, 0}) {
+        const double x = others[one][0] - place[0], y = others[one][1] - place[1];
+        const double along = (x * speed[0] + y * speed[1]) / std::hypot(speed[0], speed[1]);
+        const double beside = std::sqrt(x * x + y * y - along * along);
+        const double way = along - std::sqrt(4.0 * radius * radius - beside * beside),
+                     wait = way / std::hypot(speed[0], speed[1]);
+        t += wait;
+        for (std::size_t i = 0; i < 2; ++i) place[i] += wait * speed[i];
+        const std::array<double, 2> n = {(others[one][0] - place[0]) / (2.0 * radius),
+                                         (others[one][1] - place[1]) / (2.0 * radius)};
+        const double passed = 0.5 * (1.0 + e) * (n[0] * speed[0] + n[1] * speed[1]);
+        for (std::size_t i = 0; i < 2; ++i) {
+            given[one][i] = passed * n[i];
+            speed[i] -= passed * n[i];
+        }
+    }
+    ASSERT_LT(t, 0.08);
+    for (const double step : {1.0 / 60.0, 0.01, 0.0037}) {
+        auto run = run_of(fmt::format(
+            "step: {:.17g}\nend: {}\ngravity: [0, 0, 0]\nmaterials: {{b: {{restitution: {}}}}}\nbodies:\n"
+            "- {{name: hits, mass: 1, position: [-0.1, 0, 0], velocity: [2, 0, 0], shapes: [{{sphere: {{radius: {}}}, "
+            "material: b}}]}}\n- {{name: 'b{{j}}', mass: 1, position: [0.049, 0.029, 0], shapes: [{{sphere: {{radius: "
+            "{}}}, material: b}}], repeat: {{count: [1, 2, 1], spacing: [0, -0.0575, 0]}}}}\n",
+            step, end, e, radius, radius));
+        run.finish();
+        for (std::size_t one = 0; one < 2; ++one)
+            for (std::size_t i = 0; i < 2; ++i)
+                EXPECT_NEAR(run.velocities(fmt::format("b{}", one))[0][i], given[one][i], 1e-3) << step << ' ' << one;
+        for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(run.velocities("hits")[0][i], speed[i], 1e-3) << step;
+    }
+}
+
 // Contacts that carry what lies on them and bounce at once: the load acts over the whole step. With all of an impulse
 // at the time of the bounce, the stack gained three quarters of what it lost.
 TEST(PlainMotion, AStackThatBouncesGainsNoEnergy) {

@@ -72,6 +72,78 @@ TEST(RefinedSteps, ACubeTurnsOnTheEdgeThatItLandsOn) {
         }
 }
 
+// A body of 2 kg on a spring stands on a foot of 1 kg, drawn together. With x the length of the spring above its rest
+// the body moves as m ẍ = −k x − m g until the spring pulls the foot up, at k x = m₂ g. From then on the mass centre is
+// thrown, and the spring swings by itself with k (1/m + 1/m₂).
+struct Jump {
+    double m = 2.0, foot = 1.0, k = 20.0, g = 9.81, drawn = -3.2;
+
+    /// The height of the foot at a time after the start, before it lands.
+    [[nodiscard]] double foot_at(double time) const {
+        const double omega = std::sqrt(k / m), middle = -m * g / k, width = drawn - middle, leaves = foot * g / k;
+        const double until = std::acos((leaves - middle) / width) / omega, t = time - until;
+        if (t < 0.0) return 0.0;
+        const double speed = -width * omega * std::sin(omega * until), swings = std::sqrt(k * (1.0 / m + 1.0 / foot));
+        const double centre = m / (m + foot) * (leaves + speed * t) - 0.5 * g * t * t;
+        const double x = leaves * std::cos(swings * t) + speed / swings * std::sin(swings * t);
+        return centre - m / (m + foot) * x;
+    }
+    [[nodiscard]] std::string scene(double step, double end, bool joint) const {
+        const std::string way = joint ? fmt::format(
+                                            "joints: [{{name: leg, kind: prismatic, first: foot, second: body, "
+                                            "axis: [0, 0, 1], spring: {{stiffness: {}, rest: {:.17g}}}}}]\n",
+                                            k, -drawn)
+                                      : fmt::format(
+                                            "springs: [{{name: leg, first: foot, second: body, stiffness: {}, "
+                                            "rest_length: {:.17g}}}]\n",
+                                            k, 2.0 - drawn);
+        return fmt::format(
+            "step: {:.17g}\nend: {:.17g}\nbodies:\n- {{name: floor, fixed: true, shapes: [{{plane: {{}}}}]}}\n- "
+            "{{name: "
+            "foot, mass: {}, position: [0, 0, 0.1], shapes: [{{sphere: {{radius: 0.1}}}}]}}\n- {{name: body, mass: {}, "
+            "inertia: {{xx: 1, yy: 1, zz: 1}}, position: [0, 0, 2.1]}}\n{}",
+            step, end, foot, m, way);
+    }
+};
+
+TEST(RefinedSteps, AFootLetsGoWithinAStep) {
+    const Jump jump;
+    const double end = 1.0, height = jump.foot_at(end);
+    ASSERT_GT(height, 0.2);
+    for (const bool joint : {true, false})
+        for (const double step : {1.0 / 60.0, 0.0071}) {
+            SCOPED_TRACE(fmt::format("{} {}", joint, step));
+            auto run = run_of(jump.scene(step, end, joint));
+            run.finish();
+            EXPECT_NEAR(run.pose("foot").position[2] - 0.1, height, 3e-3);
+        }
+}
+
+// A ball rolls off a table, a wheel over a curb: against steps by accuracy.
+TEST(RefinedSteps, EdgesThatBodiesGoOver) {
+    const std::string roll =
+        "end: 0.9\nmaterials: {m: {friction: 0.5}}\nbodies:\n- {name: table, fixed: true, position: [-0.5, 0, 0.25], "
+        "shapes: [{box: {size: [1, 1, 0.5]}, material: m}]}\n- {name: b, mass: 1, position: [-0.4, 0.05, 0.6], "
+        "velocity: [0.7, 0.1, 0], angular_velocity: [-1, 7, 0], shapes: [{sphere: {radius: 0.1}, material: m}]}\n";
+    const std::string curb =
+        "end: 0.8\nmaterials: {m: {friction: 0.8}}\nbodies:\n- {name: ground, fixed: true, shapes: [{plane: {}, "
+        "material: m}]}\n- {name: curb, fixed: true, position: [1, 0, 0.03], shapes: [{box: {size: [1, 1, 0.06]}, "
+        "material: m}]}\n- {name: b, mass: 5, position: [0, 0, 0.3], velocity: [2.5, 0, 0], angular_velocity: [0, 0, "
+        "8.3333333], orientation: {axis: [1, 0, 0], angle: -90}, shapes: [{cylinder: {radius: 0.3, length: 0.1}, "
+        "material: m}]}\n";
+    for (const std::string& scene : {roll, curb}) {
+        auto exact = run_of("step: 0.01\naccuracy: 1.0e-5\n" + scene);
+        exact.finish();
+        for (const double step : {1.0 / 60.0, 0.0073}) {
+            SCOPED_TRACE(step);
+            auto run = run_of(fmt::format("step: {:.17g}\n", step) + scene);
+            run.finish();
+            for (std::size_t i = 0; i < 3; ++i)
+                EXPECT_NEAR(run.pose("b").position[i], exact.pose("b").position[i], 2e-3) << i;
+        }
+    }
+}
+
 TEST(RefinedSteps, AMethodThatIsNamedKeepsItsSteps) {
     const Landing landing;
     auto run = run_of(landing.scene(1.0 / 60.0, landing.meets + 0.043, "integrator: linearly_implicit_trapezoidal\n"));

@@ -71,7 +71,11 @@ void VelocityContacts::take_out_open(Problem& problem) const {
             if (!keeps) continue;
             problem.b[to] = problem.b[row];
             move(problem.D);
-            if (compliant) move(problem.E);
+            if (compliant) {  // diagonal
+                move(problem.E);
+                std::fill(problem.E.column.begin() + problem.E.row_start[to],
+                          problem.E.column.begin() + problem.E.row_start[to + 1], static_cast<std::int32_t>(to));
+            }
             ++to;
         }
     }
