@@ -66,7 +66,13 @@ public:
 
     [[nodiscard]] int order() const override { return 2; }
     [[nodiscard]] bool estimates_error() const override { return true; }
-    void choose_steps(double tolerance) override { limit_ = std::isfinite(tolerance) ? tolerance : given_limit_; }
+    void choose_steps(double tolerance) override {
+        limit_ = std::isfinite(tolerance) ? tolerance : given_limit_;
+        if (!control_) return;
+        const std::vector<double> memory = control_->save();
+        control_.reset();
+        control(control_step_).load(memory);
+    }
 
     void restart() override {
         multipliers_.clear();

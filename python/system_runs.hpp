@@ -132,18 +132,8 @@ private:
             stepping_->undo();
             throw;
         }
-        const SolverEffort& effort = solver_->effort();
         record.step = record_.step + 1;
-        record.h = taken.h;
-        record.substeps = taken.substeps;
-        record.rejected = taken.rejected;
-        record.impact = taken.impact;
-        record.contacts = taken.step.unilateral_blocks;
-        record.newton_iterations = taken.step.newton_iterations;
-        record.solver_iterations = effort.iterations;
-        record.natural = effort.worst_natural;
-        record.solved = taken.step.solved;
-        record.linearization = taken.step.linearization;
+        stepping_->describe(taken, solver_->effort(), record);
         record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
         if (!record.solved && ++unsolved_ == 1) first_unsolved_ = fmt::format("{}: {}", where(), taken.step.message);
         record_ = record;

@@ -256,7 +256,7 @@ TEST(Accuracy, OfTheCommandTakesThePlaceOfATolerance) {
     overrides.step = 0.1;
     const Scene scene = parse_scene("tolerance: 1e-3\n" + body, "test.yaml", overrides);
     EXPECT_FALSE(scene.systems[0].control);
-    EXPECT_TRUE(scene.systems[0].steps_by_accuracy);
+    EXPECT_TRUE(scene.systems[0].steps_by_accuracy());
     EXPECT_EQ(scene.systems[0].accuracy, 1e-2);
     SceneOverrides tolerance;
     tolerance.tolerance = 1e-3;

@@ -115,7 +115,7 @@ TEST(StiffSprings, AreDividedAlikeInAllUnits) {
             fmt::format("- {{name: load, mass: 2.9, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}}}]}}\n",
                         1.27 * mm, 0.1 * mm) +
             fmt::format("springs: [{{name: leg, first: foot, second: load, stiffness: {}}}]\n", stiffness));
-        EXPECT_TRUE(run.scene.systems[0].accuracy_chosen);
+        EXPECT_EQ(run.scene.systems[0].division, StepDivision::ToChosenAccuracy);
         return run.pose("load").position[2] / mm;
     };
     EXPECT_NEAR(landing(1000.0, 1000.0), landing(1.0, 1.0), 1e-6);

@@ -176,9 +176,10 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
         if (totals.worst_linearization > 0.0)
             fmt::print("  worst linearisation error {:.1e}\n", totals.worst_linearization);
         if (totals.divided_steps > 0)
-            fmt::print("  {} steps taken in up to {} parts: as one they are too long for {}{}\n", totals.divided_steps,
-                       totals.most_substeps, simulation.method().integrator,
-                       system.steps_by_accuracy ? fmt::format(" to be right to {:.3g} a second", system.accuracy) : "");
+            fmt::print(
+                "  {} steps taken in up to {} parts: as one they are too long for {}{}\n", totals.divided_steps,
+                totals.most_substeps, simulation.method().integrator,
+                system.steps_by_accuracy() ? fmt::format(" to be right to {:.3g} a second", system.accuracy) : "");
         print_error(simulation);
         if (totals.plugin_solves == 0) {
             fmt::print("  no solver was needed\n");

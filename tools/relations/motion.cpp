@@ -29,7 +29,6 @@ struct Running {
 };
 
 double error_limit_of(const SceneSystem& system) {
-    if (system.steps_by_accuracy) return system.accuracy;
     for (const auto& [key, value] : system.integrator_options)
         if (key == "error_limit") return std::strtod(value.c_str(), nullptr);
     // The default of the only method that has one without being told.
@@ -40,6 +39,7 @@ void describe(const SceneSystem& scene, Motion& motion) {
     motion.integrator = scene.integrator;
     motion.coordinates = scene.coordinates == Coordinates::Joint ? "joint" : "maximal";
     motion.error_limit = error_limit_of(scene);
+    motion.divides = scene.division != StepDivision::None;
     motion.driven = !scene.motors.empty() || !scene.actuators.empty() || !scene.loads.empty();
     const auto& gravity = scene.system->gravity();
     const double fall = scene.step * std::hypot(gravity[0], gravity[1], gravity[2]);
@@ -126,6 +126,7 @@ void go(const std::string& text, const Registry& registry, const RunOrder& order
     }
     motion.warnings = running->simulation.warnings();
     const auto& totals = running->simulation.totals();
+    motion.inexact = totals.inexact_steps > 0;
     motion.parts = static_cast<double>(motion.t.size() - 1) +
                    static_cast<double>(totals.divided_steps) * static_cast<double>(totals.most_substeps);
     motion.rows_left_out = !running->simulation.save().rows_left_out.empty();

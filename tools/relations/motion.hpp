@@ -27,6 +27,8 @@ struct Motion {
     bool began = false;   ///< it came to its first step
     std::string integrator, coordinates;
     double error_limit = 0.0;         ///< of a method that divides its steps by one, m and rad; 0: it has none
+    bool inexact = false;             ///< it says that steps err by more than the accuracy
+    bool divides = false;             ///< fixed steps are divided by their error, to an accuracy
     double parts = 0.0;               ///< steps of the method at most: those shown, and what they were divided into
     std::vector<std::string> bodies;  ///< that move
     std::map<std::string, MassOf> masses;    ///< of these

@@ -141,7 +141,7 @@ public:
         described.units = {1e3, 1e3, 1e3};  // mm, g, ms
         return same_problem(in_units(scene_, described.units), described, rate_of_limits());
     }
-    Judgement other_order() { return same_problem(reordered(scene_, 1), {}, 0.0); }
+    Judgement other_order() { return same_problem(reordered(scene_, 1), {}, base_.divides ? rate_of_limits() : 0.0); }
 
     Judgement in_pieces() {
         if (const auto gone = not_comparable(base_)) return *gone;
@@ -278,7 +278,9 @@ private:
     }
 
     /// 1/s, of the error that two runs together may have by dividing their steps otherwise.
-    [[nodiscard]] double rate_of_limits() const { return base_.error_limit > 0.0 ? 2.0 * accuracy : 0.0; }
+    [[nodiscard]] double rate_of_limits() const {
+        return base_.divides || base_.error_limit > 0.0 ? 2.0 * accuracy : 0.0;
+    }
 
     /// G, of an answer to the disturbance.
     static double growth(double answer) {
@@ -287,7 +289,8 @@ private:
 
     /// By the same method, its error limit small, or in whole steps: a chosen one is divided where it gains energy.
     const Motion& named() {
-        if (base_.error_limit == 0.0 && base_.parts + 1.0 <= static_cast<double>(base_.t.size())) return base_;
+        const bool whole = base_.parts + 1.0 <= static_cast<double>(base_.t.size());
+        if (base_.error_limit == 0.0 && !base_.divides && whole) return base_;
         if (!named_) named_ = std::make_unique<Motion>(motion(with_method(scene_, base_)));
         return *named_;
     }
@@ -336,9 +339,10 @@ private:
 
     static Judgement verdict(const Motion& base, const Motion& other, const Judged& judged) {
         if (judged.beyond)
-            return {spoken(base) || spoken(other) ? Verdict::Reported : Verdict::Violated,
-                    fmt::format("apart by {:.3g} at t = {:.6g} s, where {:.3g} is allowed", judged.distance, judged.t,
-                                judged.allowed)};
+            return {
+                spoken(base) || spoken(other) || base.inexact || other.inexact ? Verdict::Reported : Verdict::Violated,
+                fmt::format("apart by {:.3g} at t = {:.6g} s, where {:.3g} is allowed", judged.distance, judged.t,
+                            judged.allowed)};
         if (judged.chaotic) return {Verdict::Chaotic, ""};
         if (base.end != other.end) return only_one(base, other);
         return {Verdict::Held, ""};

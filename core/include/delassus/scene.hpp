@@ -71,6 +71,14 @@ enum class Coordinates {
     Joint     ///< those of the joints, where joints make trees (delassus/joint_coordinates.hpp)
 };
 
+/// How the steps of a system are divided by their error, where no tolerance chooses them.
+enum class StepDivision {
+    None,              ///< they are as given
+    WhileCheap,        ///< those that err by more than `accuracy` are, at most for a fixed work a step; chosen
+    ToAccuracy,        ///< all are, as the scene gives an accuracy; `step` is then how often results are shown
+    ToChosenAccuracy,  ///< all are, though it gives none: fixed steps would change its motion
+};
+
 /// A system, finished and ready to be simulated, with the settings of the file.
 struct SceneSystem {
     std::string name;  ///< "main" in a file without `systems`
@@ -81,15 +89,16 @@ struct SceneSystem {
     bool coordinates_chosen = false;  ///< the scene names none
     std::string integrator = "euler_implicit_linearized";
     OptionTexts integrator_options;
-    std::string method_reason;             ///< why the integrator is this one; empty: the scene names it
-    SolverConfig solver;                   ///< an empty name: `auto`
-    double step = 0.0;                     ///< s, > 0; with `control` the first that is tried
-    double accuracy = 1e-3;                ///< of positions a second, as a share of the extent of what moves, and rad
-    bool steps_by_accuracy = false;        ///< `step` is then how often results are shown
-    bool accuracy_chosen = false;          ///< the scene gives no accuracy: fixed steps would change its motion
-    bool refines_steps = false;            ///< fixed steps that err by more are divided while that is cheap; chosen
-    std::optional<StepControl> control;    ///< steps follow from a tolerance; none: all are `step` long
-    std::optional<SleepingRule> sleeping;  ///< none: every body is awake
+    std::string method_reason;  ///< why the integrator is this one; empty: the scene names it
+    SolverConfig solver;        ///< an empty name: `auto`
+    double step = 0.0;          ///< s, > 0; with `control` the first that is tried
+    double accuracy = 1e-3;     ///< of positions a second, as a share of the extent of what moves, and rad
+    StepDivision division = StepDivision::None;
+    [[nodiscard]] bool steps_by_accuracy() const {
+        return division == StepDivision::ToAccuracy || division == StepDivision::ToChosenAccuracy;
+    }
+    std::optional<StepControl> control;          ///< steps follow from a tolerance; none: all are `step` long
+    std::optional<SleepingRule> sleeping;        ///< none: every body is awake
     std::optional<EquilibriumRule> equilibrium;  ///< none: it starts as given
     RunLimits limits;                            ///< what a run must not exceed
     double end = 0.0;                            ///< s, ≥ 0: the time at which the simulation ends; it starts at 0

@@ -125,7 +125,7 @@ struct SteppingMethod {
     std::string integrator;
     OptionTexts options;
     Coordinates coordinates = Coordinates::Maximal;
-    bool by_accuracy = false;  ///< its steps are divided by their error (SceneSystem::steps_by_accuracy)
+    bool by_accuracy = false;  ///< its steps are divided by their error (SceneSystem::division)
 };
 
 class EnergyGuard;

@@ -60,7 +60,7 @@ private:
     void move_late(double h);
     void mark_struck(bool struck);
     void remember_change(const Vector& result, double h);
-    void report_error(const State& begin, double h, StepReport& report);
+    void report_error(double h, StepReport& report);
     void resolve_up_to(double h);
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);

@@ -105,6 +105,8 @@ public:
     /// whole problem.
     [[nodiscard]] bool find_impacts(const Problem& problem, const Solution& solution);
     [[nodiscard]] std::span<const OnVelocity> on_velocities() const { return on_velocities_; }  ///< n
+    /// Of these impacts, whether all have restitution: then steps are cut between those that lead to one another.
+    [[nodiscard]] bool all_bounce() const { return all_bounce_; }
     /// Timestepper::follow_impacts().
     void follow_impacts(bool follow) { follows_ = follow; }
     [[nodiscard]] bool follows_impacts() const { return follows_; }
@@ -241,7 +243,7 @@ private:
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     std::size_t first_row_ = 0;             // in the problem
-    bool coulomb_ = false, settled_ = true, follows_ = false;
+    bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;
 };
 
 /// report ← the impact of a normal row that pushes, if it is one and the fastest so far: it did not push in the step

@@ -282,6 +282,9 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
         return contact.impact && solution.lambda[first_row_ + contact.row] > 0.0;
     };
     if (std::none_of(contacts_.begin(), contacts_.end(), acts)) return false;
+    all_bounce_ = true;
+    for (std::size_t k = 0; k < contacts_.size(); ++k)
+        all_bounce_ = all_bounce_ && (!acts(contacts_[k]) || rows_.blocks()[k].restitution > 0.0);
     const auto& D = problem.D;
     const auto n = static_cast<std::size_t>(D.columns);
     on_velocities_.assign(n, {});

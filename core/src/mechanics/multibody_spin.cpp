@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Gyroscopic torques of a multibody system, and the free spin of its bodies.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "mechanics/multibody_implementation.hpp"
@@ -21,10 +22,17 @@ using mechanics::Vector3d;
 // Krishnaprasad and Wang, J. Comput. Phys. 107, 1993). Order 2. The rotation cay(h w) turns by 2 atan(½h |w|) about w:
 // as a quaternion it is (1, ½h w), normalised. Newton's method converges at once while |h ω| is small; longer steps are
 // made of several.
+//
+// Of an angle φ = h |ω| a step is off by φ²/12 of it: 0.5 % at a quarter of a radian. So turns that are not small are
+// made of five such steps, of c h, c h, (1 − 4 c) h, c h and c h with c = 1/(4 − 4^⅓), which is of order 4 and keeps
+// what each of them keeps (Suzuki, Phys. Lett. A 146, 1990; Hairer, Lubich, Wanner, Geometric Numerical Integration,
+// sec. II.4).
 namespace {
 
-constexpr double largest_turn = 0.25;
+constexpr double largest_turn = 0.25, small_turn = 0.01;
 constexpr double most_parts = 10000.0;
+constexpr double outer = 0.41449077179437573714;
+constexpr std::array<double, 5> shares = {outer, outer, 1.0 - 4.0 * outer, outer, outer};
 
 /// ω ← ω⁺ after h.
 Vector3d midpoint_speed(const Matrix3d& J, const Vector3d& omega, double h) {
@@ -61,14 +69,19 @@ void MultibodySystem::free_spins(const State& state, double h, std::vector<FreeS
         FreeSpin& spin = spins.emplace_back();
         spin.column = column;
         spin.alone = alone;
-        const double parts = std::clamp(std::ceil(h * omega.norm() / largest_turn), 1.0, most_parts);
-        const double part = h / parts;
+        const double angle = h * omega.norm(), parts = std::clamp(std::ceil(angle / largest_turn), 1.0, most_parts);
         Vector3d speed = omega;
         Quaterniond turn = Quaterniond::Identity();
-        for (double k = 0.0; k < parts; ++k) {
+        const auto spin_on = [&](double part) {
             const Vector3d next = midpoint_speed(J, speed, part), half = 0.25 * part * (speed + next);
             turn = turn * Quaterniond(1.0, half.x(), half.y(), half.z()).normalized();
             speed = next;
+        };
+        if (angle <= small_turn) {
+            spin_on(h);
+        } else {
+            for (double k = 0.0; k < parts; ++k)
+                for (const double share : shares) spin_on(share * h / parts);
         }
         spin.torque = mechanics::array(-omega.cross(J * omega));
         spin.impulse = mechanics::array(J * (speed - omega));

@@ -107,7 +107,7 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
                     {"tolerance", system.control ? Json{{"absolute", system.control->absolute},
                                                         {"relative", system.control->relative}}
                                                  : Json(nullptr)},
-                    {"accuracy", system.steps_by_accuracy ? Json(system.accuracy) : Json(nullptr)},
+                    {"accuracy", system.steps_by_accuracy() ? Json(system.accuracy) : Json(nullptr)},
                     {"sleeping", system.sleeping ? Json{{"speed", system.sleeping->speed},
                                                         {"time", system.sleeping->time},
                                                         {"bodies", simulation.record().sleeping}}

@@ -181,9 +181,9 @@ bool mostly_without_joints(const SceneSystem& system) {
 /// How fast forces are, for a method that takes h ω up to these limits; empty: it takes them.
 std::string how_fast(const SceneSystem& system, const Rates::Fastest& most) {
     // A tolerance chooses its steps; these are as long as its users take them.
-    const double step = system.control             ? std::min(system.control->largest, 0.01)
-                        : system.steps_by_accuracy ? std::min(system.step, 0.01)
-                                                   : system.step;
+    const double step = system.control               ? std::min(system.control->largest, 0.01)
+                        : system.steps_by_accuracy() ? std::min(system.step, 0.01)
+                                                     : system.step;
     Rates rates(*system.system);
     if (rates.fastest().within(most, step)) return {};
     if (system.system->m() > 0) rates.hold_joints();
@@ -216,7 +216,7 @@ void choose_with_unilateral(SceneSystem& system, bool in_joints) {
         choose_in_touch(system, in_joints ? "bodies may touch, most of these have no joints" : "bodies may touch");
         return;
     }
-    const bool chosen_steps = system.control || system.steps_by_accuracy;
+    const bool chosen_steps = system.control || system.steps_by_accuracy();
     if (!in_joints || (system.control && !touching)) {
         system.method_reason = "joints have stops, dry friction or forces with limits";
         if (!system.control) choose_in_touch(system, system.method_reason);
@@ -266,19 +266,21 @@ std::string why_divided(const SceneSystem& system) {
 }
 
 void divide_by_error(SceneSystem& system) {
-    if (system.control || system.steps_by_accuracy) return;
+    if (system.control || system.steps_by_accuracy()) return;
     const std::string why = why_divided(system);
     if (why.empty()) return;
-    system.steps_by_accuracy = system.accuracy_chosen = true;
+    system.division = StepDivision::ToChosenAccuracy;
     system.method_reason += fmt::format("; {}, so steps are divided by their error", why);
 }
 
 /// What happens within a fixed step is early or late by up to its length. Where bodies sleep, what it did is not
-/// undone.
-void refine_steps(SceneSystem& system) {
-    const bool fixed = !system.control && !system.steps_by_accuracy && !system.sleeping;
-    const bool switches = system.integrator == "switching";
-    system.refines_steps = fixed && system.system->has_unilateral() && (switches || is_of_order_2(system));
+/// undone; with restitution steps are cut between impacts instead.
+void divide_while_cheap(SceneSystem& system) {
+    const bool fixed = !system.control && !system.steps_by_accuracy() && !system.sleeping;
+    const bool order_2 = system.integrator == "switching" || is_of_order_2(system);
+    if (!fixed || !order_2 || !system.system->has_unilateral() || system.system->restitutes()) return;
+    system.division = StepDivision::WhileCheap;
+    system.method_reason += "; fixed steps that err are divided while that is cheap";
 }
 
 void choose_of_all(SceneSystem& system) {
@@ -304,7 +306,7 @@ void choose_of_all(SceneSystem& system) {
     if (in_joints) system.coordinates = Coordinates::Joint;
     system.integrator = stiff.empty() ? "dormand_prince" : "radau_iia";
     system.method_reason = "nothing can touch, and " + (stiff.empty() ? "no force is stiff" : stiff);
-    if (!system.control && !system.steps_by_accuracy)
+    if (!system.control && !system.steps_by_accuracy())
         system.integrator_options.insert_or_assign("error_limit",
                                                    stiff.empty() ? error_limit_of_explicit : error_limit);
 }
@@ -317,7 +319,7 @@ void choose_method(SceneSystem& system) {
     if (system.integrator != chosen) return;
     choose_of_all(system);
     divide_by_error(system);
-    refine_steps(system);
+    divide_while_cheap(system);
 }
 
 }  // namespace delassus::scene

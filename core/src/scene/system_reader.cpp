@@ -25,7 +25,7 @@ std::vector<std::pair<std::string_view, Handler>> SystemReader::handlers() {
         {"accuracy",
          [this](const YAML::Node& n) {
              result_.accuracy = positive_number(source_, n, "accuracy");
-             result_.steps_by_accuracy = true;
+             result_.division = StepDivision::ToAccuracy;
          }},
         {"end", [this](const YAML::Node& n) { end_ = nonnegative_number(source_, n, "end"); }},
         {"sleeping", [this](const YAML::Node& n) { read_sleeping(n); }},
@@ -205,7 +205,7 @@ void SystemReader::build_step(const YAML::Node& place) {
         result_.step = *step_;
         return;
     }
-    if (result_.steps_by_accuracy)
+    if (result_.steps_by_accuracy())
         source_.refuse(place, "an \"accuracy\" and a \"tolerance\" exclude each other: steps follow from one of them");
     if (step_)
         source_.refuse(step_node_,

@@ -37,17 +37,17 @@ std::string described(const SteppingMethod& method) {
 
 std::vector<SteppingMethod> methods_of(const SceneSystem& system) {
     std::vector<SteppingMethod> methods = {
-        {system.integrator, system.integrator_options, system.coordinates, system.steps_by_accuracy}};
+        {system.integrator, system.integrator_options, system.coordinates, system.steps_by_accuracy()}};
     if (system.method_reason.empty() || system.control || system.sleeping) return methods;
     const bool leaves_joints =
         system.coordinates == Coordinates::Joint && system.coordinates_chosen && system.system->detects_contacts();
-    const bool given = system.steps_by_accuracy && !system.accuracy_chosen;
+    const bool given = system.division == StepDivision::ToAccuracy;
     if (leaves_joints) {
         methods.push_back({system.integrator == of_stiff_forces ? of_stiff_forces : "linearly_implicit_trapezoidal",
                            {},
                            Coordinates::Maximal,
                            given});
-    } else if (system.accuracy_chosen) {
+    } else if (system.division == StepDivision::ToChosenAccuracy) {
         methods.push_back(methods.front());
         methods.back().by_accuracy = false;
     }
@@ -78,7 +78,7 @@ void Simulation::make_method() {
             solver_->bound_errors(std::move(bounds));
         } else if (!shared_) {
             settings.judged = control_of_accuracy();
-            settings.refines = system_->refines_steps && !restitutes_;
+            settings.refines = system_->division == StepDivision::WhileCheap;
         }
     }
     stepping_ = std::make_unique<Stepping>(dynamics(), std::move(timestepper), std::move(settings), shared_.get());
@@ -96,7 +96,7 @@ StepControl Simulation::control_of_accuracy() {
     SizesOfMotion sizes = sizes_of_motion(*system_, joint_.get());
     StepControl control = StepControl::within(system_->accuracy, system_->step);
     control.sizes = std::move(sizes.of_velocities);
-    if (!system_->steps_by_accuracy || system_->accuracy_chosen)
+    if (system_->division != StepDivision::ToAccuracy)
         control.unit = sizes.time > 0.0 ? sizes.time : steps_of_time * system_->step;
     control.slow = control.absolute * sizes.least / control.unit;
     if (dynamics().has_unilateral()) control.smallest = shortest_impact * system_->step;

@@ -69,7 +69,7 @@ Apart apart(const Track::Frame& one, const Track::Frame& other, double extent, c
 double error_factor(const Simulation& refined) {
     const SceneSystem& system = refined.system();
     const bool limited = system.integrator_options.contains("error_limit");
-    if (system.control || system.steps_by_accuracy || limited || refined.totals().most_contacts > 0) return 2.0;
+    if (system.control || system.steps_by_accuracy() || limited || refined.totals().most_contacts > 0) return 2.0;
     int order = 1;
     for (const TimestepperInfo& info : timesteppers())
         if (info.name == refined.method().integrator) order = info.order;

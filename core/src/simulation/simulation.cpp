@@ -99,8 +99,7 @@ bool shares_bodies(const SceneSystem& system, const Registry& registry) {
 /// Where bodies are shared and the scene does not name its method, one that can be shared.
 void choose_method_to_share(SceneSystem& system, const Registry& registry) {
     if (!shares_bodies(system, registry)) return;
-    system.refines_steps = false;
-    if (system.accuracy_chosen) system.steps_by_accuracy = system.accuracy_chosen = false;
+    if (system.division != StepDivision::ToAccuracy) system.division = StepDivision::None;
     if (can_be_shared(system.integrator) || system.method_reason.empty()) return;
     system.method_reason = fmt::format("several processes cannot share {}", system.integrator);
     system.integrator = methods_to_share().front();
@@ -153,7 +152,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
             if (in_joints)
                 throw Unsupported("bodies cannot sleep in joint coordinates; remove \"sleeping\" or \"coordinates\"");
             require_sleeping(system);
-            if (system.control || system.steps_by_accuracy)
+            if (system.control || system.steps_by_accuracy())
                 throw InputError(
                     fmt::format("bodies may sleep with a fixed step only; {}",
                                 system.control ? "give a \"step\" instead of a \"tolerance\"" : "remove \"accuracy\""));
@@ -404,18 +403,8 @@ const StepRecord& Simulation::step() {
     now_.totals = std::move(judged);
     ++now_.step;
 
-    record_.contacts = report.unilateral_blocks;
     const SolverEffort& effort = solver_->effort();
-    record_.newton_iterations = report.newton_iterations;
-    record_.solver_iterations = effort.iterations;
-    record_.natural = effort.worst_natural;
-    record_.solved = report.solved;
-    record_.h = taken.h;
-    record_.substeps = taken.substeps;
-    record_.rejected = taken.rejected;
-    record_.impact = taken.impact;
-    record_.error = stepping_->allowed() * taken.h * (std::isnan(taken.error) ? 0.0 : taken.error);
-    record_.linearization = report.linearization;
+    stepping_->describe(taken, effort, record_);
     record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 
     auto& totals = now_.totals;
@@ -437,7 +426,7 @@ const StepRecord& Simulation::step() {
     if (totals.first_failure.empty()) totals.first_failure = effort.failure;
     totals.near_goal_solves += effort.near_goal;
     totals.solver_seconds += effort.seconds;
-    if (taken.error > 1.0) ++totals.inexact_steps;
+    if (taken.error > 1.0 && std::isfinite(record_.error)) ++totals.inexact_steps;
     if (!deep_.empty()) {
         ++totals.deep_steps;
         if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);

@@ -357,6 +357,20 @@ double Stepping::allowed() const {
     return by_accuracy ? control->absolute / control->unit : std::numeric_limits<double>::quiet_NaN();
 }
 
+void Stepping::describe(const AdaptiveStepReport& taken, const SolverEffort& effort, StepRecord& record) const {
+    record.h = taken.h;
+    record.substeps = taken.substeps;
+    record.rejected = taken.rejected;
+    record.impact = taken.impact;
+    record.error = allowed() * taken.h * (std::isnan(taken.error) ? 0.0 : taken.error);
+    record.contacts = taken.step.unilateral_blocks;
+    record.newton_iterations = taken.step.newton_iterations;
+    record.solver_iterations = effort.iterations;
+    record.natural = effort.worst_natural;
+    record.solved = taken.step.solved;
+    record.linearization = taken.step.linearization;
+}
+
 void Stepping::keep_control_of(const Stepping& other) {
     if (control_ && other.control_) control_->load(other.control_->save());
     if (refined_ && other.refined_) work_ = other.work_;

@@ -12,6 +12,7 @@
 #include "delassus/adaptive_stepping.hpp"
 #include "delassus/export.hpp"
 #include "delassus/simulation.hpp"
+#include "delassus/step_solver.hpp"
 #include "delassus/timestepper.hpp"
 #include "dynamics/impact_cuts.hpp"
 #include "simulation/fixed_step.hpp"
@@ -73,10 +74,8 @@ public:
     /// Shows states by steps that are longer; null: there are none such.
     [[nodiscard]] LookAhead* ahead() { return ahead_.get(); }
     void look_ahead(std::unique_ptr<LookAhead> ahead) { ahead_ = std::move(ahead); }
-    /// What positions may err by a second, as a share of the size of what moves and in rad: AdaptiveStepReport::error
-    /// is over it. NaN where nobody says so: the method follows a limit of its own, or a tolerance, or is of high
-    /// order.
-    [[nodiscard]] double allowed() const;
+    /// record ← what is known of a step that advance() took, but for what states and clocks say.
+    void describe(const AdaptiveStepReport& taken, const SolverEffort& effort, StepRecord& record) const;
     /// Whether fixed steps are divided by their error.
     [[nodiscard]] bool has_limit() const { return control_ && !settings_.chosen; }
 
@@ -97,6 +96,10 @@ private:
     void step_within_error(AdaptiveStepping& control, State& state, double end, StepSolver& solver,
                            AdaptiveStepReport& report, double most_work = HUGE_VAL);
     [[nodiscard]] double work_of(const StepReport& report, std::int64_t iterations) const;
+    /// What positions may err by a second, as a share of the size of what moves and in rad: AdaptiveStepReport::error
+    /// is over it. NaN where nobody says so: the method follows a limit of its own, or a tolerance, or is of high
+    /// order.
+    [[nodiscard]] double allowed() const;
     /// What a step of size h errs by, over what is allowed; NaN where it is not known.
     [[nodiscard]] double error_of(const StepReport& report, double h) const;
     void refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
