@@ -225,7 +225,7 @@ public:
     }
 
 private:
-    Motion motion(const Json& scene, RunOrder order) const {
+    Motion motion(const Json& scene, const RunOrder& order) const {
         if (order_.still_alive) order_.still_alive();
         return run(scene, registry_, order);
     }

@@ -288,10 +288,12 @@ void ThetaMethod::remember_change(const Vector& result, double h) {
 //
 // Where a force sets in or ends within the step accelerations jump, and this is the order of what the step errs by; so
 // it is at an impact without restitution, by what follows it in the step. Bounces have their own time, and steps are
-// cut between them. Contacts that let go in a step change nothing yet.
+// cut between them. Contacts that let go in a step change nothing yet. What a much shorter step before says of
+// accelerations is what its solve left.
 void ThetaMethod::report_error(double h, StepReport& report) {
     const auto n = static_cast<std::size_t>(n_);
-    const bool met = report.impact_speed > 0.0, before = last_h_ > 0.0 && !acceleration_.empty();
+    constexpr double short_share = 1e-3;
+    const bool before = last_h_ >= short_share * h && !acceleration_.empty(), met = report.impact_speed > 0.0;
     const bool known = before || met;  // beside the jump of an impact the acceleration before it is small
     if (!before) acceleration_.assign(n, 0.0);
     if (known) report.error.assign(n, 0.0);

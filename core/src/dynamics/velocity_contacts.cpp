@@ -519,16 +519,12 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
     }
 }
 
-// With the mean forces F of the step and F₋ of the one before, of size h₋, a force changes at the rate r = 2 (F −
-// F₋)/(h
-// + h₋), and is F + ½ h r at the end. Where that is negative nothing pulls in its place: the step takes E²/(2 |r|) too
-// little of impulse with E = −F − ½ h r, and so gives a speed that is wrong for as long as the motion goes on: it
-// counts as if it were wrong over all of the step. What much shorter a step before says of forces is what its solve
-// left.
+// With the mean forces F of the step and F₋ of the one before, of size h₋, a force changes at the rate
+// r = 2 (F − F₋)/(h + h₋), and is F + ½ h r at the end. Where that is negative nothing pulls in its place: the step
+// takes E²/(2 |r|) too little of impulse with E = −F − ½ h r, and so gives a speed that is wrong for as long as the
+// motion goes on: it counts as if it were wrong over all of the step.
 void VelocityContacts::add_release_error(const Problem& problem, const Solution& solution, double last_h,
                                          std::vector<double>& error) const {
-    constexpr double short_share = 0.1;
-    if (last_h < short_share * h_) return;
     const auto& D = problem.D;
     for (const Contact& contact : contacts_) {
         const std::size_t row = first_row_ + contact.row;

@@ -258,6 +258,7 @@ void Stepping::take_refined(State& state, StepSolver& solver, AdaptiveStepReport
     report.error = 0.0;
     const std::int64_t before = solver.effort().iterations;
     step_within_error(*refined_, state, end, solver, report, work_);
+    if (!report.step.solved) throw StepFailure("solves of the substeps missed their tolerance");
     report.refined = true;
     work_ -= work_of(report.step, solver.effort().iterations - before);
     if (state.t < end) {
