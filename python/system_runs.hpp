@@ -8,7 +8,6 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -26,8 +25,8 @@
 #include "guards.hpp"
 #include "python_system.hpp"
 #include "scenes.hpp"
+#include "simulation/run_step.hpp"
 #include "simulation/stepping.hpp"
-#include "support/finite.hpp"
 
 namespace delassus::python {
 
@@ -46,7 +45,7 @@ public:
         SolverConfig named = set_.solver;
         if (named.name.empty()) named.name = "auto";
         check_solver(*registry_, named);
-        state_ = system_.initial_state();
+        now_.state = system_.initial_state();
         SteppingSettings steps{
             .step = set_.step,
             .end = set_.end,
@@ -60,7 +59,7 @@ public:
         };
         stepping_ = std::make_unique<Stepping>(
             system_, make_timestepper(set_.integrator, system_, set_.integrator_options), std::move(steps));
-        measure(state_, record_);
+        measure(now_.state, record_);
     }
 
     /// What look(run) returns, a value.
@@ -89,60 +88,40 @@ public:
         return record;
     }
 
-    [[nodiscard]] bool finished() const { return stepping_->ends(state_.t); }
-    [[nodiscard]] const State& state() const { return state_; }
+    [[nodiscard]] bool finished() const { return stepping_->ends(now_.state.t); }
+    [[nodiscard]] const State& state() const { return now_.state; }
     [[nodiscard]] const StepRecord& record() const { return record_; }
-    [[nodiscard]] const StepReport& report() const { return report_; }
+    [[nodiscard]] const StepReport& report() const { return report_.step; }
     [[nodiscard]] const std::string& integrator() const { return set_.integrator; }
     [[nodiscard]] std::vector<std::string> warnings() const {
-        if (unsolved_ == 0) return {};
-        return {fmt::format("{} of {} steps rest on a solve that missed its tolerance; the first: {}", unsolved_,
-                            record_.step, first_unsolved_)};
+        if (now_.totals.unsolved_steps == 0) return {};
+        return {fmt::format("{} of {} steps rest on a solve that missed its tolerance; the first: {}",
+                            now_.totals.unsolved_steps, now_.step, now_.totals.first_unsolved)};
     }
 
 private:
+    /// The system does not say what momentum is.
+    class Step : public RunStep {
+    public:
+        explicit Step(SystemRun& run)
+            : RunStep({run.stepping_, *run.solver_, run.now_, run.record_, run.report_, run.memory_}), system_(run) {}
+
+    private:
+        void measure(State& state, const AdaptiveStepReport&, StepRecord& record) override {
+            system_.measure(state, record);
+        }
+        SystemRun& system_;
+    };
+
     const StepRecord& take_step() {
         if (finished())
             throw InputError(
                 fmt::format("the simulation has reached its end, {} s: there is no further step", set_.end));
-        const auto begin = std::chrono::steady_clock::now();
-        const auto where = [&] { return fmt::format("step {} from t = {:.9g} s", record_.step + 1, state_.t); };
-        State next = state_;
-        StepRecord record;
-        AdaptiveStepReport taken;
-        solver_->reset_effort();
-        try {
-            stepping_->advance(next, *solver_, taken);
-            if (!all_finite(next.q) || !all_finite(next.v))
-                throw StepFailure("the state at the end of the step is not finite");
-            measure(next, record);
-        } catch (const Unsupported& error) {
-            stepping_->undo();
-            throw Unsupported(fmt::format("{}: {}", where(), error.what()));
-        } catch (const StepInterrupted&) {
-            stepping_->undo();
-            throw;
-        } catch (const StepFailure& error) {
-            stepping_->undo();
-            throw StepFailure(fmt::format("{}: {}", where(), error.what()));
-        } catch (const InputError& error) {
-            stepping_->undo();
-            throw StepFailure(fmt::format("{}: {}", where(), error.what()));
-        } catch (...) {  // of the user's methods
-            stepping_->undo();
-            throw;
-        }
-        record.step = record_.step + 1;
-        stepping_->describe(taken, solver_->effort(), record);
-        record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-        if (!record.solved && ++unsolved_ == 1) first_unsolved_ = fmt::format("{}: {}", where(), taken.step.message);
-        record_ = record;
-        state_ = std::move(next);
-        report_ = std::move(taken.step);
+        Step(*this).take();
         return record_;
     }
 
-    /// record ← what is known of a state. The system does not say what momentum is.
+    /// record ← what is known of a state; those values are still 0.
     void measure(const State& state, StepRecord& record) {
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
         record.t = state.t;
@@ -168,14 +147,12 @@ private:
     const SceneSystem& set_;
     PythonSystem system_;
     Turn turn_;
-    State state_;
     std::unique_ptr<StepSolver> solver_;
     std::unique_ptr<Stepping> stepping_;
+    SimulationState now_;
     StepRecord record_;
-    StepReport report_;  // of the last step
+    AdaptiveStepReport report_, memory_;  // of the last step, and for the next
     UnilateralRows rows_;
-    std::int64_t unsolved_ = 0;
-    std::string first_unsolved_;
 };
 
 /// The unilateral blocks of the last step.

@@ -232,16 +232,15 @@ public:
     DELASSUS_API void load(SimulationState state);
 
 private:
-    /// record_ ← what is known of a state of the bodies after so many steps.
-    void measure(const State& state, std::int64_t step);
+    class Step;
+    /// record ← what is known of a state of the bodies; those values are still 0.
+    void measure(const State& state, StepRecord& record);
     /// What the timestepper steps.
     [[nodiscard]] DynamicalSystem& dynamics();
     /// The bodies at a state of dynamics(); `memory` holds them where the coordinates are others.
     [[nodiscard]] const State& bodies_at(const State& state, State& memory) const;
     /// totals ← with the energy and the drift in record_ after a step. Throws StepFailure where they are beyond limits.
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
-    /// state ← the next one that is shown.
-    void advance(State& state, AdaptiveStepReport& report);
     /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
     void add_unilateral_forces(std::vector<double>& force) const;
     /// Which bodies touched in the last step, and joints that repeat others, as the end of a sentence; or empty.
@@ -285,7 +284,6 @@ private:
     std::unique_ptr<EnergyWatch> energy_;     // empty where the scene names the method, or processes share bodies
     std::unique_ptr<OverlapWatch> overlaps_;  // empty where bodies cannot touch, or processes share them
     bool restitutes_ = false;                 // MultibodySystem::restitutes()
-    std::string deep_;                        // of this step: what came to overlap whatever its substeps; or empty
     std::unique_ptr<SharedRun> shared_;       // empty where this process steps all bodies
     std::unique_ptr<Stepping> stepping_;
     std::vector<double> gathered_;  // the memory of the method for all bodies, after step gathered_at_

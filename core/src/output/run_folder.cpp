@@ -90,9 +90,10 @@ void RunFolder::open(const Scene& scene, std::optional<Checkpoint> resumed, cons
     std::vector<TrajectorySystem> systems;
     for (std::size_t i = 0; i < simulations_.size(); ++i) {
         const SceneSystem& system = scene.systems[i];
-        systems.push_back({system.name, system.integrator, system.solver.name, system.system->position_size(),
-                           system.system->n(), system.step, trajectory_model(system), contact_forces_,
-                           simulations_[i].record().step + 1, static_cast<std::int64_t>(frame_times_[i].size()),
+        systems.push_back({system.name, simulations_[i].method().integrator, system.solver.name,
+                           system.system->position_size(), system.system->n(), system.step, trajectory_model(system),
+                           contact_forces_, simulations_[i].record().step + 1,
+                           static_cast<std::int64_t>(frame_times_[i].size()),
                            resumed ? std::move(resumed->systems[i].written) : std::vector<std::uint64_t>{}});
         series_.emplace_back(folder_.path() / "vtk", system.name, *system.system);
     }

@@ -91,7 +91,7 @@ std::string run_report_json(const std::string& scene, const Scene& read, std::ve
         const auto* joints = simulation.joint_coordinates();
         const std::int32_t of_trees = joints ? joints->rows_saved() : 0;
         Json one = {{"name", system.name},
-                    {"integrator", system.integrator},
+                    {"integrator", simulation.method().integrator},
                     {"solver_chosen", system.solver.name.empty() ? Json(nullptr) : Json(system.solver.name)},
                     {"solvers_loaded", simulation.solver().loaded()},
                     {"velocities", velocities},

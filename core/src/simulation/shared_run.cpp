@@ -46,9 +46,10 @@ std::string SharedRun::obstacle(const SceneSystem& system) {
     return {};
 }
 
-SharedRun::SharedRun(SceneSystem& system, std::shared_ptr<const Communicator> communicator, const Registry& registry,
-                     StepSolver& solver)
+SharedRun::SharedRun(SceneSystem& system, SteppingMethod method, std::shared_ptr<const Communicator> communicator,
+                     const Registry& registry, StepSolver& solver)
     : system_(system),
+      method_(std::move(method)),
       communicator_(std::move(communicator)),
       steps_(communicator_, registry, solver.config()),
       domains_(system),
@@ -146,7 +147,7 @@ void SharedRun::share_out(const State& whole, double h, std::unique_ptr<Timestep
     // What one process alone cannot do ends the step on all.
     steps_.step([&] {
         part_ = part_of_system(system_, bodies, touched);
-        timestepper = make_timestepper(system_.integrator, *part_.system, system_.integrator_options);
+        timestepper = make_timestepper(method_.integrator, *part_.system, method_.options);
         if (!has_begin_) return;
         StepMemory own;
         own.numbers = begin_.numbers;

@@ -29,8 +29,8 @@ public:
 
     /// system and registry outlive this; solver takes the scene's configuration from there and is told of this.
     /// Collective.
-    SharedRun(SceneSystem& system, std::shared_ptr<const Communicator> communicator, const Registry& registry,
-              StepSolver& solver);
+    SharedRun(SceneSystem& system, SteppingMethod method, std::shared_ptr<const Communicator> communicator,
+              const Registry& registry, StepSolver& solver);
     ~SharedRun();
 
     /// Before a step of size h: shares the bodies out anew where ghosts may be too few by its end, or where the
@@ -73,6 +73,7 @@ private:
     void complete(StepReport& report, double h);
 
     SceneSystem& system_;
+    SteppingMethod method_;
     std::shared_ptr<const Communicator> communicator_;
     SharedSteps steps_;
     Domains domains_;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -16,22 +15,19 @@
 #include "simulation/energy_guard.hpp"
 #include "simulation/method_change.hpp"
 #include "simulation/overlap_watch.hpp"
+#include "simulation/run_step.hpp"
 #include "simulation/shared_run.hpp"
 #include "simulation/sleeping.hpp"
-#include "simulation/step_columns.hpp"
 #include "simulation/stepping.hpp"
 #include "simulation/stops_at_start.hpp"
 #include "simulation/touching.hpp"
 #include "simulation/watched_step.hpp"
 #include "solver/auto_solver.hpp"
-#include "support/finite.hpp"
 #include "support/frames.hpp"
 #include "support/trace.hpp"
 
 namespace delassus {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Throws Unsupported if the system's timestepper solves for more than the velocities of one step.
 void require_sleeping(const SceneSystem& system) {
@@ -96,15 +92,14 @@ bool shares_bodies(const SceneSystem& system, const Registry& registry) {
     return can_be_shared(system.integrator) || system.system->has_unilateral();
 }
 
-/// Where bodies are shared and the scene does not name its method, one that can be shared.
-void choose_method_to_share(SceneSystem& system, const Registry& registry) {
-    if (!shares_bodies(system, registry)) return;
-    if (system.division != StepDivision::ToAccuracy) system.division = StepDivision::None;
-    if (can_be_shared(system.integrator) || system.method_reason.empty()) return;
-    system.method_reason = fmt::format("several processes cannot share {}", system.integrator);
-    system.integrator = methods_to_share().front();
-    system.integrator_options.clear();
-    if (system.coordinates_chosen) system.coordinates = Coordinates::Maximal;
+/// Where bodies are shared: the scene's method, or one that can be shared where the scene names none.
+SteppingMethod method_to_share(const SceneSystem& system) {
+    if (can_be_shared(system.integrator) || system.method_reason.empty())
+        return {system.integrator, system.integrator_options, system.coordinates,
+                system.division == StepDivision::ToAccuracy};
+    return {.integrator = methods_to_share().front(),
+            .options = {},
+            .coordinates = system.coordinates_chosen ? Coordinates::Maximal : system.coordinates};
 }
 
 /// Of the energy that can have moved: a change that a plot would show.
@@ -124,9 +119,9 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     now_.inputs = system.inputs.at_start();
     system.inputs.load(now_.inputs);
     if (!system.leave_out) solver_->leave_nothing_out();
-    choose_method_to_share(system, registry);
     methods_ = methods_of(system);
-    const bool in_joints = system.coordinates == Coordinates::Joint;
+    if (shares_bodies(system, registry)) methods_ = {method_to_share(system)};
+    const bool in_joints = method().coordinates == Coordinates::Joint;
     const auto with_name = [&](const auto& make) {
         try {
             make();
@@ -180,7 +175,7 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
     if (!shared_ && system.system->size_of_shapes() > 0.0)
         overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy, bodies_at(now_.state, next_bodies_),
                                                    system.step);
-    measure(state(), now_.step);
+    measure(state(), record_);
     now_.totals.start_energy = now_.totals.lowest = now_.totals.energy = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
     now_.totals.worst_drift = record_.drift;
@@ -203,15 +198,15 @@ void Simulation::share(const Registry& registry) {
                         "process",
                         system_->solver.name, fmt::join(solvers_in_parts(registry), ", ")));
     }
-    if (!can_be_shared(system_->integrator))
-        refuse(fmt::format("with the integrator {}", system_->integrator),
+    if (!can_be_shared(method().integrator))
+        refuse(fmt::format("with the integrator {}", method().integrator),
                fmt::format("name {}, or ", fmt::join(methods_to_share(), " or ")));
-    if (system_->coordinates == Coordinates::Joint) refuse("in joint coordinates", "remove \"coordinates\", or ");
+    if (method().coordinates == Coordinates::Joint) refuse("in joint coordinates", "remove \"coordinates\", or ");
     if (system_->sleeping) refuse("in which bodies sleep", "remove \"sleeping\", or ");
     if (system_->control) refuse("with steps chosen by a tolerance", "give a fixed \"step\", or ");
     if (method().by_accuracy) refuse("with steps that follow from an accuracy", "remove \"accuracy\", or ");
     if (!system_->leave_out) refuse("of which nothing is left out", "");
-    shared_ = std::make_unique<SharedRun>(*system_, communicator_of_run(), registry, *solver_);
+    shared_ = std::make_unique<SharedRun>(*system_, method(), communicator_of_run(), registry, *solver_);
 }
 
 DynamicalSystem& Simulation::dynamics() {
@@ -281,19 +276,17 @@ bool Simulation::finished() const {
     return stepping_->ends(now_.state.t);
 }
 
-void Simulation::measure(const State& state, std::int64_t step) {
+void Simulation::measure(const State& state, StepRecord& record) {
     const MultibodySystem& mechanics = *system_->system;
-    record_.step = step;
-    record_.t = state.t;
-    record_.energy = mechanics.energy(state);
-    record_.kinetic = mechanics.kinetic_energy(state);
+    record.t = state.t;
+    record.energy = mechanics.energy(state);
+    record.kinetic = mechanics.kinetic_energy(state);
     const auto momentum = mechanics.momentum(state);
-    record_.momentum = momentum[0];
-    record_.angular_momentum = momentum[1];
+    record.momentum = momentum[0];
+    record.angular_momentum = momentum[1];
     if (!constraint_.empty()) mechanics.all_constraints(state, constraint_.data());
-    record_.drift = 0.0;
-    for (const double C : constraint_) record_.drift = std::max(record_.drift, std::abs(C));
-    record_.sleeping = sleeping_ ? sleeping_->count() : 0;
+    for (const double C : constraint_) record.drift = std::max(record.drift, std::abs(C));
+    record.sleeping = sleeping_ ? sleeping_->count() : 0;
 }
 
 void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const {
@@ -327,118 +320,80 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
             totals.start_energy, record_.energy, scale, taken.h, method().integrator, limits.energy_growth));
 }
 
-void Simulation::advance(State& state, AdaptiveStepReport& report) {
-    if (sleeping_) sleeping_->begin_step(stepping_->next(state.t).h);
-    WatchedStep watch(*system_->system, joint_.get(), *solver_, {overlaps_.get(), energy_.get(), &now_.totals},
-                      !restitutes_, next_bodies_);
-    stepping_->advance(state, *solver_, report, &watch);
-    deep_ = watch.deep();
-    if (sleeping_) sleeping_->end_step(now_.state, state);
-}
+// What a step of a scene has beside that of any system.
+class Simulation::Step : public RunStep {
+public:
+    explicit Step(Simulation& run)
+        : RunStep({run.stepping_, *run.solver_, run.now_, run.record_, run.report_, run.next_report_}), all_(run) {
+        if (all_.sleeping_) sleeping_ = all_.sleeping_->save();
+    }
+
+private:
+    void prepare(State& state) override {
+        LookAhead* ahead = run_.stepping->ahead();
+        if (!ahead) {
+            all_.renew_rows(state, run_.now.step);
+        } else if (!ahead->reaches(run_.stepping->next(state.t).end)) {
+            all_.renew_rows_ahead();
+        }
+        if (all_.shared_) all_.shared_->prepare(state, run_.stepping->next(state.t).h, run_.stepping->timestepper());
+    }
+
+    void advance(State& state, AdaptiveStepReport& report) override {
+        if (all_.sleeping_) all_.sleeping_->begin_step(run_.stepping->next(state.t).h);
+        WatchedStep watch(*all_.system_->system, all_.joint_.get(), run_.solver,
+                          {all_.overlaps_.get(), all_.energy_.get(), &run_.now.totals}, !all_.restitutes_,
+                          all_.next_bodies_);
+        run_.stepping->advance(state, run_.solver, report, &watch);
+        deep_ = watch.deep();
+        if (all_.sleeping_) all_.sleeping_->end_step(run_.now.state, state);
+    }
+
+    void measure(State& state, const AdaptiveStepReport& report, StepRecord& record) override {
+        if (!run_.stepping->ahead()) all_.settle_turns(state);
+        all_.measure(all_.bodies_at(state, all_.next_bodies_), record);
+        for (const auto& contact : report.step.contacts)
+            record.penetration = std::max(record.penetration, -contact.gap);
+        if (all_.shared_) record.penetration = all_.shared_->penetration();
+    }
+
+    void judge(const StepRecord&, const AdaptiveStepReport& report, SimulationTotals& totals) override {
+        all_.judge(report, totals);
+    }
+
+    void count(const std::string& place, SimulationTotals& totals) override {
+        std::swap(all_.bodies_, all_.next_bodies_);
+        if (!deep_.empty()) {
+            ++totals.deep_steps;
+            if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
+        }
+        const std::int64_t inverted = all_.system_->system->inverted_solids(all_.state());
+        totals.most_inverted = std::max(totals.most_inverted, inverted);
+        if (inverted > 0 && totals.first_inverted.empty()) totals.first_inverted = place;
+    }
+
+    void undo() override {
+        if (all_.sleeping_) all_.sleeping_->load(sleeping_);
+    }
+    [[nodiscard]] std::string what_acts() const override { return all_.what_acts(); }
+    bool go_on(const std::string& failure) override { return all_.go_on(failure); }
+    [[nodiscard]] std::string name() const override { return fmt::format("system \"{}\", ", all_.system_->name); }
+
+    Simulation& all_;
+    std::vector<double> sleeping_;  // Sleeping::save() before the step
+    std::string deep_;              // what came to overlap whatever its substeps; or empty
+};
 
 const StepRecord& Simulation::step() {
-    const auto begin = Clock::now();
     TraceSpan span("step", "step");
     span.say("system", system_->name);
     span.say("number", static_cast<double>(now_.step + 1));
     span.say("t", now_.state.t);
-    const auto where = [&] {
-        return fmt::format("system \"{}\", step {} from t = {:.9g} s", system_->name, now_.step + 1, now_.state.t);
-    };
     if (joint_ && now_.totals.growth_share > visible_share)
         go_on(fmt::format("the energy rose by {:.3g} J, {:.2g} % of what can have moved, though nothing supplies any",
                           now_.totals.growth, 100.0 * now_.totals.growth_share));
     notice_changes();
-    State next = now_.state;
-    try {
-        if (!stepping_->ahead()) {
-            renew_rows(next, now_.step);
-        } else if (!stepping_->ahead()->reaches(stepping_->next(next.t).end)) {
-            renew_rows_ahead();
-        }
-        if (shared_) shared_->prepare(next, stepping_->next(next.t).h, stepping_->timestepper());
-    } catch (const StepFailure& error) {
-        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
-    }
-    const std::vector<double> sleeping = sleeping_ ? sleeping_->save() : std::vector<double>{};
-    AdaptiveStepReport& taken = next_report_;
-    SimulationTotals judged = now_.totals;
-    const StepRecord last = record_;
-    solver_->reset_effort();
-    const auto undo = [&] {
-        record_ = last;
-        stepping_->undo();
-        if (sleeping_) sleeping_->load(sleeping);
-    };
-    try {
-        advance(next, taken);
-        if (!all_finite(next.q) || !all_finite(next.v))
-            throw StepFailure("the state at the end of the step is not finite");
-        if (!stepping_->ahead()) settle_turns(next);
-        measure(bodies_at(next, next_bodies_), now_.step + 1);
-        record_.penetration = 0.0;
-        for (const auto& contact : taken.step.contacts)
-            record_.penetration = std::max(record_.penetration, -contact.gap);
-        if (shared_) record_.penetration = shared_->penetration();
-        judge(taken, judged);
-    } catch (const Unsupported& error) {
-        undo();
-        throw Unsupported(fmt::format("{}: {}", where(), error.what()));
-    } catch (const InputError& error) {
-        undo();
-        throw StepFailure(fmt::format("{}: {}", where(), error.what()));
-    } catch (const StepInterrupted& error) {
-        undo();
-        throw StepInterrupted(fmt::format("{}: {}", where(), error.what()));
-    } catch (const StepFailure& error) {
-        undo();
-        const std::string sentence = fmt::format("{}{}", error.what(), what_acts());
-        if (go_on(sentence)) return step();
-        throw StepFailure(fmt::format("{}: {}", where(), sentence));
-    }
-    const StepReport& report = taken.step;
-    const std::string place = where();
-    now_.state = std::move(next);
-    std::swap(bodies_, next_bodies_);
-    now_.totals = std::move(judged);
-    ++now_.step;
-
-    const SolverEffort& effort = solver_->effort();
-    stepping_->describe(taken, effort, record_);
-    record_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-
-    auto& totals = now_.totals;
-    add_step(record_, totals);
-    if (taken.refined) {
-        ++totals.refined_steps;
-    } else if (record_.substeps > 1) {
-        ++totals.divided_steps;
-        totals.most_substeps = std::max(totals.most_substeps, record_.substeps);
-    }
-    if (!taken.impact) {
-        totals.smallest_step = totals.largest_step == 0.0 ? taken.h : std::min(totals.smallest_step, taken.h);
-        totals.largest_step = std::max(totals.largest_step, taken.h);
-    }
-    totals.plugin_solves += effort.plugin_solves;
-    totals.resting_parts += effort.resting_parts;
-    totals.repeated_solves += effort.repeated;
-    totals.failed_solves += effort.failed;
-    if (totals.first_failure.empty()) totals.first_failure = effort.failure;
-    totals.near_goal_solves += effort.near_goal;
-    totals.solver_seconds += effort.seconds;
-    if (taken.error > 1.0 && std::isfinite(record_.error)) ++totals.inexact_steps;
-    if (!deep_.empty()) {
-        ++totals.deep_steps;
-        if (totals.first_deep.empty()) totals.first_deep = fmt::format("{}: {}", place, deep_);
-    }
-    const std::int64_t inverted = system_->system->inverted_solids(state());
-    totals.most_inverted = std::max(totals.most_inverted, inverted);
-    if (inverted > 0 && totals.first_inverted.empty()) totals.first_inverted = place;
-    if (!report.solved) {
-        ++totals.unsolved_steps;
-        if (totals.first_unsolved.empty()) totals.first_unsolved = fmt::format("{}: {}", place, report.message);
-    }
-    std::swap(report_, next_report_);
+    Step(*this).take();
     return record_;
 }
 
@@ -593,9 +548,10 @@ std::vector<std::string> Simulation::warnings() const {
                         "parts of them did "
                         "not help; the first: {}",
                         totals.deep_steps, now_.step, totals.first_deep));
-    if (shared_ && !system_->method_reason.empty() && system_->method_reason.find("several processes") == 0)
-        sentences.push_back(fmt::format("system \"{}\": {}; {} took its place, which is less exact", system_->name,
-                                        system_->method_reason, method().integrator));
+    if (shared_ && method().integrator != system_->integrator)
+        sentences.push_back(
+            fmt::format("system \"{}\": several processes cannot share {}; {} took its place, which is less exact",
+                        system_->name, system_->integrator, method().integrator));
     if (equilibrium_ && equilibrium_->smallest_eigenvalue < 0.0)
         sentences.push_back(fmt::format(
             "system \"{}\": the equilibrium in which the run begins is unstable (smallest eigenvalue {:.3g} "
@@ -701,8 +657,9 @@ void Simulation::load(SimulationState state) {
     now_.sleeping.clear();
     now_.overlapping.clear();
     record_ = {};
+    record_.step = now_.step;
     report_ = {};
-    measure(this->state(), now_.step);
+    measure(this->state(), record_);
 }
 
 }  // namespace delassus
