@@ -10,10 +10,10 @@
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
-#include "dynamics/step_error.hpp"
 #include "dynamics/step_memory.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
+#include "dynamics/velocity_error.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -80,17 +80,17 @@ public:
         multipliers_.clear();
         kept_.clear();
         last_h_ = 0.0;
-        error_.forget();
+        velocity_error_.forget();
         resolution_.forget();
         left_.clear();
     }
-    void forces_jumped() override { error_.forget(); }
+    void forces_jumped() override { velocity_error_.forget(); }
 
     // h; the errors of the last steps' velocities and the errors that solves left; the multipliers.
     StepMemory memory() const override {
         StepMemory memory;
         memory.numbers = {last_h_};
-        for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
+        for (auto& values : velocity_error_.save()) memory.of_columns.push_back(std::move(values));
         memory.of_columns.push_back(resolution_.left());
         memory.of_columns.push_back(left_);
         memory.of_rows = {multipliers_};
@@ -100,9 +100,9 @@ public:
     void set_memory(StepMemory&& memory) override {
         restart();
         last_h_ = memory.numbers.at(0);
-        error_.load(std::span(memory.of_columns).first(error_.kept()));
-        resolution_.load(std::move(memory.of_columns.at(error_.kept())));
-        left_ = std::move(memory.of_columns.at(error_.kept() + 1));
+        velocity_error_.load(std::span(memory.of_columns).first(velocity_error_.kept()));
+        resolution_.load(std::move(memory.of_columns.at(velocity_error_.kept())));
+        left_ = std::move(memory.of_columns.at(velocity_error_.kept() + 1));
         multipliers_ = std::move(memory.of_rows.at(0));
         kept_ = std::move(memory.impulses);
     }
@@ -128,8 +128,9 @@ private:
         coulomb_ = solver.law() == Law::Coulomb;
         assemble_unilateral(state, h);
 
-        const StepRequest request{
-            .warm_start = true, .method_error = estimated_error(state), .error_of_solves = error_.of_solver()};
+        const StepRequest request{.warm_start = true,
+                                  .method_error = note_velocity_error(state),
+                                  .error_of_solves = velocity_error_.of_solver()};
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
@@ -144,7 +145,7 @@ private:
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
         require_finite(state, end_, h, "euler_implicit_linearized");
-        report_error(state, h, report);
+        report_position_error(state, h, report);
         if (linearization_.wanted()) judge_linearization(state, h, solver, report);
         report_reactions(solution_.lambda, h, report);
         keep(solution_.lambda, h);
@@ -155,17 +156,17 @@ private:
 
     // A step errs in positions by ½ h² q̈ (Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, sec.
     // II.1).
-    void report_error(const State& begin, double h, StepReport& report) const {
+    void report_position_error(const State& begin, double h, StepReport& report) const {
         report.error.resize(static_cast<std::size_t>(n_));
         for (std::size_t i = 0; i < report.error.size(); ++i)
             report.error[i] = 0.5 * h * std::abs(end_.v[i] - begin.v[i]);
     }
 
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
-    std::span<const double> estimated_error(const State& state) {
+    std::span<const double> note_velocity_error(const State& state) {
         if (follows_sliding_) return {};
-        error_.note(state.v, left_);
-        return error_.known();
+        velocity_error_.note(state.v, left_);
+        return velocity_error_.known();
     }
 
     void note_left(const StepAnswer& answer) {
@@ -466,7 +467,7 @@ private:
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;
     std::vector<double> delta_, impulse_, force_;
-    StepError error_{1};
+    VelocityError velocity_error_{1};
     std::vector<double> left_;  ///< what the last solve left, in the norm of the masses, n, or empty
     double last_h_ = 0.0;
     KeptImpulses kept_;

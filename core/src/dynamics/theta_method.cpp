@@ -65,7 +65,8 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
       cones_(free_cones(system)),
       n_(system.n()),
       m_(system.m()),
-      error_(order()) {
+      velocity_error_(order()),
+      position_error_(theta_) {
     std::int32_t next = 0;
     for (const std::int32_t first : system.vectors()) {
         for (; next < first; ++next) vectors_.push_back({next, 1});
@@ -92,8 +93,8 @@ void ThetaMethod::restart() {
     contacts_.restart();
     for (auto& change : changes_) change.clear();
     struck_.clear();
-    acceleration_.clear();
-    error_.forget();
+    position_error_.forget();
+    velocity_error_.forget();
     left_.clear();
     last_h_ = 0.0;
 }
@@ -101,8 +102,8 @@ void ThetaMethod::restart() {
 void ThetaMethod::forces_jumped() {
     for (auto& change : changes_) change.clear();
     struck_.clear();
-    acceleration_.clear();
-    error_.forget();
+    position_error_.forget();
+    velocity_error_.forget();
 }
 
 // h; the changes of the last steps, their errors, what the last solve left, what an impact changed, and accelerations;
@@ -111,11 +112,11 @@ StepMemory ThetaMethod::memory() const {
     StepMemory memory;
     memory.numbers = {last_h_, longest_h_};
     memory.of_columns.assign(changes_.begin(), changes_.end());
-    for (auto& values : error_.save()) memory.of_columns.push_back(std::move(values));
+    for (auto& values : velocity_error_.save()) memory.of_columns.push_back(std::move(values));
     memory.of_columns.push_back(left_);
     memory.of_columns.push_back(struck_);
     memory.of_columns.push_back(contacts_.resolution().left());
-    memory.of_columns.push_back(acceleration_);
+    memory.of_columns.push_back(position_error_.acceleration());
     memory.of_rows = {multipliers_};
     memory.impulses = contacts_.kept();
     return memory;
@@ -126,12 +127,12 @@ void ThetaMethod::set_memory(StepMemory&& memory) {
     last_h_ = memory.numbers.at(0);
     if (memory.numbers.at(1) > longest_h_) resolve_up_to(memory.numbers.at(1));
     for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] = std::move(memory.of_columns.at(k));
-    error_.load(std::span(memory.of_columns).subspan(changes_.size(), error_.kept()));
-    const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + error_.kept());
+    velocity_error_.load(std::span(memory.of_columns).subspan(changes_.size(), velocity_error_.kept()));
+    const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + velocity_error_.kept());
     left_ = std::move(rest[0]);
     struck_ = std::move(rest[1]);
     contacts_.resolution().load(std::move(rest[2]));
-    acceleration_ = std::move(rest[3]);
+    position_error_.load(std::move(rest[3]));
     multipliers_ = std::move(memory.of_rows.at(0));
     contacts_.keep(std::move(memory.impulses));
 }
@@ -147,7 +148,7 @@ void ThetaMethod::load(const std::vector<double>& memory) {
 
 void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepReport& report) {
     require_step(system_, state, h, settings_.name);
-    note_error(state, h);
+    note_velocity_error(state, h);
     find_spins(state, h);
     timed_ = false;
     if (settings_.linearly_implicit) extrapolate(h);
@@ -180,7 +181,9 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;
     contacts_.finish(solution_.lambda, report);
-    report_error(h, report);
+    result_ -= free_;
+    if (position_error_.note({h, last_h_, result_, struck_, timed_, contacts_.all_bounce()}, report))
+        contacts_.add_release_error(problem_, solution_, last_h_, report.error);
     last_h_ = h;
     std::swap(state, end_);
     report.multipliers = multipliers_;
@@ -276,39 +279,6 @@ void ThetaMethod::remember_change(const Vector& result, double h) {
         if (!before.empty()) before[k] = last[k];
         last[k] = (result[i] - free_[i]) / h;
     }
-}
-
-// ---- What a step errs by ----
-//
-// A step of the trapezoidal rule errs in positions by h³ q‴/12, and one of θ > ½ by (θ − ½) h² q̈ more (Hairer, Nørsett,
-// Wanner, Solving Ordinary Differential Equations I, sec. III.2). With the mean accelerations a of the step and a₋ of
-// the one before, of size h₋, besides free spins, q‴ is 2 (a − a₋)/(h + h₋):
-//
-//     error ≈ h³ |a − a₋| / (6 (h + h₋)) + (θ − ½) h² |a|
-//
-// Where a force sets in or ends within the step accelerations jump, and this is the order of what the step errs by; so
-// it is at an impact without restitution, by what follows it in the step. Bounces have their own time, and steps are
-// cut between them. Contacts that let go in a step change nothing yet. What a much shorter step before says of
-// accelerations is what its solve left.
-void ThetaMethod::report_error(double h, StepReport& report) {
-    const auto n = static_cast<std::size_t>(n_);
-    constexpr double short_share = 1e-3;
-    const bool before = last_h_ >= short_share * h && !acceleration_.empty(), met = report.impact_speed > 0.0;
-    const bool known = before || met;  // beside the jump of an impact the acceleration before it is small
-    if (!before) acceleration_.assign(n, 0.0);
-    if (known) report.error.assign(n, 0.0);
-    for (std::size_t i = 0; i < n; ++i) {
-        const double jump = timed_ && contacts_.all_bounce() ? struck_[i] : 0.0;
-        const auto k = static_cast<std::int32_t>(i);
-        const double change = (1.0 - jump) * (result_[k] - free_[k]);
-        if (known)
-            report.error[i] =
-                h * h * std::abs(change - (1.0 - jump) * h * acceleration_[i]) / (6.0 * (h + (before ? last_h_ : h))) +
-                (theta_ - 0.5) * h * std::abs(change);
-        if (!before || struck_[i] <= mostly) acceleration_[i] = change / h;
-    }
-    if (before) contacts_.add_release_error(problem_, solution_, last_h_, report.error);
-    if (met && (!timed_ || !before)) acceleration_.clear();
 }
 
 /// What is stiff from now on, h being the longest step.
@@ -579,13 +549,13 @@ bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
 }
 
 // What the last steps of this size show. Where steps are chosen by their error, the solver must not disturb it.
-void ThetaMethod::note_error(const State& begin, double h) {
+void ThetaMethod::note_velocity_error(const State& begin, double h) {
     request_ = {.warm_start = true};
     if (chooses_steps_) return;
-    if (h != last_h_) error_.forget();
-    error_.note(begin.v, left_);
-    request_.method_error = error_.known();
-    request_.error_of_solves = error_.of_solver();
+    if (h != last_h_) velocity_error_.forget();
+    velocity_error_.note(begin.v, left_);
+    request_.method_error = velocity_error_.known();
+    request_.error_of_solves = velocity_error_.of_solver();
 }
 
 // The linear model of the last problem had h f = h f̃ − (H − M) (v⁺ − ṽ⁺).

@@ -12,11 +12,12 @@
 #include "delassus/timestepper.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
+#include "dynamics/position_error.hpp"
 #include "dynamics/position_projection.hpp"
-#include "dynamics/step_error.hpp"
 #include "dynamics/step_memory.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
+#include "dynamics/velocity_error.hpp"
 
 namespace delassus {
 
@@ -60,7 +61,6 @@ private:
     void move_late(double h);
     void mark_struck(bool struck);
     void remember_change(const Vector& result, double h);
-    void report_error(double h, StepReport& report);
     void resolve_up_to(double h);
     void assemble(const State& begin, double h, bool coulomb);
     void linearize(const State& begin, double h);
@@ -77,7 +77,7 @@ private:
     void time_turns(StepSolver& solver, StepReport& report);
     void time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
-    void note_error(const State& begin, double h);
+    void note_velocity_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
     void judge_constraints(const State& begin, double h);
     void judge_linearization(const State& begin, double h, const Vector& result, StepSolver& solver,
@@ -95,7 +95,8 @@ private:
     std::vector<Cone> cones_;
     std::int32_t n_, m_;
     double last_h_ = 0.0;
-    StepError error_;
+    VelocityError velocity_error_;
+    PositionError position_error_;
     StepRequest request_{.warm_start = true};
     std::vector<std::pair<std::int32_t, std::int32_t>> vectors_;  ///< first velocities and sizes, ascending
     std::vector<double> struck_;  ///< the share of impacts in the change of each velocity in the last step; n, or empty
@@ -113,7 +114,6 @@ private:
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
     /// implicit.
     std::array<std::vector<double>, 2> changes_;
-    std::vector<double> acceleration_;           // (v⁺ − v)/h of the last step, but for impacts; n, or empty
     bool timed_ = false;                         // whether contacts got the times of their meetings in this step
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end

@@ -11,10 +11,10 @@ namespace delassus {
 
 /// What the velocities of the last steps show of the error that a step makes in them, apart from what the solver left
 /// in them (docs/tolerance.md).
-class DELASSUS_API StepError {
+class DELASSUS_API VelocityError {
 public:
     /// Of a method of this order, 1 or 2, whose steps are of one size.
-    explicit StepError(int order);
+    explicit VelocityError(int order);
 
     /// Takes the velocities at the beginning of a step, and what the solve left that they are from: for each velocity,
     /// in the norm of the masses, the error of its island (StepAnswer::left_in_masses), or nothing where none was.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "dynamics/step_error.hpp"
+#include "dynamics/velocity_error.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,14 +16,14 @@ namespace delassus {
 // coefficients c_i = ±1, ∓2, ±1 or ±1, ∓3, ±3, ∓1. They have nothing to do with one another, so that their squares add
 // up. If that were taken for the method's error, one solve that ends far above its tolerance would loosen the
 // tolerances of the next, and so on.
-StepError::StepError(int order)
+VelocityError::VelocityError(int order)
     : constant_(order == 1 ? 0.5 : 1.0 / 12.0),
       coefficients_(order == 1 ? std::vector{1.0, 4.0, 1.0} : std::vector{1.0, 9.0, 9.0, 1.0}),
       differences_(static_cast<std::size_t>(order)),
       jumps_(static_cast<std::size_t>(order) + 2),
       left_(static_cast<std::size_t>(order) + 2) {}
 
-void StepError::note(const std::vector<double>& v, std::span<const double> left) {
+void VelocityError::note(const std::vector<double>& v, std::span<const double> left) {
     const std::size_t n = v.size();
     if (before_.empty()) {
         before_ = v;
@@ -48,13 +48,13 @@ void StepError::note(const std::vector<double>& v, std::span<const double> left)
     before_ = v;
 }
 
-void StepError::forget() {
+void VelocityError::forget() {
     for (auto* list : {&differences_, &jumps_, &left_})
         for (auto& part : *list) part.clear();
     for (auto* part : {&before_, &error_, &noise_}) part->clear();
 }
 
-std::vector<std::vector<double>> StepError::save() const {
+std::vector<std::vector<double>> VelocityError::save() const {
     std::vector<std::vector<double>> memory = {before_};
     memory.insert(memory.end(), differences_.begin(), differences_.end());
     memory.insert(memory.end(), jumps_.begin(), jumps_.end() - 1);
@@ -62,7 +62,7 @@ std::vector<std::vector<double>> StepError::save() const {
     return memory;
 }
 
-void StepError::load(std::span<std::vector<double>> memory) {
+void VelocityError::load(std::span<std::vector<double>> memory) {
     forget();
     const std::size_t n = memory[0].size();
     if (n == 0) return;
