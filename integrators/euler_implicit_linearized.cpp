@@ -375,7 +375,7 @@ private:
             const ContactPoint* contact = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
             const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
             for (std::int32_t i = 0; i < block.cone.rows; ++i) {
-                const auto& [gap, rate] = rows_.rows()[row + i];
+                const double gap = rows_.rows()[row + i].gap, rate = rows_.rows()[row + i].rate;
                 const double resolution = contact && i == 0 ? gap_resolution(m_ + row, h) : resolution_.least();
                 const double resolved = gap - std::clamp(gap, -resolution, resolution);
                 problem_.b[m_ + row + i] = rate + std::max(resolved / h, -recovery_speed_);
@@ -395,7 +395,7 @@ private:
 
     /// Restitution and De Saxcé's term in the first b of a contact, whose first row of D_A is `row`.
     void bounce(const UnilateralRows::Block& block, std::int32_t row, bool pushed, const State& state, double h) {
-        const auto& [gap, rate] = rows_.rows()[row];
+        const double gap = rows_.rows()[row].gap, rate = rows_.rows()[row].rate;
         double& b = problem_.b[m_ + row];
         const bool closes =
             block.restitution > 0.0 && block.speed < -restitution_speed_ && gap + h * block.speed <= 0.0;

@@ -85,6 +85,48 @@ TEST(TurnOfFriction, OnAShakingTableAddsUpToNoDrift) {
         }
 }
 
+// Friction acts against a velocity whose direction turns: a box slides across a slope as a point would.
+TEST(TurnOfFriction, OfASlideThatCurvesIsOfOrderTwo) {
+    const double mu = 0.3, along = 9.81 * std::sin(0.5), across = 9.81 * std::cos(0.5);
+    const auto last_place = [&](double step) {
+        Running run(parse_scene(
+            fmt::format(
+                "step: {}\nend: 0.9\ngravity: [{:.17g}, 0, {:.17g}]\nmaterials: {{m: {{friction: {}}}}}\nbodies:\n"
+                "- {{name: slope, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                "- {{name: b, mass: 2, position: [0, 0, 0.03], velocity: [-0.4, 1.3, 0], shapes: [{{box: {{size: [0.3, "
+                "0.2, 0.06]}}, material: m}}]}}\n",
+                step, along, -across, mu),
+            "test.yaml"));
+        run.finish();
+        return run.pose("b").position;
+    };
+    using Values = std::array<double, 4>;
+    const auto rate = [&](const Values& y) {
+        const double speed = std::hypot(y[2], y[3]), friction = mu * across / speed;
+        return Values{y[2], y[3], along - friction * y[2], -friction * y[3]};
+    };
+    Values y = {0.0, 0.0, -0.4, 1.3};
+    constexpr int parts = 20000;
+    for (int i = 0; i < parts; ++i) {
+        const double h = 0.9 / parts;
+        const Values first = rate(y);
+        Values middle = y;
+        for (std::size_t k = 0; k < 4; ++k) middle[k] += 0.5 * h * first[k];
+        const Values second = rate(middle);
+        for (std::size_t k = 0; k < 4; ++k) y[k] += h * second[k];
+    }
+    double last = 0.0;
+    for (const double step : {0.018, 0.009, 0.0045}) {
+        const auto place = last_place(step);
+        const double error = std::hypot(place[0] - y[0], place[1] - y[1]);
+        EXPECT_LT(error, 6.0 * step * step) << step;
+        if (last > 0.0) {
+            EXPECT_LT(error, 0.35 * last) << step;
+        }
+        last = error;
+    }
+}
+
 // What rides on a turntable does not slide: its sliding velocity is rounding, whose direction says nothing.
 TEST(TurnOfFriction, IsNoneWhereNothingSlides) {
     for (const double step : {1.0 / 60.0, 1.0 / 240.0}) {

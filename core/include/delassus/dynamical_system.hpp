@@ -77,7 +77,8 @@ public:
     /// One row of a block.
     struct Row {
         double gap = 0.0;   ///< position-level value Φ of the row, 0 for tangential and box rows
-        double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity
+        double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity; it may be its mean over the step
+        double rate_now = 0.0;  ///< that of a tangential row of a contact at the state itself
     };
 
     /// Keeps the memory for the next rows, and the velocities of measure_speeds_at().
@@ -96,9 +97,10 @@ public:
         put(column, std::span<const double, size>(values));
     }
     void entry(std::int32_t column, double value) { entries(column, {&value, 1}); }
-    void end_row(double gap = 0.0, double rate = 0.0) {
+    void end_row(double gap = 0.0, double rate = 0.0) { end_row(gap, rate, rate); }
+    void end_row(double gap, double rate, double rate_now) {
         if (!ascending_) sort_row();
-        rows_.push_back({gap, rate});
+        rows_.push_back({gap, rate, rate_now});
         row_start_.push_back(static_cast<std::int32_t>(used_));
     }
     /// Closes a block of the rows since the last one; throws InputError if their number is not cone.rows.

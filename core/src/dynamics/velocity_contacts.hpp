@@ -217,6 +217,10 @@ private:
                                           const Contact& impact) const;
     /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.
     [[nodiscard]] bool was_struck(const Problem& problem, const Contact& contact, std::span<const double> shares) const;
+    /// Has the friction of a contact that slides on act against the velocity of θ. end_squares: |u_t|² at the end of
+    /// the guess.
+    void turn_friction(Problem& problem, const Contact& contact, std::size_t size, std::span<const double> guess,
+                       double end_squares) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;

@@ -694,7 +694,7 @@ void JointCoordinates::collect_unilateral(const State& state, double h, Unilater
                        end = static_cast<std::size_t>(from.row_start()[row + 1]);
             self.project_row(from.column().subspan(begin, end - begin), from.value().subspan(begin, end - begin));
             for (const auto& [column, value] : self.entries) rows.entry(column, value);
-            rows.end_row(from.rows()[row].gap, from.rows()[row].rate);
+            rows.end_row(from.rows()[row].gap, from.rows()[row].rate, from.rows()[row].rate_now);
         }
         rows.end_block(block.cone, block.key, block.restitution, block.compliance);
     }

@@ -91,6 +91,8 @@ struct MultibodySystem::Implementation {
 
     // ---- Work space of the call that runs ----
     mutable mechanics::Placements at;
+    mechanics::Placements
+        at_state;  ///< before place_for_step() gave bodies with a given motion the means over the step
     mutable std::vector<mechanics::ModalPlacement> modal_at;  // of `reduced`
     mutable mechanics::RowVector gradient;
     mutable mechanics::RowMatrix hessian;
@@ -271,11 +273,15 @@ struct MultibodySystem::Implementation {
     /// the owner's motion is not prescribed. place_for_step() has been called.
     [[nodiscard]] mechanics::Vector3d prescribed_velocity(std::int32_t owner, const mechanics::Vector3d& point,
                                                           const mechanics::Vector3d& center, double h) const;
+    /// The same at the state itself.
+    [[nodiscard]] mechanics::Vector3d prescribed_velocity_now(std::int32_t owner,
+                                                              const mechanics::Vector3d& point) const;
     /// Of the pair where it was given, else from both: the geometric mean of friction, the larger restitution.
     [[nodiscard]] ContactMaterial material_between(std::int32_t first, std::int32_t second) const;
     [[nodiscard]] Pose pose_of(std::size_t body, const State& state) const;
     /// The poses of all that collides, for the detector.
-    /// place(), and bodies with a given motion as they move in a step of length h (s).
+    /// place(), and bodies with a given motion as they move in a step of length h (s). Where there are such, `at_state`
+    /// has their velocities at the state.
     void place_for_step(const State& state, double h);
     void place_shapes(const State& state);
     /// displacements ← of a step of length h (s).

@@ -115,6 +115,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
 
 void MultibodySystem::Implementation::place_for_step(const State& state, double h) {
     place(state);
+    if (!prescribed.empty()) at_state = at;
     for (const auto index : prescribed)
         bodies[static_cast<std::size_t>(index)].prescribed->place_for_step(state.t, h, at[index]);
 }
@@ -282,6 +283,12 @@ Vector3d MultibodySystem::Implementation::prescribed_velocity(std::int32_t owner
     return place.v + 2.0 / h * (turn.w() * across + turn.vec().cross(across)) + spin.cross(point - center);
 }
 
+Vector3d MultibodySystem::Implementation::prescribed_velocity_now(std::int32_t owner, const Vector3d& point) const {
+    if (owner >= static_cast<std::int32_t>(bodies.size()) || !at_state[owner].prescribed()) return Vector3d::Zero();
+    const auto& place = at_state[owner];
+    return place.v + (place.A * place.omega).cross(point - place.x);
+}
+
 // Inline in the loop over contacts, which calls it six times for each.
 inline void MultibodySystem::Implementation::PointOfOwner::put(const Vector3d& direction, double sign,
                                                                UnilateralRows& rows) const {
@@ -322,17 +329,18 @@ void MultibodySystem::Implementation::collect_contacts(double h, UnilateralRows&
         const std::int32_t owner_a = owner_of(contact.shape_a), owner_b = owner_of(contact.shape_b);
         const PointOfOwner a = point_of(owner_a, vector(contact.point_a));
         const PointOfOwner b = point_of(owner_b, vector(contact.point_b));
-        Vector3d prescribed_speed = Vector3d::Zero();
+        Vector3d prescribed_speed = Vector3d::Zero(), speed_now = Vector3d::Zero();
         if (!prescribed.empty()) {
             const Vector3d on_a = vector(contact.point_a), on_b = vector(contact.point_b);
             prescribed_speed =
                 prescribed_velocity(owner_b, on_b, axis_below(contact.shape_b, on_b, -normal).value_or(a.center), h) -
                 prescribed_velocity(owner_a, on_a, axis_below(contact.shape_a, on_a, normal).value_or(b.center), h);
+            speed_now = prescribed_velocity_now(owner_b, on_b) - prescribed_velocity_now(owner_a, on_a);
         }
         const auto put_row = [&](const Vector3d& direction, double gap) {
             a.put(direction, -1.0, rows);
             b.put(direction, 1.0, rows);
-            rows.end_row(gap, direction.dot(prescribed_speed));
+            rows.end_row(gap, direction.dot(prescribed_speed), direction.dot(speed_now));
         };
         const auto key = key_of(contact, numbers.shapes);
         put_row(normal, contact.gap);
