@@ -118,7 +118,7 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
               "the checkpoint cannot be used: it was written by another version of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 8}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 15, \"scene\": \"\", \"systems\": []}"),
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 16, \"scene\": \"\", \"systems\": []}"),
               "the checkpoint cannot be used: it is damaged: its checksum is not that of its content");
 }
 
@@ -206,7 +206,7 @@ TEST(Simulation, LastStepIsShorterWhereTheEndIsNoMultiple) {
 // ended for a time.
 TEST(Simulation, ARunThatIsEndedBeforeTakesTheSameSteps) {
     const std::string text =
-        "step: 0.007\nend: 4\nmaterials: {m: {friction: 0.6}}\nbodies:\n"
+        "step: 0.009\nend: 4\nmaterials: {m: {friction: 0.6}}\nbodies:\n"
         "- {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n"
         "- {name: wheel, mass: 1, inertia: {xx: 0.004, yy: 0.004, zz: 0.004}, position: [0.05, 0, 0.1], shapes: "
         "[{cylinder: "

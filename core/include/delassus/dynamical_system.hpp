@@ -241,6 +241,14 @@ public:
     virtual void add_definite_constraint_stiffness(const State& state, const double* lambda, double factor,
                                                    MatrixAssembler& H) const;
 
+    // ---- What time prescribes; nothing by default ----
+
+    /// The first time after t, s, at which a force, or a value, rate or acceleration that time prescribes jumps; infinity
+    /// if there is none.
+    [[nodiscard]] virtual double next_jump(double t) const;
+    /// In which what time prescribes does not come and go, from t on, s; infinity: in any.
+    [[nodiscard]] virtual double longest_step(double t) const;
+
     // ---- Contacts, stops, bounded motors; nothing by default ----
 
     /// Whether collect_unilateral() ever finds anything; such a system needs a timestepper for unilateral rows.

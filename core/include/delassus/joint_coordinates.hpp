@@ -110,6 +110,8 @@ public:
     void add_constraint_stiffness(const State& state, const double* lambda, double factor, Tangent tangent,
                                   MatrixAssembler& H) const override;
     [[nodiscard]] bool has_unilateral() const override;
+    [[nodiscard]] double next_jump(double t) const override;
+    [[nodiscard]] double longest_step(double t) const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
     [[nodiscard]] double recovery_speed() const override;
     [[nodiscard]] double free_fall() const override;

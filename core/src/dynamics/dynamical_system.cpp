@@ -154,6 +154,13 @@ void DynamicalSystem::constraint_curvature(const State&, double* c) const {
 void DynamicalSystem::add_constraint_stiffness(const State&, const double*, double, Tangent, MatrixAssembler&) const {}
 void DynamicalSystem::add_definite_constraint_stiffness(const State&, const double*, double, MatrixAssembler&) const {}
 
+double DynamicalSystem::next_jump(double /*t*/) const {
+    return std::numeric_limits<double>::infinity();
+}
+double DynamicalSystem::longest_step(double /*t*/) const {
+    return std::numeric_limits<double>::infinity();
+}
+
 bool DynamicalSystem::has_unilateral() const {
     return false;
 }

@@ -507,8 +507,8 @@ void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver
     timed_ = true;
 }
 
-// One problem. Two in the first step, which has no history to extrapolate from; a few where a contact strikes with
-// friction and the solver does not know Coulomb's law.
+// One problem. Two in the first step, which has no history to extrapolate from, and where contacts join in; a few where
+// a contact strikes with friction and the solver does not know Coulomb's law.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
     const auto linearize_at_guess = [&] {
         linearize(begin, h);
@@ -527,7 +527,8 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     }
     linearize_at_guess();
     if (!found()) return;
-    if ((timed_ && contacts_.follow_others(problem_, solution_)) || changes_[0].empty()) {
+    const bool joins = contacts_.join_the_motion(solution_);
+    if ((timed_ && contacts_.follow_others(problem_, solution_)) || changes_[0].empty() || joins) {
         linearize_at_guess();
         if (!found()) return;
     }

@@ -113,16 +113,6 @@ namespace delassus {
 // Where contacts stick and slip in turns, the terms jump for ever. So late ones only fall: with less than μ |u_t| the
 // law lies between Coulomb's and the associated one, and the contact opens at the speed μ |u_t| − s in this step.
 //
-// Friction acts against a sliding velocity whose direction turns in the step. Against that of its end it would be off
-// by O(h), and the method of order 1. So the tangential rows of a contact that slides on see the velocity of the end
-// turned back to that of θ:
-//
-//     b_t has |ũ_t⁺| u_θ/|u_θ| − ũ_t⁺ besides,      u_θ = D̄_t ((1 − θ) v + θ ṽ⁺) + r
-//
-// with the rate r at q̄ itself, as what slides over a surface that turns stays with no point of it. A contact that comes
-// to rest in spite of the guess is left with what was turned, which the next step ends. So it is turned as a whole
-// where |u_t⁻ − ũ_t⁺| is below half of both speeds, and not at all where that is as large as the smaller.
-//
 // `once` takes s of the guess alone, which is off by O(h²) while a contact slides: the contact opens or closes at that
 // speed, and the gap is g⁺ = ½ h (μ |u_t⁺| − s) = O(h³), since the row above takes back what the step before left. No
 // energy comes of it: the impulse does the work P·u⁺ = −P_n (s + b). Where the guess has turned round against u_t⁻, the
@@ -393,6 +383,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                              double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
+    find_reach(problem);
     const double share = std::max(settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
@@ -434,34 +425,6 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
         }
         b += contact.sliding;
     }
-}
-
-void VelocityContacts::turn_friction(Problem& problem, const Contact& contact, std::size_t size,
-                                     std::span<const double> guess, double end_squares) const {
-    if (theta_ == 1.0 || !contact.along_normal || !contact.pushed || !contact.nearly_as_before || contact.impact)
-        return;
-    if (contact.known[1] != 0.0 || contact.known[2] != 0.0) return;
-    constexpr std::size_t most = 3;  // rows of a contact
-    std::array<double, most> end{}, middle{};
-    double begin_squares = 0.0, change = 0.0, middle_squares = 0.0;
-    for (std::size_t i = 1; i < size; ++i) {
-        const auto row = static_cast<std::int32_t>(first_row_ + contact.row + i);
-        const auto& then = before_.rows()[contact.before + i];
-        const double begin = before_.speed(contact.before + i, begin_speeds_) - then.rate + then.rate_now;
-        const double of_guess = problem.D.row_times(row, guess.data());
-        end[i] = of_guess + problem.b[first_row_ + contact.row + i];
-        middle[i] = (1.0 - theta_) * problem.D.row_times(row, begin_speeds_) + theta_ * of_guess +
-                    rows_.rows()[contact.row + i].rate_now;
-        begin_squares += begin * begin;
-        middle_squares += middle[i] * middle[i];
-        change += (begin - end[i]) * (begin - end[i]);
-    }
-    const double least = std::min(begin_squares, end_squares);
-    if (!(change < least) || middle_squares == 0.0) return;
-    const double part = std::min(1.0, 2.0 - 2.0 * std::sqrt(change / least));
-    const double scale = std::sqrt(end_squares / middle_squares);
-    for (std::size_t i = 1; i < size; ++i)
-        problem.b[first_row_ + contact.row + i] += part * (scale * middle[i] - end[i]);
 }
 
 void VelocityContacts::set_sliding_term(Contact& contact, double wanted, double enough, int iteration) {
@@ -508,6 +471,23 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
         if (impulse[0] * std::sqrt(mobility) <= share_of_momentum * scale || contact.change <= share * opening)
             std::fill_n(impulse, rows_.blocks()[k].cone.rows, 0.0);
     }
+}
+
+bool VelocityContacts::join_the_motion(const Solution& solution) {
+    bool any = false;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[k];
+        const UnilateralRows::Block& block = rows_.blocks()[k];
+        if (!contact.along_normal || contact.pushed || contact.left || contact.impact || !contact.nearly_as_before ||
+            !(solution.lambda[first_row_ + contact.row] > 0.0))
+            continue;
+        const double turn = h_ * std::abs(block.speed + contact.approach) / theta_;
+        if (contact.resolved_gap() > turn || h_ * std::abs(contact.approach) > turn + contact.resolution) continue;
+        contact.pushed = contact.turns = true;
+        set_normal(block, contact, block.speed);
+        any = any || turn > contact.resolution;
+    }
+    return any;
 }
 
 double VelocityContacts::work(const Problem& problem, const Solution& solution, std::span<const double> mean) const {

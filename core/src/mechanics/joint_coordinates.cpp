@@ -681,6 +681,13 @@ bool JointCoordinates::has_unilateral() const {
     return implementation_->bodies.has_unilateral();
 }
 
+double JointCoordinates::next_jump(double t) const {
+    return implementation_->bodies.next_jump(t);
+}
+double JointCoordinates::longest_step(double t) const {
+    return implementation_->bodies.longest_step(t);
+}
+
 void JointCoordinates::collect_unilateral(const State& state, double h, UnilateralRows& rows) {
     auto& self = *implementation_;
     self.place(state);

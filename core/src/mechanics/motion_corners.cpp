@@ -4,27 +4,64 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace delassus::mechanics {
+
+namespace {
+
+/// The corners at which the value, the rate or the acceleration jumps: on both sides of the others they differ by next
+/// to nothing.
+std::vector<double> jumps_of(const Motion& motion) {
+    constexpr double near = 1e-6, share = 1e-3;
+    const std::vector<double>& corners = motion.corners;
+    std::vector<bool> jumps(corners.size(), false);
+    for (const auto* part : {&motion.value, &motion.rate, &motion.acceleration}) {
+        if (!*part) continue;
+        std::vector<double> change(corners.size());
+        double scale = 0.0;
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            double spacing = motion.period > 0.0 ? motion.period : 1.0;
+            if (i > 0) spacing = std::min(spacing, corners[i] - corners[i - 1]);
+            if (i + 1 < corners.size()) spacing = std::min(spacing, corners[i + 1] - corners[i]);
+            const double before = (*part)(corners[i] - near * spacing), after = (*part)(corners[i] + near * spacing);
+            change[i] = std::abs(after - before);
+            scale = std::max({scale, std::abs(before), std::abs(after)});
+        }
+        for (std::size_t i = 0; i < corners.size(); ++i) jumps[i] = jumps[i] || change[i] > share * scale;
+    }
+    std::vector<double> times;
+    for (std::size_t i = 0; i < corners.size(); ++i)
+        if (jumps[i]) times.push_back(corners[i]);
+    return times;
+}
+
+}  // namespace
+
+void MotionCorners::Times::add(std::vector<double> times, double period) {
+    if (times.empty()) return;
+    if (period > 0.0) {
+        repeated.push_back({std::move(times), period});
+        return;
+    }
+    const auto middle = static_cast<std::ptrdiff_t>(once.size());
+    once.insert(once.end(), times.begin(), times.end());
+    std::inplace_merge(once.begin(), once.begin() + middle, once.end());
+    once.erase(std::unique(once.begin(), once.end()), once.end());
+}
 
 void MotionCorners::add(const Motion& motion) {
     if (!motion.value) return;
     if (!motion.foreseeable) unknown_ = true;
-    if (motion.corners.empty()) return;
-    if (motion.period > 0.0) {
-        repeated_.push_back({motion.corners, motion.period});
-        return;
-    }
-    const auto middle = static_cast<std::ptrdiff_t>(once_.size());
-    once_.insert(once_.end(), motion.corners.begin(), motion.corners.end());
-    std::inplace_merge(once_.begin(), once_.begin() + middle, once_.end());
-    once_.erase(std::unique(once_.begin(), once_.end()), once_.end());
+    if (motion.swing > 0.0) shortest_swing_ = std::min(shortest_swing_, motion.swing);
+    all_.add(motion.corners, motion.period);
+    jumps_.add(jumps_of(motion), motion.period);
 }
 
-double MotionCorners::after(double t) const {
+double MotionCorners::Times::after(double t) const {
     double soonest = std::numeric_limits<double>::infinity();
-    if (const auto next = std::upper_bound(once_.begin(), once_.end(), t); next != once_.end()) soonest = *next;
-    for (const Repeated& one : repeated_) {
+    if (const auto next = std::upper_bound(once.begin(), once.end(), t); next != once.end()) soonest = *next;
+    for (const Repeated& one : repeated) {
         // From the period before the one of t on: rounding may put a corner on either side.
         const double periods = std::floor((t - one.times.front()) / one.period);
         for (double k = periods - 1.0; k <= periods + 1.0; k += 1.0)

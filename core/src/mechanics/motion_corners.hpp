@@ -2,6 +2,7 @@
 // When the motions of a system have corners.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -17,7 +18,11 @@ public:
         for (const Motion& motion : motions) add(motion);
     }
     /// The first after t, s; infinity if there is none.
-    [[nodiscard]] double after(double t) const;
+    [[nodiscard]] double after(double t) const { return all_.after(t); }
+    /// The first after t at which a value, a rate or an acceleration jumps, s; infinity if there is none.
+    [[nodiscard]] double jump_after(double t) const { return jumps_.after(t); }
+    /// The shortest Motion::swing, s; infinity if there is none.
+    [[nodiscard]] double shortest_swing() const { return shortest_swing_; }
     /// Whether there is a motion of which nothing is known.
     [[nodiscard]] bool unknown() const { return unknown_; }
 
@@ -26,8 +31,15 @@ private:
         std::vector<double> times;  ///< ascending, within a period
         double period = 0.0;
     };
-    std::vector<double> once_;  // ascending
-    std::vector<Repeated> repeated_;
+    struct Times {
+        std::vector<double> once;  // ascending
+        std::vector<Repeated> repeated;
+
+        void add(std::vector<double> times, double period);
+        [[nodiscard]] double after(double t) const;
+    };
+    Times all_, jumps_;
+    double shortest_swing_ = std::numeric_limits<double>::infinity();
     bool unknown_ = false;
 };
 

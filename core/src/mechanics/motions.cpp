@@ -37,14 +37,17 @@ Motion Motion::linear(double start, double slope) {
 
 Motion Motion::sine(double amplitude, double frequency, double phase, double offset) {
     const double omega = 2.0 * std::numbers::pi * frequency;
-    return smooth([=](double t) { return offset + amplitude * std::sin(omega * t + phase); },
-                  [=](double t) { return amplitude * omega * std::cos(omega * t + phase); },
-                  [=](double t) { return -amplitude * omega * omega * std::sin(omega * t + phase); },
-                  [=](double t) {
-                      const double swing =
-                          omega == 0.0 ? std::sin(phase) * t : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
-                      return offset * t + amplitude * swing;
-                  });
+    Motion motion = smooth([=](double t) { return offset + amplitude * std::sin(omega * t + phase); },
+                           [=](double t) { return amplitude * omega * std::cos(omega * t + phase); },
+                           [=](double t) { return -amplitude * omega * omega * std::sin(omega * t + phase); },
+                           [=](double t) {
+                               const double swing = omega == 0.0
+                                                        ? std::sin(phase) * t
+                                                        : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
+                               return offset * t + amplitude * swing;
+                           });
+    if (amplitude != 0.0 && frequency != 0.0) motion.swing = 1.0 / std::abs(frequency);
+    return motion;
 }
 
 namespace {

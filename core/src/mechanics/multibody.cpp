@@ -335,6 +335,17 @@ void MultibodySystem::leave_nothing_out() {
     implementation_->leaves_out = false;
 }
 
+bool MultibodySystem::Implementation::is_round_about_its_axis(BodyIndex index) const {
+    const auto& motion = *bodies[static_cast<std::size_t>(index)].prescribed;
+    return std::all_of(shapes.begin(), shapes.end(), [&](const Shape& shape) {
+        if (shape.body != index) return true;
+        const Vector3d center = vector(shape.pose.position);
+        if (shape.kind == ShapeKind::Sphere) return motion.turns_about(center, Vector3d::Zero());
+        const bool along = shape.kind == ShapeKind::Cylinder || shape.kind == ShapeKind::Capsule;
+        return along && motion.turns_about(center, quaternion(shape.pose.orientation) * Vector3d::UnitZ());
+    });
+}
+
 void MultibodySystem::finish() {
     auto& self = *implementation_;
     self.must_not_be_finished();
@@ -343,6 +354,8 @@ void MultibodySystem::finish() {
         if (body.parameters.fixed) continue;
         if (body.prescribed) {
             self.prescribed.push_back(static_cast<BodyIndex>(k));
+            if (!self.is_round_about_its_axis(static_cast<BodyIndex>(k)))
+                self.uneven.push_back(static_cast<BodyIndex>(k));
             continue;
         }
         body.position = self.position_size;
@@ -538,6 +551,18 @@ std::uint64_t MultibodySystem::revision() const {
 }
 double MultibodySystem::next_corner(double t) const {
     return implementation_->motion_corners.after(t);
+}
+double MultibodySystem::next_jump(double t) const {
+    return implementation_->motion_corners.jump_after(t);
+}
+double MultibodySystem::longest_step(double t) const {
+    constexpr double share_of_swing = 0.25, largest_turn = 1.0;
+    const auto& self = *implementation_;
+    double longest = share_of_swing * self.motion_corners.shortest_swing();
+    for (const BodyIndex index : self.uneven)
+        longest = std::min(
+            longest, largest_turn / std::abs(self.bodies[static_cast<std::size_t>(index)].prescribed->turning_rate(t)));
+    return longest;
 }
 bool MultibodySystem::foreseeable() const {
     return !implementation_->motion_corners.unknown();

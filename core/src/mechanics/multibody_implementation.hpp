@@ -74,6 +74,7 @@ struct MultibodySystem::Implementation {
     std::optional<std::vector<mechanics::Linkage>> beside_held;  // likewise, where hold_rows() has been called
     std::vector<mechanics::MovingBody> moving;
     std::vector<BodyIndex> prescribed;  // bodies that move as they are told
+    std::vector<BodyIndex> uneven;      // of these, those whose turning moves their surface
     bool gyroscopic = false;            // a moving body whose moments differ
     double load_factor = 1.0;           // of weight and loads
     double size = 0.0;                  // the median of the shapes that collide
@@ -265,6 +266,7 @@ struct MultibodySystem::Implementation {
         /// The entries of sign · direction · ṗ.
         void put(const mechanics::Vector3d& direction, double sign, UnilateralRows& rows) const;
     };
+    [[nodiscard]] bool is_round_about_its_axis(BodyIndex prescribed_body) const;
     [[nodiscard]] PointOfOwner point_of(std::int32_t owner, const mechanics::Vector3d& point) const;
     /// The point of the axis, or the centre, below a point of a round surface with this normal; nothing for others.
     [[nodiscard]] std::optional<mechanics::Vector3d> axis_below(std::int32_t shape, const mechanics::Vector3d& point,

@@ -40,6 +40,13 @@ Pose PrescribedMotion::pose(double t) const {
     return {array(point_ + Q * arm_ + at_time(translation_, &Motion::value, t)), {A.w(), A.x(), A.y(), A.z()}};
 }
 
+bool PrescribedMotion::turns_about(const Vector3d& point, const Vector3d& direction) const {
+    constexpr double rounding = 1e-9;
+    const Vector3d arm = point + orientation_.conjugate() * arm_;
+    return own_axis_.cross(arm).norm() <= rounding * (1.0 + arm.norm()) &&
+           own_axis_.cross(direction).norm() <= rounding * direction.norm();
+}
+
 void PrescribedMotion::place(double t, Placement& at) const {
     const Quaterniond Q = turn(t);
     const Vector3d r = Q * arm_;

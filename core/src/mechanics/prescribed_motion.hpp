@@ -30,6 +30,12 @@ public:
     /// moves.
     void place_for_step(double t, double h, Placement& at) const;
 
+    /// rad/s
+    [[nodiscard]] double turning_rate(double t) const { return angle_.rate(t); }
+    /// Whether the axis about which it turns goes through a point of the body; and along a direction of it, if that is
+    /// not 0.
+    [[nodiscard]] bool turns_about(const Vector3d& point, const Vector3d& direction) const;
+
 private:
     [[nodiscard]] Quaterniond turn(double t) const;
 

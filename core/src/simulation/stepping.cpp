@@ -66,11 +66,11 @@ bool Stepping::ends(double t) const {
 }
 
 void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
-    begin_ = state;
+    oldest_ = std::exchange(older_, std::exchange(last_, {.state = state, .method = {}}));
     reads_ = ahead_ && ahead_->reaches(next(state.t).end);
     ahead_before_.reset();
     if (!reads_) {
-        method_before_ = timestepper_->save();
+        last_.method = timestepper_->save();
         if (control_) control_before_ = control_->save();
         work_before_ = work_;
         if (ahead_) {
@@ -79,7 +79,8 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
         }
     }
     if (settings_.chosen) {
-        report = control_->step(state, settings_.end, solver);
+        pass_corner(state);
+        report = control_->step(state, cut(state.t, settings_.end), solver);
         return;
     }
     const FixedStep step = next(state.t);
@@ -93,21 +94,23 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
         step_within_error(*control_, state, step.end, solver, report);
     } else {
         step_fixed(state, solver, report, watch);
+        last_.whole = report.substeps == 1 && !report.refined;
     }
     state.t = step.end;
 }
 
 void Stepping::undo() {
+    if (!reads_) timestepper_->load(last_.method);
+    last_ = std::exchange(older_, std::exchange(oldest_, {}));
     if (reads_) return;
-    timestepper_->load(method_before_);
     if (control_) control_->load(control_before_);
     work_ = work_before_;
     if (ahead_before_) ahead_->put_back(std::move(*ahead_before_));
 }
 
 void Stepping::go_back(State& state) {
-    state = begin_;
-    timestepper_->load(method_before_);
+    state = last_.state;
+    timestepper_->load(last_.method);
 }
 
 // ---- Steps of a fixed size ----
@@ -124,18 +127,49 @@ void Stepping::take(State& state, double h, StepSolver& solver, StepReport& repo
     solver.require_usable();
 }
 
+// ---- What time prescribes ----
+//
+// A method knows forces and motions at some points of a step, and takes them for smooth in between. So steps end at
+// corners and are short against what swings. Corners that follow one another closely are those of a table that samples
+// a curve.
+double Stepping::cut(double t, double end) const {
+    constexpr int most_corners = 8;
+    const double near = 1e-9 * settings_.step;
+    double corner = system_.next_jump(t + near);
+    double last = corner;
+    for (int i = 1; i < most_corners && last < t + settings_.step; ++i) last = system_.next_jump(last);
+    if (last < t + settings_.step) corner = HUGE_VAL;
+    const double until = std::min(corner, t + system_.longest_step(t));
+    return until < end - near ? until : end;
+}
+
+void Stepping::pass_corner(const State& state) {
+    const double near = 1e-9 * settings_.step;
+    if (system_.next_jump(state.t - near) <= state.t + near) timestepper_->forces_jumped();
+}
+
 void Stepping::try_substeps(std::int64_t substeps, State& state, StepSolver& solver, AdaptiveStepReport& report,
                             StepWatch* watch) {
     // Where rounding makes more of the linear model's error than this, nobody knows whether substeps are short enough.
     constexpr double most_rounding = 0.1;
-    const double h = report.h / static_cast<double>(substeps);
+    const double begin = state.t, part = report.h / static_cast<double>(substeps);
     if (watch) watch->begin_trial(substeps);
     report.step.clear();
     report.error = 0.0;
-    for (std::int64_t i = 1; i <= substeps; ++i) {
+    bool whole = true;
+    for (std::int64_t i = 1; i <= substeps;) {
+        const double end = begin + static_cast<double>(i) * part, until = cut(state.t, end);
+        whole = whole && until == end;
+        const double h = whole ? part : until - state.t;
+        pass_corner(state);
         take(state, h, solver, substep_);
+        if (!whole) state.t = until;
+        if (until == end) {
+            ++i;
+            whole = true;
+        }
         if (const double error = error_of(substep_, h); !(error <= report.error)) report.error = error;
-        if (watch) watch->judge(state, h, substep_, i == substeps);
+        if (watch) watch->judge(state, h, substep_, i > substeps);
         if (substeps > 1 && substep_.linearization_rounding > most_rounding)
             throw StepTooLong("the last digits of positions are as large as what a step errs by");
         substep_.follow(report.step);
@@ -201,7 +235,8 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
     const std::int64_t before = solver.effort().iterations;
     const auto work = [&] { return work_of(report.step, solver.effort().iterations - before); };
     for (; state.t < end && work() <= most_work; ++report.substeps) {
-        AdaptiveStepReport part = control.step(state, end, solver);
+        pass_corner(state);
+        AdaptiveStepReport part = control.step(state, cut(state.t, end), solver);
         part.step.follow(report.step);
         std::swap(report.step, part.step);
         report.rejected += part.rejected;
@@ -214,6 +249,10 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
 // A fixed step is of order 2 where motion is smooth, and of order 1 where something meets, lets go, goes over an edge
 // or turns round: it knows the speeds and not the time. Such steps are few as a rule, and their estimate tells them
 // all. They are taken again by their error.
+//
+// Methods know what acts in the middle of a step. What happens after it shows in the next one, whose estimate may mean
+// either. So a step that errs is taken again together with the one before, where that was taken as a whole: the state
+// between them, which was shown already, is off by O(h²), and nothing of that remains.
 
 double Stepping::work_of(const StepReport& report, std::int64_t iterations) const {
     const double solves = report.newton_iterations + static_cast<double>(iterations) / iterations_of_a_solve;
@@ -239,9 +278,15 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
     const ChosenSteps chosen(*timestepper_, allowed());
-    go_back(state);
+    const double end = last_.state.t + report.h;
+    if (older_.whole) {
+        state = older_.state;
+        timestepper_->load(older_.method);
+    } else {
+        go_back(state);
+    }
     try {
-        take_refined(state, solver, report, watch);
+        take_refined(state, end, solver, report, watch);
     } catch (const StepFailure&) {
         work_ -= usual;
         state = whole;
@@ -252,8 +297,8 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
 }
 
 // What is left when the work is used up is one step.
-void Stepping::take_refined(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
-    const double end = begin_.t + report.h;
+void Stepping::take_refined(State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
+                            StepWatch* watch) {
     refined_->load(refined_anew_);
     report.error = 0.0;
     const std::int64_t before = solver.effort().iterations;
@@ -311,7 +356,7 @@ void Stepping::show_ahead(State& state, double end, StepSolver& solver, Adaptive
         const double limit = std::min(timestepper_->error_limit(), settings_.accuracy);
         if (std::all_of(off.begin(), off.end(), [limit](double C) { return std::abs(C) <= limit; })) return;
     }
-    state = begin_;
+    state = last_.state;
     timestepper_->restart();
     control_->set_largest(settings_.step);
     AdaptiveStepReport shown;
@@ -326,6 +371,7 @@ void Stepping::show_ahead(State& state, double end, StepSolver& solver, Adaptive
 void Stepping::begin_anew(const State& state) {
     if (ahead_) ahead_->begin(state);
     timestepper_->forces_jumped();
+    last_.whole = false;
 }
 
 std::vector<double> Stepping::multipliers(const State& state, StepSolver& solver, const StepReport& report) {
@@ -335,7 +381,14 @@ std::vector<double> Stepping::multipliers(const State& state, StepSolver& solver
 SteppingMemory Stepping::save() const {
     SteppingMemory memory{.method = timestepper_->save(), .control = {}, .ahead = {}};
     if (control_) memory.control = control_->save();
-    if (refined_) memory.control = {work_};
+    if (refined_) {
+        memory.control = {work_};
+        if (last_.whole) {
+            memory.control.push_back(last_.state.t);
+            for (const auto* values : {&last_.state.q, &last_.state.v, &last_.method})
+                memory.control.insert(memory.control.end(), values->begin(), values->end());
+        }
+    }
     if (ahead_) memory.ahead = ahead_->save();
     return memory;
 }
@@ -344,8 +397,23 @@ void Stepping::load(const SteppingMemory& memory, const State& state) {
     timestepper_->load(memory.method);
     if (control_) control_->load(memory.control);
     if (refined_) {
-        if (memory.control.size() != 1) throw InputError("the memory of divided steps is not one number");
-        work_ = memory.control.front();
+        const auto& control = memory.control;
+        const std::size_t of_state = 2 + state.q.size() + state.v.size();
+        if (control.size() != 1 && control.size() < of_state)
+            throw InputError("the memory of divided steps has not the size of the system");
+        work_ = control.front();
+        last_ = {};
+        if (control.size() > 1) {
+            auto next = control.begin() + 2;
+            const auto take = [&](std::vector<double>& values, std::size_t count) {
+                values.assign(next, next + static_cast<std::ptrdiff_t>(count));
+                next += static_cast<std::ptrdiff_t>(count);
+            };
+            last_ = {.state = {control[1], {}, {}}, .method = {}, .whole = true};
+            take(last_.state.q, state.q.size());
+            take(last_.state.v, state.v.size());
+            take(last_.method, control.size() - of_state);
+        }
     }
     if (!ahead_) return;
     if (memory.ahead.empty()) return ahead_->begin(state);

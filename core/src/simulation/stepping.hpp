@@ -39,6 +39,7 @@ struct SteppingSettings {
 //
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
+//     cut by what time prescribes     at corners of motions, and where they swing within it
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
 //     again, by their error           where it errs by more than the accuracy, and that costs little
 //   or
@@ -86,6 +87,10 @@ public:
 
 private:
     void take(State& state, double h, StepSolver& solver, StepReport& report);
+    /// Where a step from t on to `end` ends, so that what time prescribes is smooth and slow in it.
+    [[nodiscard]] double cut(double t, double end) const;
+    /// The method forgets what acted before, if the state is at a corner of what time prescribes.
+    void pass_corner(const State& state);
     void step_fixed(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
     void step_whole(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
     void step_in_substeps(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch,
@@ -103,7 +108,7 @@ private:
     /// What a step of size h errs by, over what is allowed; NaN where it is not known.
     [[nodiscard]] double error_of(const StepReport& report, double h) const;
     void refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
-    void take_refined(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    void take_refined(State& state, double end, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
     static void judge(const State& state, const AdaptiveStepReport& report, StepWatch& watch);
     void step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
     void show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
@@ -119,10 +124,15 @@ private:
     std::vector<double> refined_anew_;           // its memory before any
     double work_ = 0.0;                          // that may be spent on them now
     std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
-    // Of the last advance(), before it:
-    State begin_;
-    bool reads_ = false;  // all was known already, and nothing has changed
-    std::vector<double> method_before_, control_before_;
+    /// Where a step began.
+    struct Beginning {
+        State state;
+        std::vector<double> method;
+        bool whole = false;  // the step was taken as a whole, and nothing was changed from outside since
+    };
+    Beginning last_, older_, oldest_;  // of the last advance(), and of those before it
+    bool reads_ = false;               // all was known already, and nothing has changed
+    std::vector<double> control_before_;
     double work_before_ = 0.0;
     std::optional<LookAhead::Memory> ahead_before_;
     StepReport substep_;  // memory
