@@ -119,6 +119,62 @@ TEST(RefinedSteps, AFootLetsGoWithinAStep) {
         }
 }
 
+// A ball flies off the edge of a smooth table, which it reaches at any time of a step.
+TEST(RefinedSteps, ABallLeavesATableAtAnyTimeOfAStep) {
+    const double v = 2.0, end = 0.9, g = 9.81;
+    for (int k = 0; k < 8; ++k) {
+        const double way = 0.8 + 0.0025 * k, flight = end - way / v;
+        auto run = run_of(fmt::format(
+            "step: 0.01\nend: {}\nbodies:\n- {{name: table, fixed: true, position: [-1, 0, -0.5], shapes: [{{box: "
+            "{{size: [2, 2, 1]}}}}]}}\n- {{name: ball, mass: 0.6, position: [{:.17g}, 0, 0.1], velocity: [{}, 0, 0], "
+            "shapes: [{{sphere: {{radius: 0.1}}}}]}}\n",
+            end, -way, v));
+        run.finish();
+        EXPECT_NEAR(run.pose("ball").position[0], v * flight, 1e-9) << way;
+        EXPECT_NEAR(run.pose("ball").position[2], 0.1 - 0.5 * g * flight * flight, 1e-3) << way;
+    }
+}
+
+// Loads that are switched on, act for half a step, or swing within a step: on a ball on a smooth plane, with steps that
+// follow from an accuracy and without. x = ∬ F/m dt².
+TEST(RefinedSteps, LoadsThatComeAndGoWithinAStep) {
+    struct Case {
+        std::string force;
+        double end, x, error;
+    };
+    const double pi = std::acos(-1.0);
+    for (const Case& one : {
+             Case{"table: {times: [0, 0.2045, 0.20450001, 9], values: [0, 0, 10, 10]}", 0.6, 5.0 * 0.3955 * 0.3955,
+                  1e-6},
+             Case{"table: {times: [0, 0.106, 0.1060001, 0.111, 0.1110001, 9], values: [0, 0, 200, 200, 0, 0]}", 0.5,
+                  200.0 * 0.005 * (0.5 - 0.106 - 0.0025), 1e-4},
+             Case{"sine: {amplitude: 100, frequency: 50}", 0.5, 100.0 / (100.0 * pi) * 0.5, 2e-3},
+         })
+        for (const std::string accuracy : {"", "accuracy: 1.0e-3\n"})
+            for (const double step : {0.02, 0.0173}) {
+                auto run =
+                    run_of(fmt::format("step: {}\nend: {}\n{}bodies:\n- {{name: floor, fixed: true, shapes: [{{plane: "
+                                       "{{}}}}]}}\n- {{name: "
+                                       "ball, mass: 1, position: [0, 0, 0.1], shapes: [{{sphere: {{radius: "
+                                       "0.1}}}}]}}\nloads:\n- {{name: f, "
+                                       "body: ball, force: [{{{}}}, 0, 0]}}\n",
+                                       step, one.end, accuracy, one.force));
+                run.finish();
+                EXPECT_NEAR(run.pose("ball").position[0], one.x, one.error) << one.force << ' ' << step << accuracy;
+            }
+}
+
+// A blade that turns once a step hits what lies in its way.
+TEST(RefinedSteps, ABladeThatTurnsOnceAStepHits) {
+    auto run = run_of(
+        "step: 0.02\nend: 0.3\ngravity: [0, 0, 0]\nbodies:\n- {name: blade, motion: {rotation: {axis: [0, 0, 1], "
+        "angle: "
+        "{linear: {rate: 314.15926535897933}}}}, shapes: [{box: {size: [1, 0.1, 0.1]}}]}\n- {name: ball, mass: 1, "
+        "position: [0, 0.8, 0], velocity: [0, -2, 0], shapes: [{sphere: {radius: 0.1}}]}\n");
+    run.finish();
+    EXPECT_GT(std::hypot(run.velocities("ball")[0][0], run.velocities("ball")[0][1]), 10.0);
+}
+
 // A ball rolls off a table, a wheel over a curb: against steps by accuracy.
 TEST(RefinedSteps, EdgesThatBodiesGoOver) {
     const std::string roll =

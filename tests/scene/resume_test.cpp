@@ -214,7 +214,7 @@ TEST(Simulation, ARunThatIsEndedBeforeTakesTheSameSteps) {
         "m}]}\n";
     Running whole(parse_scene(text, "test.yaml"));
     SceneOverrides overrides;
-    overrides.end = 1.4;
+    overrides.end = 1.404;
     Running first(parse_scene(text, "test.yaml", overrides));
     first.finish();
     ASSERT_GT(first.simulation.totals().divided_steps, 0);

@@ -243,8 +243,8 @@ public:
 
     // ---- What time prescribes; nothing by default ----
 
-    /// The first time after t, s, at which a force, or a value, rate or acceleration that time prescribes jumps; infinity
-    /// if there is none.
+    /// The first time after t, s, at which a force, or a value, rate or acceleration that time prescribes jumps;
+    /// infinity if there is none.
     [[nodiscard]] virtual double next_jump(double t) const;
     /// In which what time prescribes does not come and go, from t on, s; infinity: in any.
     [[nodiscard]] virtual double longest_step(double t) const;

@@ -79,7 +79,7 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
         }
     }
     if (settings_.chosen) {
-        pass_corner(state);
+        pass_jump(state);
         report = control_->step(state, cut(state.t, settings_.end), solver);
         return;
     }
@@ -130,20 +130,20 @@ void Stepping::take(State& state, double h, StepSolver& solver, StepReport& repo
 // ---- What time prescribes ----
 //
 // A method knows forces and motions at some points of a step, and takes them for smooth in between. So steps end at
-// corners and are short against what swings. Corners that follow one another closely are those of a table that samples
-// a curve.
+// jumps and are short against what swings. Jumps that follow one another closely are those of a table that samples a
+// curve.
 double Stepping::cut(double t, double end) const {
-    constexpr int most_corners = 8;
+    constexpr int most_jumps = 8;
     const double near = 1e-9 * settings_.step;
-    double corner = system_.next_jump(t + near);
-    double last = corner;
-    for (int i = 1; i < most_corners && last < t + settings_.step; ++i) last = system_.next_jump(last);
-    if (last < t + settings_.step) corner = HUGE_VAL;
-    const double until = std::min(corner, t + system_.longest_step(t));
+    double jump = system_.next_jump(t + near);
+    double last = jump;
+    for (int i = 1; i < most_jumps && last < t + settings_.step; ++i) last = system_.next_jump(last);
+    if (last < t + settings_.step) jump = HUGE_VAL;
+    const double until = std::min(jump, t + system_.longest_step(t));
     return until < end - near ? until : end;
 }
 
-void Stepping::pass_corner(const State& state) {
+void Stepping::pass_jump(const State& state) {
     const double near = 1e-9 * settings_.step;
     if (system_.next_jump(state.t - near) <= state.t + near) timestepper_->forces_jumped();
 }
@@ -161,7 +161,7 @@ void Stepping::try_substeps(std::int64_t substeps, State& state, StepSolver& sol
         const double end = begin + static_cast<double>(i) * part, until = cut(state.t, end);
         whole = whole && until == end;
         const double h = whole ? part : until - state.t;
-        pass_corner(state);
+        pass_jump(state);
         take(state, h, solver, substep_);
         if (!whole) state.t = until;
         if (until == end) {
@@ -235,7 +235,7 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
     const std::int64_t before = solver.effort().iterations;
     const auto work = [&] { return work_of(report.step, solver.effort().iterations - before); };
     for (; state.t < end && work() <= most_work; ++report.substeps) {
-        pass_corner(state);
+        pass_jump(state);
         AdaptiveStepReport part = control.step(state, cut(state.t, end), solver);
         part.step.follow(report.step);
         std::swap(report.step, part.step);

@@ -39,7 +39,7 @@ struct SteppingSettings {
 //
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
-//     cut by what time prescribes     at corners of motions, and where they swing within it
+//     cut by what time prescribes     where it jumps, or swings within the step
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
 //     again, by their error           where it errs by more than the accuracy, and that costs little
 //   or
@@ -89,8 +89,8 @@ private:
     void take(State& state, double h, StepSolver& solver, StepReport& report);
     /// Where a step from t on to `end` ends, so that what time prescribes is smooth and slow in it.
     [[nodiscard]] double cut(double t, double end) const;
-    /// The method forgets what acted before, if the state is at a corner of what time prescribes.
-    void pass_corner(const State& state);
+    /// The method forgets what acted before, if something that time prescribes jumps at the state.
+    void pass_jump(const State& state);
     void step_fixed(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
     void step_whole(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
     void step_in_substeps(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch,
