@@ -168,9 +168,8 @@ TEST(RefinedSteps, LoadsThatComeAndGoWithinAStep) {
 TEST(RefinedSteps, ABladeThatTurnsOnceAStepHits) {
     auto run = run_of(
         "step: 0.02\nend: 0.3\ngravity: [0, 0, 0]\nbodies:\n- {name: blade, motion: {rotation: {axis: [0, 0, 1], "
-        "angle: "
-        "{linear: {rate: 314.15926535897933}}}}, shapes: [{box: {size: [1, 0.1, 0.1]}}]}\n- {name: ball, mass: 1, "
-        "position: [0, 0.8, 0], velocity: [0, -2, 0], shapes: [{sphere: {radius: 0.1}}]}\n");
+        "angle: {linear: {rate: 314.15926535897933}}}}, shapes: [{box: {size: [1, 0.1, 0.1]}}]}\n- {name: ball, mass: "
+        "1, position: [0, 0.8, 0], velocity: [0, -2, 0], shapes: [{sphere: {radius: 0.1}}]}\n");
     run.finish();
     EXPECT_GT(std::hypot(run.velocities("ball")[0][0], run.velocities("ball")[0][1]), 10.0);
 }

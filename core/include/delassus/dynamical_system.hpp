@@ -246,7 +246,7 @@ public:
     /// The first time after t, s, at which a force, or a value, rate or acceleration that time prescribes jumps;
     /// infinity if there is none.
     [[nodiscard]] virtual double next_jump(double t) const;
-    /// In which what time prescribes does not come and go, from t on, s; infinity: in any.
+    /// The longest step from t on, s, that resolves what time prescribes; infinity: any does.
     [[nodiscard]] virtual double longest_step(double t) const;
 
     // ---- Contacts, stops, bounded motors; nothing by default ----

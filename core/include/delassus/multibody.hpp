@@ -55,7 +55,7 @@ struct Motion {
     /// Whether nothing but t decides the functions, and whether they are smooth between the corners: those made below
     /// are. Where a motion is not, no step looks ahead of what is shown.
     bool foreseeable = false;
-    double swing = 0.0;  ///< the period in which the functions swing, s; 0: they do not
+    double oscillation_period = 0.0;  ///< s; 0: the functions do not oscillate
     DELASSUS_API static Motion constant(double value);
     DELASSUS_API static Motion linear(double start, double rate);
     /// offset + amplitude sin(2π frequency t + phase)
@@ -475,8 +475,8 @@ public:
     /// is none.
     [[nodiscard]] double next_corner(double t) const;
     [[nodiscard]] double next_jump(double t) const override;
-    /// A quarter of the shortest swing of a motion; and 1 rad of a body whose shapes are not round about the axis about
-    /// which it turns by its motion.
+    /// A quarter of the shortest period of a motion that oscillates; and 1 rad of a body whose shapes are not round
+    /// about the axis about which it turns by its motion.
     [[nodiscard]] double longest_step(double t) const override;
     /// Whether all these motions are Motion::foreseeable.
     [[nodiscard]] bool foreseeable() const;

@@ -23,7 +23,6 @@ constexpr double short_share = 1e-3;
 // cut between them. Contacts that let go in a step change nothing yet. Beside the jump of an impact the acceleration
 // before it is small.
 bool PositionError::note(const Step& step, StepReport& report) {
-    constexpr double mostly = 0.5;
     const auto n = static_cast<std::size_t>(step.change.size());
     const double h = step.h;
     const bool before = step.last_h >= short_share * h && !acceleration_.empty(), met = report.impact_speed > 0.0;

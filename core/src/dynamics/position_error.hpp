@@ -5,11 +5,15 @@
 #include <Eigen/Core>
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "delassus/timestepper.hpp"
 
 namespace delassus {
+
+/// Of the change of a velocity by impacts, beyond which it says no acceleration.
+inline constexpr double mostly = 0.5;
 
 class PositionError {
 public:

@@ -47,8 +47,6 @@ namespace {
 
 /// h ω up to which the trapezoidal rule has a faint error of the fastest motion.
 constexpr double rate_of_faint_error = 2.0;
-/// Of the change of a velocity by impacts, beyond which it says no acceleration.
-constexpr double mostly = 0.5;
 /// The same where steps are divided until their error is small; they resolve no faster vibrations.
 constexpr double rate_that_errors_show = 100.0;
 
@@ -507,8 +505,8 @@ void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver
     timed_ = true;
 }
 
-// One problem. Two in the first step, which has no history to extrapolate from, and where contacts join in; a few where
-// a contact strikes with friction and the solver does not know Coulomb's law.
+// One problem. Two in the first step, which has no history to extrapolate from, and where contacts become persistent; a
+// few where a contact strikes with friction and the solver does not know Coulomb's law.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
     const auto linearize_at_guess = [&] {
         linearize(begin, h);
@@ -527,8 +525,8 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     }
     linearize_at_guess();
     if (!found()) return;
-    const bool joins = contacts_.join_the_motion(solution_);
-    if ((timed_ && contacts_.follow_others(problem_, solution_)) || changes_[0].empty() || joins) {
+    const bool persists = contacts_.make_persistent(solution_);
+    if ((timed_ && contacts_.follow_others(problem_, solution_)) || changes_[0].empty() || persists) {
         linearize_at_guess();
         if (!found()) return;
     }

@@ -383,7 +383,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                              double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
-    find_reach(problem);
+    if (iteration == 0) find_friction_reach(problem);
     const double share = std::max(settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
@@ -410,7 +410,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
             if (settings_.once && contact.was_there)
                 along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
         }
-        turn_friction(problem, contact, size, guess, squares);
+        set_friction_direction(problem, contact, size, guess, squares);
         double& b = problem.b[first];
         b += contact.normal;
         if (contact.friction == 0.0) continue;
@@ -473,7 +473,7 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
     }
 }
 
-bool VelocityContacts::join_the_motion(const Solution& solution) {
+bool VelocityContacts::make_persistent(const Solution& solution) {
     bool any = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];

@@ -110,9 +110,10 @@ public:
     /// Timestepper::follow_impacts().
     void follow_impacts(bool follow) { follows_ = follow; }
     [[nodiscard]] bool follows_impacts() const { return follows_; }
-    /// Contacts that touch, are no faster than their turn explains, and push in this answer have pushed before: as what
-    /// lies on something when a run begins, or goes over an edge. Returns whether the answer changes by that.
-    [[nodiscard]] bool join_the_motion(const Solution& solution);
+    /// Contacts that touch, are no faster than their turn explains, and push in this answer are persistent, as if they
+    /// had pushed before: what lies on something when a run begins, or goes over an edge. Returns whether the answer
+    /// changes by that.
+    [[nodiscard]] bool make_persistent(const Solution& solution);
     /// StepReport::cut, where more than a hundredth of the kinetic energy is to be given back. solution: of the whole
     /// problem.
     [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution) const;
@@ -220,12 +221,13 @@ private:
                                           const Contact& impact) const;
     /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.
     [[nodiscard]] bool was_struck(const Problem& problem, const Contact& contact, std::span<const double> shares) const;
-    /// reach_ ← by what the friction of all contacts can change each velocity, as large as it was in the step before.
-    void find_reach(const Problem& problem);
+    /// friction_reach_ ← by what the friction of all contacts can change each velocity, as large as it was in the step
+    /// before.
+    void find_friction_reach(const Problem& problem);
     /// Has the friction of a contact that slides on act against the velocity of θ. end_squares: |u_t|² at the end of
     /// the guess.
-    void turn_friction(Problem& problem, const Contact& contact, std::size_t size, std::span<const double> guess,
-                       double end_squares) const;
+    void set_friction_direction(Problem& problem, const Contact& contact, std::size_t size,
+                                std::span<const double> guess, double end_squares) const;
     void set_sliding_term(Contact& contact, double wanted, double enough, int iteration);
 
     DynamicalSystem& system_;
@@ -252,7 +254,7 @@ private:
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     std::size_t first_row_ = 0;             // in the problem
-    std::vector<double> reach_;
+    std::vector<double> friction_reach_;
     bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;
 };
 

@@ -36,8 +36,8 @@ void for_each_length(const SparseMatrix& D, std::size_t row, const Act& act) {
 
 }  // namespace
 
-void VelocityContacts::find_reach(const Problem& problem) {
-    reach_.assign(diagonal_.size(), 0.0);
+void VelocityContacts::find_friction_reach(const Problem& problem) {
+    friction_reach_.assign(diagonal_.size(), 0.0);
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const Cone& cone = rows_.blocks()[k].cone;
@@ -45,13 +45,13 @@ void VelocityContacts::find_reach(const Problem& problem) {
             continue;
         const double impulse = cone.parameters[0] * contact.last[0];
         for_each_length(problem.D, first_row_ + contact.row + 1, [&](std::size_t column, double length) {
-            reach_[column] += impulse * length / diagonal_[column];
+            friction_reach_[column] += impulse * length / diagonal_[column];
         });
     }
 }
 
-void VelocityContacts::turn_friction(Problem& problem, const Contact& contact, std::size_t size,
-                                     std::span<const double> guess, double end_squares) const {
+void VelocityContacts::set_friction_direction(Problem& problem, const Contact& contact, std::size_t size,
+                                              std::span<const double> guess, double end_squares) const {
     constexpr std::size_t rows = 3;
     if (theta_ == 1.0 || size != rows || !contact.along_normal || !contact.pushed || !contact.nearly_as_before ||
         contact.impact || contact.known[1] != 0.0 || contact.known[2] != 0.0)
@@ -71,7 +71,8 @@ void VelocityContacts::turn_friction(Problem& problem, const Contact& contact, s
         middle_squares += middle[i] * middle[i];
         change += (begin - end[i]) * (begin - end[i]);
     }
-    for_each_length(problem.D, first + 1, [&](std::size_t column, double length) { reach += length * reach_[column]; });
+    for_each_length(problem.D, first + 1,
+                    [&](std::size_t column, double length) { reach += length * friction_reach_[column]; });
     const double speed = std::sqrt(std::min(begin_squares, end_squares));
     const double largest = std::max(std::sqrt(change), reach);
     if (!(2.0 * largest < speed) || middle_squares == 0.0) return;

@@ -21,8 +21,8 @@ public:
     [[nodiscard]] double after(double t) const { return all_.after(t); }
     /// The first after t at which a value, a rate or an acceleration jumps, s; infinity if there is none.
     [[nodiscard]] double jump_after(double t) const { return jumps_.after(t); }
-    /// The shortest Motion::swing, s; infinity if there is none.
-    [[nodiscard]] double shortest_swing() const { return shortest_swing_; }
+    /// The shortest Motion::oscillation_period, s; infinity if there is none.
+    [[nodiscard]] double shortest_oscillation() const { return shortest_oscillation_; }
     /// Whether there is a motion of which nothing is known.
     [[nodiscard]] bool unknown() const { return unknown_; }
 
@@ -39,7 +39,7 @@ private:
         [[nodiscard]] double after(double t) const;
     };
     Times all_, jumps_;
-    double shortest_swing_ = std::numeric_limits<double>::infinity();
+    double shortest_oscillation_ = std::numeric_limits<double>::infinity();
     bool unknown_ = false;
 };
 

@@ -46,7 +46,7 @@ Motion Motion::sine(double amplitude, double frequency, double phase, double off
                                                         : (std::cos(phase) - std::cos(omega * t + phase)) / omega;
                                return offset * t + amplitude * swing;
                            });
-    if (amplitude != 0.0 && frequency != 0.0) motion.swing = 1.0 / std::abs(frequency);
+    if (amplitude != 0.0 && frequency != 0.0) motion.oscillation_period = 1.0 / std::abs(frequency);
     return motion;
 }
 

@@ -48,7 +48,7 @@ bool RunStep::try_to_take() {
         run_.record = {};
         run_.record.step = run_.now.step + 1;
         measure(next, taken, run_.record);
-        judge(run_.record, taken, totals);
+        judge(taken, totals);
     } catch (const Unsupported& error) {
         undo_all();
         throw Unsupported(fmt::format("{}: {}", where, error.what()));

@@ -45,8 +45,7 @@ protected:
     /// record ← what the state at the end of the step says; after `step`.
     virtual void measure(State& state, const AdaptiveStepReport& report, StepRecord& record) = 0;
     /// totals ← of the step. Throws StepFailure if it must not count.
-    virtual void judge(const StepRecord& /*record*/, const AdaptiveStepReport& /*report*/,
-                       SimulationTotals& /*totals*/) {}
+    virtual void judge(const AdaptiveStepReport& /*report*/, SimulationTotals& /*totals*/) {}
     /// The step counts. place: which one it is.
     virtual void count(const std::string& /*place*/, SimulationTotals& /*totals*/) {}
 

@@ -357,9 +357,7 @@ private:
         if (all_.shared_) record.penetration = all_.shared_->penetration();
     }
 
-    void judge(const StepRecord&, const AdaptiveStepReport& report, SimulationTotals& totals) override {
-        all_.judge(report, totals);
-    }
+    void judge(const AdaptiveStepReport& report, SimulationTotals& totals) override { all_.judge(report, totals); }
 
     void count(const std::string& place, SimulationTotals& totals) override {
         std::swap(all_.bodies_, all_.next_bodies_);

@@ -130,8 +130,8 @@ void Stepping::take(State& state, double h, StepSolver& solver, StepReport& repo
 // ---- What time prescribes ----
 //
 // A method knows forces and motions at some points of a step, and takes them for smooth in between. So steps end at
-// jumps and are short against what swings. Jumps that follow one another closely are those of a table that samples a
-// curve.
+// jumps and are short against what oscillates. Jumps that follow one another closely are those of a table that samples
+// a curve.
 double Stepping::cut(double t, double end) const {
     constexpr int most_jumps = 8;
     const double near = 1e-9 * settings_.step;
@@ -156,7 +156,7 @@ void Stepping::try_substeps(std::int64_t substeps, State& state, StepSolver& sol
     if (watch) watch->begin_trial(substeps);
     report.step.clear();
     report.error = 0.0;
-    bool whole = true;
+    bool whole = true;  // parts that are not cut are of one size to the last digit, as methods compare sizes
     for (std::int64_t i = 1; i <= substeps;) {
         const double end = begin + static_cast<double>(i) * part, until = cut(state.t, end);
         whole = whole && until == end;

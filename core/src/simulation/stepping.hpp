@@ -39,7 +39,7 @@ struct SteppingSettings {
 //
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
-//     cut by what time prescribes     where it jumps, or swings within the step
+//     cut by what time prescribes     where it jumps, or oscillates within the step
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
 //     again, by their error           where it errs by more than the accuracy, and that costs little
 //   or
