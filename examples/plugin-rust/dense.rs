@@ -186,7 +186,7 @@ extern "C" fn last_error(solver: *const Dense) -> *const c_char {
 static DESCRIPTOR: Descriptor = Descriptor {
     magic: 0x53414c44,
     abi_major: 2,
-    abi_minor: 5,
+    abi_minor: 6,
     struct_size: std::mem::size_of::<Descriptor>() as u32,
     flags: 0,
     name: text!("dense_rust"),

@@ -20,7 +20,7 @@ public:
     }
     sdk::Outcome solve(const sdk::ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
                        sdk::MutableVectorView lambda) override {
-        system_.load(problem);
+        if (!request.resume()) system_.load(problem);
         return iteration_.solve(system_, request, x, lambda);
     }
     [[nodiscard]] std::int64_t analyses() const override { return system_.analyses(); }
@@ -53,6 +53,7 @@ constexpr sdk::PluginInfo info{
                     DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_COULOMB | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
                     DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_H_SEMIDEFINITE | DELASSUS_CAN_REDUCED |
                     DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT | DELASSUS_CAN_WARM_START,
+    .flags = DELASSUS_FLAG_RESUMES,
 };
 
 }  // namespace

@@ -57,11 +57,17 @@ public:
     /// Leaves the best iterate in x (n) and lambda (m), where the start is. system must be loaded.
     [[nodiscard]] sdk::Outcome solve(System& system, const sdk::Request& request, sdk::MutableVectorView x,
                                      sdk::MutableVectorView lambda) {
-        // Not the penalty that the last solve ended with: a run that goes on from a checkpoint takes the same path.
-        system.set_penalty(initial_penalty_);
         Run run{system, request, sdk::Monitor(request, stall_iterations_)};
-        if (!check(run, start(run, x, lambda))) iterate(run);
+        if (request.resume()) {
+            run.monitor.go_on(lambda, best_error_);
+            iterate(run, true);
+        } else {
+            // Not the penalty that the last solve ended with: a run that goes on from a checkpoint takes the same path.
+            system.set_penalty(initial_penalty_);
+            if (!check(run, start(run, x, lambda))) iterate(run, false);
+        }
         system.end_iterations();
+        best_error_ = run.monitor.best_residual();
         lambda = run.monitor.best();
         x = system.definite() ? system.velocity(lambda) : best_x_;
         return run.monitor.outcome();
@@ -91,36 +97,41 @@ private:
         const double error = system.claim(reactions_, x_);
         best_x_ = x_;
         y_ = lambda_ - system.penalty() * system.scale().cwiseProduct(system.velocities(reactions_, x_));
-        return error;
-    }
-
-    void iterate(Run& run) {
-        System& system = run.system;
         anderson_.reset(y_.size(), memory_);
         penalty_rule_.reset(y_.size());
         forget();
-        bool extrapolated = false;
-        double accepted = 0.0;  // ‖step‖ of the latest point that was not rejected
-        while (true) {
-            ++run.iteration;
-            system.next_iteration();
-            system.project(y_, lambda_);
-            w_ = 2.0 * lambda_ - y_;
-            system.resolve(w_, mu_, u_);
-            if (judge(run)) return;
+        extrapolated_ = false;
+        accepted_ = 0.0;
+        iteration_ = 0;
+        return error;
+    }
+
+    // judged: the state was judged by the run that stopped.
+    void iterate(Run& run, bool judged) {
+        System& system = run.system;
+        for (;; judged = false) {
+            if (!judged) {
+                ++run.iteration;
+                ++iteration_;
+                system.next_iteration();
+                system.project(y_, lambda_);
+                w_ = 2.0 * lambda_ - y_;
+                system.resolve(w_, mu_, u_);
+                if (judge(run)) return;
+            }
 
             // ‖μ − λ‖ is the combined residual of Goldstein et al. (2014): under a convex law no plain step grows it.
             step_ = over_relaxation_ * (mu_ - lambda_);
             const double length = system.norm(step_);
-            if (extrapolated && !(length <= accepted)) {
+            if (extrapolated_ && !(length <= accepted_)) {
                 y_ = plain_;
                 forget();
-                extrapolated = false;
+                extrapolated_ = false;
                 continue;
             }
-            accepted = length;
+            accepted_ = length;
             plain_ = y_ + step_;
-            extrapolated = !(adaptive_ && change_penalty(run)) && extrapolate(system);
+            extrapolated_ = !(adaptive_ && change_penalty(run)) && extrapolate(system);
         }
     }
 
@@ -145,7 +156,7 @@ private:
         System& system = run.system;
         const double before = system.penalty();
         z_ = (lambda_ - y_) / before;
-        const double after = penalty_rule_.next(lambda_, z_, run.monitor.best_residual(), run.iteration, before,
+        const double after = penalty_rule_.next(lambda_, z_, run.monitor.best_residual(), iteration_, before,
                                                 [&system](const sdk::Vector& v) { return system.norm(v); });
         if (after == before) return false;
         system.set_penalty(after);
@@ -193,6 +204,10 @@ private:
 
     PenaltyRule penalty_rule_;
     sdk::Anderson anderson_;
+    std::int64_t iteration_ = 0;                       // of all runs since the start
+    double best_error_ = 0.0;                          // of the iterates since the start
+    bool extrapolated_ = false;                        // whether ŷ is, and has to prove itself
+    double accepted_ = 0.0;                            // ‖step‖ of the latest point that was not rejected
     double theta_ = 1.0;                               // Nesterov's sequence
     bool has_last_ = false;                            // whether last_ is there to extrapolate from
     sdk::Vector y_, lambda_;                           // the state and its λ̂

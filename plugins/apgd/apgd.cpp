@@ -12,7 +12,7 @@ public:
     void factorize(const sdk::ProblemView& problem) override { scaled_.factorize(problem, team()); }
     sdk::Outcome solve(const sdk::ProblemView& problem, const sdk::Request& request, sdk::MutableVectorView x,
                        sdk::MutableVectorView lambda) override {
-        scaled_.load(problem);
+        if (!request.resume()) scaled_.load(problem);
         return iteration_.solve(problem, scaled_, request, sdk::ScaledProblem::useful(team(), problem), x, lambda);
     }
     [[nodiscard]] std::int64_t analyses() const override { return scaled_.unscaled().inverse().analyses(); }
@@ -31,6 +31,7 @@ constexpr sdk::PluginInfo info{
     .capabilities = sdk::all_cones | DELASSUS_CAN_ASSOCIATED | DELASSUS_CAN_H_DIAGONAL | DELASSUS_CAN_H_BLOCKS |
                     DELASSUS_CAN_H_DEFINITE | DELASSUS_CAN_REDUCED | DELASSUS_CAN_COMPLIANCE | DELASSUS_CAN_REDUNDANT |
                     DELASSUS_CAN_WARM_START,
+    .flags = DELASSUS_FLAG_RESUMES,
 };
 
 }  // namespace

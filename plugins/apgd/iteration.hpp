@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "delassus/sdk/scaled_run.hpp"
 
@@ -35,10 +36,16 @@ public:
                                      const sdk::Request& request, const sdk::Team& team, sdk::MutableVectorView x,
                                      sdk::MutableVectorView lambda) {
         Run run(problem, scaled, request, stall_iterations_);
-        lambda_ = run.start(lambda);
-        for (sdk::Vector* v : {&velocity_, &next_, &next_velocity_, &point_, &point_velocity_, &change_, &product_})
-            v->setZero(problem.m);
-        iterate(scaled, run, team);
+        if (request.resume()) {
+            run.go_on(lambda, best_error_);
+            iterate(scaled, run, team, !backtracking_);
+        } else {
+            lambda_ = run.start(lambda);
+            for (sdk::Vector* v : {&velocity_, &next_, &next_velocity_, &point_, &point_velocity_, &change_, &product_})
+                v->setZero(problem.m);
+            if (!start(scaled, run)) iterate(scaled, run, team, false);
+        }
+        best_error_ = run.best_residual();
         return run.finish(x, lambda);
     }
 
@@ -50,25 +57,33 @@ private:
     static constexpr std::int64_t refresh_interval = 200;  // iterations between products that renew û
     static constexpr double rounding = 1e-10;              // of sums over all rows, generously
 
-    // û is affine in λ̂, so that û of the extrapolated point is the extrapolation of û: one product with N̂ an iteration.
-    void iterate(const Scaled& scaled, Run& run, const sdk::Team& team) {
+    // True: stop.
+    [[nodiscard]] bool start(const Scaled& scaled, Run& run) {
         scaled.gradient(lambda_, velocity_);
-        if (run.check(lambda_, velocity_)) return;
+        if (run.check(lambda_, velocity_)) return true;
         next_ = lambda_;
         next_velocity_ = velocity_;
-        step_ = 1.0;
-        double theta = 1.0, momentum = 0.0;
-        while (true) {
-            if (gradient_step(scaled, run, team, momentum)) return;
-            if (run.judge(natural_)) return;
+        step_ = theta_ = 1.0;
+        momentum_ = 0.0;
+        since_refresh_ = 0;
+        backtracking_ = false;
+        return false;
+    }
+
+    // û is affine in λ̂, so that û of the extrapolated point is the extrapolation of û: one product with N̂ an iteration.
+    // judged: the next iterate was judged by the run that stopped.
+    void iterate(const Scaled& scaled, Run& run, const sdk::Team& team, bool judged) {
+        for (;; judged = false) {
+            if (!judged && (gradient_step(scaled, run, team) || run.judge(natural_))) return;
 
             // Restart where the gradient mapping (y − λ⁺)/t points against the motion (O'Donoghue and Candès 2015,
             // eq. 13).
             const bool restart = restart_ && uphill_ < 0.0;
-            const double next_theta = restart ? 1.0 : 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * theta * theta));
-            momentum = restart ? 0.0 : (theta - 1.0) / next_theta;
-            theta = next_theta;
-            if (run.stale() || run.iteration() % refresh_interval == 0) {
+            const double next_theta = restart ? 1.0 : 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * theta_ * theta_));
+            momentum_ = restart ? 0.0 : (theta_ - 1.0) / next_theta;
+            theta_ = next_theta;
+            if (run.stale() || ++since_refresh_ >= refresh_interval) {
+                since_refresh_ = 0;
                 scaled.gradient(next_, next_velocity_);
                 scaled.gradient(lambda_, velocity_);
             }
@@ -85,13 +100,13 @@ private:
     // it again. The quantities that judge next are computed on the way, while its rows are in the cache, and added up
     // together: one reduction an iteration. True: stop. On entry next and its û are the iterate before λ̂, from which
     // the first pass extrapolates to y.
-    bool gradient_step(const Scaled& scaled, Run& run, const sdk::Team& team, double momentum) {
-        for (bool first = true;; first = false) {
+    bool gradient_step(const Scaled& scaled, Run& run, const sdk::Team& team) {
+        for (bool first = !std::exchange(backtracking_, false);; first = false) {
             const auto step_and_project = [&](const Part& part) {
                 if (first) {
-                    part.of(point_) = part.of(lambda_) + momentum * (part.of(lambda_) - part.of(next_));
+                    part.of(point_) = part.of(lambda_) + momentum_ * (part.of(lambda_) - part.of(next_));
                     part.of(point_velocity_) =
-                        part.of(velocity_) + momentum * (part.of(velocity_) - part.of(next_velocity_));
+                        part.of(velocity_) + momentum_ * (part.of(velocity_) - part.of(next_velocity_));
                 }
                 part.of(next_) = part.of(point_) - step_ * part.of(point_velocity_);
                 scaled.project(part, next_);
@@ -114,8 +129,8 @@ private:
             scaled.for_parts(team, [&](const Part& part) {
                 part.of(run.unscaled()) = part.of(lambda_).cwiseProduct(part.of(scaled.scaling()));
             });
-            if (run.count()) return true;
             step_ = std::min(shrinkage_ * step_, square / curvature);
+            if (run.count()) return backtracking_ = true;
         }
     }
 
@@ -124,6 +139,10 @@ private:
     std::int64_t stall_iterations_;
 
     double step_ = 1.0;                    // t
+    double theta_ = 1.0, momentum_ = 0.0;  // of Nesterov's sequence
+    std::int64_t since_refresh_ = 0;       // iterations since û was renewed
+    bool backtracking_ = false;            // whether the run stopped between two trials of a step
+    double best_error_ = 0.0;              // of the iterates since the start
     sdk::Vector lambda_, velocity_;        // λ̂ of the latest iterate and its û
     sdk::Vector point_, point_velocity_;   // y, where the gradient is taken, and its û
     sdk::Vector next_, next_velocity_;     // the iterate that follows

@@ -47,43 +47,40 @@ bool InteriorPoint::follow_shift(const Judge& judge, double tau, double goal, in
     }
 }
 
-// True: the iterate is on, or near, the path at τ.
-bool InteriorPoint::hop(const Judge& judge, double tau) {
-    cones_.take_shift_path();
-    const double size = std::sqrt(tau * std::max(cones_.degree(), 1.0));
-    double h = 1.0, tried_at = std::numeric_limits<double>::infinity(), lag = tried_at;
-    int failures = 0;
-    Complementarity kept = cones_;
-    sdk::Vector kept_x = x_;
+// True: the iterate is on, or near, the path at the hop's τ. Stopped, it goes on where it is called again.
+bool InteriorPoint::follow_flow(const Judge& judge, Hop& hop) {
+    const double size = std::sqrt(hop.tau * std::max(cones_.degree(), 1.0));
     const auto undo = [&] {
-        cones_ = kept;
-        x_ = kept_x;
+        cones_ = hop.kept;
+        x_ = hop.kept_x;
     };
-    for (int k = 0; k < longest_flow && !is_stopped_; ++k) {
-        cones_.set_share(h / (1.0 + h));
+    for (; hop.steps < longest_flow; ++hop.steps) {
+        cones_.set_share(hop.h / (1.0 + hop.h));
         const std::int64_t before = system_.factorizations();
-        if (!follow_shift(judge, tau, newton_goal, most_newton_steps)) {
+        if (!follow_shift(judge, hop.tau, newton_goal, most_newton_steps)) {
+            if (is_stopped_) return false;
             undo();
-            h *= 0.4;
-            if (++failures > 10) break;
+            hop.h *= 0.4;
+            if (++hop.failures > 10) break;
             continue;
         }
-        const std::int64_t steps = system_.factorizations() - before;
-        failures = 0;
-        lag = cones_.shift_lag() / size;
+        const std::int64_t newton_steps = system_.factorizations() - before;
+        hop.failures = 0;
+        hop.lag = cones_.shift_lag() / size;
         cones_.advance_shift();
-        kept = cones_;
-        kept_x = x_;
-        h = std::min(h * (steps <= 3 ? 1.3 : steps < 6 ? 1.0 : 0.8), largest_step);
-        if (lag < 0.5 * tried_at || k % 8 == 7) {
-            tried_at = std::min(lag, tried_at);
+        hop.kept = cones_;
+        hop.kept_x = x_;
+        hop.h = std::min(hop.h * (newton_steps <= 3 ? 1.3 : newton_steps < 6 ? 1.0 : 0.8), largest_step);
+        if (hop.lag < 0.5 * hop.tried_at || hop.steps % 8 == 7) {
+            hop.tried_at = std::min(hop.lag, hop.tried_at);
             cones_.set_share(1.0);
-            if (follow_shift(judge, tau, path_goal, most_path_steps)) return true;
+            if (follow_shift(judge, hop.tau, path_goal, most_path_steps)) return true;
             undo();
         }
-        if (lag < small_lag && k >= 3) return true;
+        if (hop.lag < small_lag && hop.steps >= 3) return true;
+        if (is_stopped_) return false;
     }
-    return lag < 1.0;
+    return hop.lag < 1.0;
 }
 
 // From the jam of the path on, until it is followed to its end (true) or hops lead no further down.
@@ -92,7 +89,15 @@ bool InteriorPoint::hop_on(const Judge& judge) {
     rise_ = tau < 0.9 * lowest_tau_ ? 1.0 : 2.0 * rise_;
     lowest_tau_ = std::min(lowest_tau_, tau);
     if (rise_ > most_rising || ++hops_ > most_hops_) return false;
-    hop(judge, fall * rise_ * tau);
+    cones_.take_shift_path();
+    hop_.emplace(fall * rise_ * tau, cones_, x_);
+    return end_hop(judge);
+}
+
+// The rest of the hop at hand. False: stopped.
+bool InteriorPoint::end_hop(const Judge& judge) {
+    if (!follow_flow(judge, *hop_) && is_stopped_) return false;
+    hop_.reset();
     cones_.take_product_path();
     jam_ = 0.0;
     centre_next_ = 0;

@@ -28,30 +28,42 @@ sdk::Outcome InteriorPoint::solve(const sdk::ProblemView& problem, const sdk::Re
                                   sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
     if (!problem.coulomb) return Iteration::solve(problem, request, x, lambda);
     return solve_by(
-        [this](sdk::Monitor& monitor, bool) {
-            start_cold();
-            if (shift_first_) cones_.take_shift_path();
-            iterate(monitor);
+        [this](sdk::Monitor& monitor, Beginning beginning) {
+            if (beginning != Beginning::Resumed) start_path();
+            iterate(monitor, beginning == Beginning::Resumed);
         },
         problem, request, x, lambda);
 }
 
-void InteriorPoint::iterate(sdk::Monitor& monitor) {
+void InteriorPoint::start_path() {
+    start_cold();
+    if (shift_first_) cones_.take_shift_path();
     slow_iterations_ = 0;
     halved_error_ = path_error_ = lowest_tau_ = infinity;
     centre_next_ = hops_ = 0;
     jam_ = 0.0;
     rise_ = 1.0;
+    hop_.reset();
+}
+
+// judged: the iterate was judged by the loop that stopped.
+void InteriorPoint::iterate(sdk::Monitor& monitor, bool judged) {
     is_stopped_ = false;
     const auto judge_iterate = [&] {
         const bool stop = judge_step(monitor);
         path_error_ = std::min(path_error_, error_);
         return stop;
     };
-    while (true) {
-        find_residuals();
-        if (!step()) return stall_outside(monitor);
-        if (judge_iterate()) return;
+    if (hop_) {
+        if (!end_hop(judge_iterate)) return;
+        judged = false;
+    }
+    for (;; judged = false) {
+        if (!judged) {
+            find_residuals();
+            if (!step()) return stall_outside(monitor);
+            if (judge_iterate()) return;
+        }
         if (is_jammed()) {
             if (path_error_ < error_for_ssn || !hop_on(judge_iterate)) {
                 if (!is_stopped_) stall(monitor, "the path to the solution ends: steps inside the cones stay short");

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "equations.hpp"
 #include "iteration.hpp"
@@ -22,7 +23,8 @@ public:
 
 private:
     // Exact Coulomb only, as all that follows.
-    void iterate(sdk::Monitor& monitor);
+    void start_path();
+    void iterate(sdk::Monitor& monitor, bool judged);
     bool is_slow();
 
     bool step();  // coulomb_step.cpp
@@ -33,8 +35,18 @@ private:
     // coulomb_path.cpp
     using Judge = std::function<bool()>;  // of the iterate; true: stop
     bool follow_shift(const Judge& judge, double tau, double goal, int most);
-    bool hop(const Judge& judge, double tau);
+    struct Hop {
+        Hop(double to, const Complementarity& from, const sdk::Vector& x) : tau(to), kept(from), kept_x(x) {}
+        double tau, h = 1.0;         // where it goes, and the step of Euler's method
+        double lag = infinity;       // of the shift, after the latest step
+        double tried_at = infinity;  // the least lag at which the path was tried
+        int steps = 0, failures = 0;
+        Complementarity kept;  // after the latest step, with its x̂
+        sdk::Vector kept_x;
+    };
+    bool follow_flow(const Judge& judge, Hop& hop);
     bool hop_on(const Judge& judge);
+    bool end_hop(const Judge& judge);
 
     bool shift_first_;
     std::int64_t most_hops_;
@@ -45,6 +57,7 @@ private:
     int centre_next_ = 0;  // iterations that aim at the present products
     int hops_ = 0;
     double rise_ = 1.0, lowest_tau_ = 0.0;
+    std::optional<Hop> hop_;   // at hand
     bool is_stopped_ = false;  // in a hop
     double jam_ = 0.0;         // counts short steps
 };

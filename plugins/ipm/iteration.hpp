@@ -40,13 +40,10 @@ public:
     [[nodiscard]] sdk::Outcome solve(const typename System::View& problem, const sdk::Request& request,
                                      sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
         return solve_by(
-            [this](sdk::Monitor& monitor, bool warm) {
-                if (warm) {
-                    start_warm(monitor.best_residual());
-                } else {
-                    start_cold();
-                }
-                iterate(monitor);
+            [this](sdk::Monitor& monitor, Beginning beginning) {
+                if (beginning == Beginning::Cold) start_cold();
+                if (beginning == Beginning::Warm) start_warm(monitor.best_residual());
+                iterate(monitor, beginning == Beginning::Resumed);
             },
             problem, request, x, lambda);
     }
@@ -54,21 +51,26 @@ public:
 protected:
     using Start = typename Refinement<typename System::Linear>::Start;
 
-    /// Runs loop(monitor, warm) unless the start, given (warm) or zero, is good enough.
+    enum class Beginning {
+        Cold,    ///< at zero
+        Warm,    ///< at the start that was given
+        Resumed  ///< where the last loop stopped
+    };
+
+    /// One solve whose iterations are those of loop(monitor, beginning).
     template <class Loop>
     [[nodiscard]] sdk::Outcome solve_by(const Loop& loop, const typename System::View& problem,
                                         const sdk::Request& request, sdk::MutableVectorView x,
                                         sdk::MutableVectorView lambda) {
-        system_.load(problem, cones_);
-        const bool warm = request.warm_start() && system_.everywhere(lambda.allFinite() && x.allFinite());
-        true_lambda_ = warm ? sdk::Vector(lambda) : sdk::Vector::Zero(problem.m);
-        true_x_ = warm ? sdk::Vector(x) : sdk::Vector::Zero(problem.n);
-        for (const delassus_cone& cone : problem.cones) sdk::project(cone, true_lambda_.data() + cone.first_row);
-        best_x_ = true_x_;
-        least_error_ = least_rest_ = infinity;
-        iteration_ = idle_iterations_ = 0;
         sdk::Monitor monitor(request, 0);
-        if (!judge(monitor)) loop(monitor, warm);
+        iteration_ = 0;
+        if (request.resume()) {
+            monitor.go_on(lambda, best_error_);
+            loop(monitor, Beginning::Resumed);
+        } else {
+            start(loop, monitor, problem, request, x, lambda);
+        }
+        best_error_ = monitor.best_residual();
         system_.end_iterations();
         const bool proof = monitor.outcome().status == DELASSUS_INFEASIBLE;  // the directions along which they diverge
         lambda = proof ? true_lambda_ : monitor.best();
@@ -76,6 +78,21 @@ protected:
         std::string& message = monitor.outcome().message;
         message += (message.empty() ? "" : "; ") + system_.description();
         return monitor.outcome();
+    }
+
+    /// Runs loop(monitor, beginning) unless the given start, or zero, is good enough.
+    template <class Loop>
+    void start(const Loop& loop, sdk::Monitor& monitor, const typename System::View& problem,
+               const sdk::Request& request, const sdk::MutableVectorView& x, const sdk::MutableVectorView& lambda) {
+        system_.load(problem, cones_);
+        const bool warm = request.warm_start() && system_.everywhere(lambda.allFinite() && x.allFinite());
+        true_lambda_ = warm ? sdk::Vector(lambda) : sdk::Vector::Zero(problem.m);
+        true_x_ = warm ? sdk::Vector(x) : sdk::Vector::Zero(problem.n);
+        for (const delassus_cone& cone : problem.cones) sdk::project(cone, true_lambda_.data() + cone.first_row);
+        best_x_ = true_x_;
+        least_error_ = least_rest_ = infinity;
+        idle_iterations_ = 0;
+        if (!judge(monitor)) loop(monitor, warm ? Beginning::Warm : Beginning::Cold);
     }
 
     /// Judges the iterate in true_x_, true_lambda_; true: stop.
@@ -173,12 +190,15 @@ private:
     // ‖S r‖ = 1 in scaled units. A solution larger than the data by this factor counts as none.
     static constexpr double largest_solution = 1e9;
 
-    void iterate(sdk::Monitor& monitor) {
-        while (true) {
-            system_.next_iteration();
-            find_residuals();
-            if (!step()) return stall_outside(monitor);
-            if (judge_step(monitor)) return;
+    // judged: the iterate was judged by the loop that stopped.
+    void iterate(sdk::Monitor& monitor, bool judged) {
+        for (;; judged = false) {
+            if (!judged) {
+                system_.next_iteration();
+                find_residuals();
+                if (!step()) return stall_outside(monitor);
+                if (judge_step(monitor)) return;
+            }
             if (const double size = proven_size(); size > largest_solution) {
                 char text[160];
                 std::snprintf(
@@ -265,6 +285,7 @@ private:
     sdk::Vector best_x_;                           // in the problem's units
     sdk::Vector kept_x_, kept_z_;                  // δx and δz before a corrector
     double least_error_ = 0.0, least_rest_ = 0.0;  // of is_stuck
+    double best_error_ = 0.0;                      // of the iterates since the start
 };
 
 }  // namespace delassus::ipm

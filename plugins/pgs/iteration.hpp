@@ -39,27 +39,31 @@ public:
     template <class Measured>
     void run(Model& model, const sdk::DelassusOperator& N, double reference, bool coulomb, const sdk::Request& request,
              sdk::Monitor& monitor, sdk::Vector& lambda, const Measured& measured) {
-        rule_.coulomb = coulomb;
-        reference_ = reference;
-        model.state_of(lambda, state_);
+        const bool resumed = request.resume();
         // A tolerance below rounding asks for all iterations: then only their end is measured. A few of them gain less
         // by extrapolation than it costs.
         const bool to_the_end = request.tolerance() < std::numeric_limits<double>::epsilon();
-        const bool few = to_the_end && request.max_iterations() < fewest_extrapolated;
-        extrapolation_.reset(model, N, few ? 0 : memory_);
-        // A warm start is a step of a simulation, whose sweeps are few: their own estimate says when to look.
-        const bool estimates = request.warm_start() && check_every_ == 0 && !jacobi_;
-        std::int64_t next_check = to_the_end ? request.max_iterations() : 0;
+        if (!resumed) {
+            rule_.coulomb = coulomb;
+            reference_ = reference;
+            model.state_of(lambda, state_);
+            const bool few = to_the_end && request.max_iterations() < fewest_extrapolated;
+            extrapolation_.reset(model, N, few ? 0 : memory_);
+            // A warm start is a step of a simulation, whose sweeps are few: their own estimate says when to look.
+            estimates_ = request.warm_start() && check_every_ == 0 && !jacobi_;
+        }
+        std::int64_t next_check = to_the_end ? request.max_iterations() : resumed ? Extrapolation::period : 0;
         shown_ = Clock::now();
         last_shown_ = 0;
         next_show_ = 1;
-        for (std::int64_t iteration = 0;; ++iteration) {
+        if (resumed) extrapolation_.after(model, state_);
+        for (std::int64_t iteration = resumed ? 1 : 0;; ++iteration) {
             bool looks = false;
             double error = std::numeric_limits<double>::infinity();
             if (iteration > 0) {
                 extrapolation_.before(model, state_);
                 looks = extrapolation_.looks();
-                const bool records = estimates && (iteration == 1 || iteration % Extrapolation::period == 0);
+                const bool records = estimates_ && (iteration == 1 || iteration % Extrapolation::period == 0);
                 const double squares = advance(model, records);
                 if (records) error = natural(model, squares);
                 looks = looks && !records;
@@ -86,7 +90,7 @@ public:
                 }
                 has_shown(model, iteration);
                 next_check =
-                    estimates ? iteration + std::max(fewest_unchecked, iteration / 20) : next_check_after(iteration);
+                    estimates_ ? iteration + std::max(fewest_unchecked, iteration / 20) : next_check_after(iteration);
             }
             if (iteration > 0) extrapolation_.after(model, state_);
         }
@@ -167,6 +171,7 @@ private:
     int memory_;  // 0: no acceleration
     std::int64_t check_every_, stall_window_;
     SweepRule rule_;
+    bool estimates_ = false;
     double reference_ = 1.0;
     Clock::time_point shown_;
     std::int64_t last_shown_ = 0, next_show_ = 0;

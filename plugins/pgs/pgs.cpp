@@ -56,18 +56,22 @@ public:
 
     sdk::Outcome solve(const ProblemView& problem, const Request& request, sdk::MutableVectorView x,
                        sdk::MutableVectorView lambda) override {
-        operator_.free_velocity(problem, u_);
-        residual_.assign(problem, operator_.diagonal(), u_);
-        model_.use(useful_team(problem));
-        model_.set_right_hand_side(problem, operator_, residual_.scaling());
-        lambda_.setZero(problem.m);
-        if (request.warm_start() && lambda.allFinite()) lambda_ = lambda;
-        for (const delassus_cone& cone : problem.cones) sdk::project(cone, lambda_.data() + cone.first_row);
-
         sdk::Monitor monitor(request, iteration_.stall_window());
+        model_.use(useful_team(problem));
+        if (request.resume()) {
+            monitor.go_on(lambda, best_error_);
+        } else {
+            operator_.free_velocity(problem, u_);
+            residual_.assign(problem, operator_.diagonal(), u_);
+            model_.set_right_hand_side(problem, operator_, residual_.scaling());
+            lambda_.setZero(problem.m);
+            if (request.warm_start() && lambda.allFinite()) lambda_ = lambda;
+            for (const delassus_cone& cone : problem.cones) sdk::project(cone, lambda_.data() + cone.first_row);
+        }
         iteration_.run(model_, operator_, residual_.reference(), problem.coulomb, request, monitor, lambda_,
                        [&](const Vector& reactions) { return measured(problem, reactions); });
         model_.use({});
+        best_error_ = monitor.best_residual();
         lambda = monitor.best();
         x = operator_.velocity(problem, lambda);
         return monitor.outcome();
@@ -97,6 +101,7 @@ private:
     Model model_;
     sdk::NaturalResidual residual_;
     Vector lambda_, u_;
+    double best_error_ = 0.0;  // of the iterates since the start
 };
 
 constexpr std::uint64_t capabilities =
@@ -113,5 +118,6 @@ DELASSUS_SOLVER_PLUGIN(delassus::pgs::Pgs,
                                                   .description = "projected Gauss-Seidel over blocks, on velocities or "
                                                                  "on rows of the Delassus operator",
                                                   .licence = "BSD-3-Clause AND MPL-2.0",
-                                                  .capabilities = delassus::pgs::capabilities}),
+                                                  .capabilities = delassus::pgs::capabilities,
+                                                  .flags = DELASSUS_FLAG_RESUMES}),
                        delassus::pgs::option_table)

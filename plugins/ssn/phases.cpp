@@ -128,12 +128,16 @@ SemismoothNewton::Result SemismoothNewton::proximal_step(sdk::ScaledRun& run) {
         const double length =
             convex ? convex_search(subproblem) : merit_search(subproblem, allowed_growth * best, 0.05, value);
         move_to(lambda_ + length * step_);
-        if (run.check(lambda_, velocity_)) return Result::Stopped;
+        const bool stopped = run.check(lambda_, velocity_);
         value = merit(lambda_, velocity_, measure);
         if (value < best) {
             best = value;
             best_at = k;
             kept_ = lambda_;
+        }
+        if (stopped) {
+            move_to(kept_);
+            return Result::Stopped;
         }
         failed = !convex && (k - best_at >= watch || value > 100.0 * best);
     }

@@ -57,33 +57,41 @@ std::int64_t SemismoothNewton::factorizations() const {
 
 sdk::Outcome SemismoothNewton::solve(const sdk::ProblemView& problem, const sdk::Request& request,
                                      sdk::MutableVectorView x, sdk::MutableVectorView lambda) {
-    scaled_.load(problem);
-    map_.load(scaled_);
-    map_.set_law(problem.coulomb ? 1.0 : 0.0);
-    const double size = scaled_.r().norm();
-    reference_ = size > 0.0 ? size : 1.0;
     // iterate() finds a stall itself: the monitor would take the path between the laws for one.
     sdk::ScaledRun run(problem, scaled_, request, 0);
-    move_to(run.start(lambda));
-    const bool stopped = run.check(lambda_, velocity_);
-    if (!stopped) iterate(run);
+    if (request.resume() && !between_laws_) {
+        run.go_on(lambda, best_error_);
+        iterate(run, true);
+    } else {
+        scaled_.load(problem);
+        map_.load(scaled_);
+        map_.set_law(problem.coulomb ? 1.0 : 0.0);
+        const double size = scaled_.r().norm();
+        reference_ = size > 0.0 ? size : 1.0;
+        between_laws_ = false;
+        move_to(run.start(lambda));
+        if (!run.check(lambda_, velocity_)) iterate(run, false);
+    }
+    best_error_ = run.best_residual();
     return run.finish(x, lambda);
 }
 
 // Returns where the run asks to stop, or stalls it.
-void SemismoothNewton::iterate(sdk::ScaledRun& run) {
+void SemismoothNewton::iterate(sdk::ScaledRun& run, bool resumed) {
     const Patience last{stall_iterations_, last_gain};
     const bool may_follow = map_.law() > 0.0 && follow_law_;
     const Patience direct{std::min(direct_solves, stall_iterations_), 0.5};
-    tau_ = std::min(first_tau, error());
+    if (!resumed) begin_law(std::min(first_tau, error()));
     if (solve_law(run, 0.0, may_follow ? direct : last) == Result::Stopped) return;
     while (may_follow && !at_rounding()) {
         const Vector before = lambda_;
         const double error_before = error();
+        between_laws_ = true;
         if (follow_law(run, std::min(path_goal, 0.01 * error_before)) == Result::Stopped) return;
+        between_laws_ = false;
         map_.set_law(1.0);
         if (!(error() <= error_before)) move_to(before);
-        tau_ = std::min(first_tau, error());
+        begin_law(std::min(first_tau, error()));
         if (solve_law(run, 0.0, last) == Result::Stopped) return;
         if (!(error() <= 0.5 * error_before)) break;
     }
@@ -94,7 +102,7 @@ void SemismoothNewton::iterate(sdk::ScaledRun& run) {
 // extrapolation of the last two points.
 SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run, double goal) {
     map_.set_law(0.0);
-    tau_ = first_tau;
+    begin_law(first_tau);
     if (const Result result = solve_law(run, goal, associated_patience); result != Result::Reached) return result;
     double theta = 0.0, stride = first_stride, last_stride = 0.0;
     Vector here = lambda_, before = lambda_;
@@ -103,7 +111,7 @@ SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run, doubl
         map_.set_law(next);
         if (last_stride > 0.0) move_to(here + ((next - theta) / last_stride) * (here - before));
         const std::int64_t since = run.iteration();
-        tau_ = std::min(first_tau, 1e-3 * error());
+        begin_law(std::min(first_tau, 1e-3 * error()));
         const Result result = solve_law(run, goal, path_patience);
         if (result == Result::Stopped) return result;
         if (result == Result::Reached) {
@@ -121,25 +129,32 @@ SemismoothNewton::Result SemismoothNewton::follow_law(sdk::ScaledRun& run, doubl
     return Result::Reached;
 }
 
-// Proximal subproblems, and Newton's method on the problem itself where it looks near.
-SemismoothNewton::Result SemismoothNewton::solve_law(sdk::ScaledRun& run, double goal, Patience patience) {
-    double threshold = newton_threshold;
-    double milestone = error();
-    std::int64_t since = run.iteration();
+// To solve under the law of the map, from the iterate.
+void SemismoothNewton::begin_law(double tau) {
+    tau_ = tau;
     shrinkage_ = 10.0;
     previous_tau_ = 0.0;
+    threshold_ = newton_threshold;
+    milestone_ = error();
+    waited_ = 0;
+}
+
+// Proximal subproblems, and Newton's method on the problem itself where it looks near.
+SemismoothNewton::Result SemismoothNewton::solve_law(sdk::ScaledRun& run, double goal, Patience patience) {
     while (error() > goal) {
         if (!std::isfinite(error())) return Result::Failed;
-        if (error() <= threshold) {
+        const std::int64_t before = run.iteration();
+        if (error() <= threshold_) {
             if (const Result result = newton(run, goal); result != Result::Failed) return result;
             if (at_rounding()) return Result::Failed;
-            threshold = 0.3 * error();
+            threshold_ = 0.3 * error();
         }
         if (proximal_step(run) == Result::Stopped) return Result::Stopped;
-        if (const double now = error(); now <= patience.gain * milestone) {
-            milestone = now;
-            since = run.iteration();
-        } else if (run.iteration() - since > patience.solves) {
+        waited_ += run.iteration() - before;
+        if (const double now = error(); now <= patience.gain * milestone_) {
+            milestone_ = now;
+            waited_ = 0;
+        } else if (waited_ > patience.solves) {
             return Result::Failed;
         }
     }

@@ -34,7 +34,8 @@ private:
     };
 
     // ssn.cpp: the order of the phases
-    void iterate(sdk::ScaledRun& run);
+    void iterate(sdk::ScaledRun& run, bool resumed);
+    void begin_law(double tau);
     Result follow_law(sdk::ScaledRun& run, double goal);
     Result solve_law(sdk::ScaledRun& run, double goal, Patience patience);
     [[nodiscard]] bool at_rounding();
@@ -60,6 +61,13 @@ private:
     bool follow_law_;
     bool pattern_is_new_ = true;
 
+    // Of solve_law:
+    double threshold_ = 0.0;   // error below which Newton's method is tried without a centre
+    double milestone_ = 0.0;   // the error that the next has to better
+    std::int64_t waited_ = 0;  // iterations since then
+
+    bool between_laws_ = false;  // the run stopped in follow_law
+    double best_error_ = 0.0;    // of the iterates since the start
     double reference_ = 1.0;     // ‖r̂‖, or 1 if that is zero
     double tau_ = 0.1;           // of the next proximal subproblem
     double shrinkage_ = 10.0;    // by which τ falls after a subproblem that was solved

@@ -28,8 +28,8 @@ std::string refusal_of(const std::string& name) {
 
 TEST(Load, RefusesBrokenHandshakesWithASentence) {
     const std::pair<const char*, std::vector<const char*>> cases[] = {
-        {"wrong_abi", {"99.5", "this is version 2.5"}},
-        {"before_release", {"built for version 1.0", "this is version 2.5"}},
+        {"wrong_abi", {"99.6", "this is version 2.6"}},
+        {"before_release", {"built for version 1.0", "this is version 2.6"}},
         {"wrong_magic", {"magic number"}},
         {"small_descriptor", {"24 bytes"}},
         {"bad_name", {"../Bad Name", "not a word"}},

@@ -97,7 +97,7 @@ TEST(Rounds, WhoEndedBeginsWhereAnotherStopped) {
         if (turn.round == 3) return {TurnEnd::Done, 1.0};
         switch (turn.member) {
             case 0:
-                return {turn.round == 0 ? TurnEnd::Exhausted : TurnEnd::Ended, 0.5};
+                return {turn.round == 0 ? TurnEnd::Exhausted : TurnEnd::Ended, turn.round == 2 ? 0.001 : 0.5};
             case 1:
                 return {TurnEnd::Ended, 0.1};
             case 2:
@@ -116,6 +116,20 @@ TEST(Rounds, WhoEndedBeginsWhereAnotherStopped) {
     for (std::size_t k = 0; k < std::min(begun.size(), expected.size()); ++k)
         EXPECT_EQ(begun[k], expected[k]) << "turn " << k << ": member " << begun[k].member << ", round "
                                          << begun[k].round;
+}
+
+// A member that does not profit from the starts of others would do the same again in every round.
+TEST(Rounds, WhoEndsAgainNoNearerIsRetired) {
+    std::vector<int> turns(3);
+    const std::vector<Member> members = {{}, {}, {.local = true}};
+    const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
+        ++turns[turn.member];
+        const double error = std::exp2(-turn.round);
+        if (turn.member == 0) return {turn.round == 5 ? TurnEnd::Done : TurnEnd::Exhausted, error};
+        return {TurnEnd::Ended, error};
+    });
+    EXPECT_EQ(end, RoundsEnd::Done);
+    EXPECT_EQ(turns, (std::vector<int>{6, 2, 5})) << "one round alone, one from another's iterate; the local one on";
 }
 
 TEST(Rounds, EndWhereNobodyHasATurn) {

@@ -72,7 +72,9 @@ RawResult RawSolver::solve(const delassus_problem& problem, const SolveSettings&
                                    settings.max_iterations,
                                    settings.time_limit,
                                    listener ? &call_listener : nullptr,
-                                   const_cast<Listener*>(&listener)};
+                                   const_cast<Listener*>(&listener),
+                                   0,
+                                   0};
     result.status = border_.solve(solver_, &problem, &request, x.begin(), lambda.begin(), &result.outcome);
     result.solution = {x.content("x"), lambda.content("λ")};
     expect(result.status == result.outcome.status,

@@ -27,6 +27,38 @@ std::string check_warm_start(const Subject& subject) {
     return fmt::format("{} iterations from zero, {} from the solutions", cold_sum, warm_sum);
 }
 
+/// In pieces of a seventh each, a solve takes the iterations that it takes in one piece, and what it takes to notice
+/// the end and to do again what was cut short, at most a piece.
+std::string check_resume(const Subject& subject) {
+    if ((subject.info().flags & DELASSUS_FLAG_RESUMES) == 0) throw Skip("it does not declare that it resumes");
+    std::int64_t whole_sum = 0, pieces_sum = 0;
+    auto problems = subject.problems();
+    for (auto& tower : subject.takeable(towers())) problems.push_back(std::move(tower));
+    for (const auto& known : problems) {
+        Solver solver = subject.solver();
+        const PreparedProblem problem(known.problem);
+        auto settings = settings_of(fine_tolerance);
+        Solution solution;
+        const auto whole = solver.solve(problem, solution, settings);
+        if (whole.status != Status::Solved || whole.iterations < 14) continue;  // a tower may be too hard for it
+        settings.max_iterations = whole.iterations / 7;
+        SolveReport piece;
+        std::int64_t iterations = 0;
+        do {
+            piece = solver.solve(problem, solution, settings);
+            iterations += piece.iterations;
+            settings.warm_start = settings.resume = true;
+            expect(iterations <= whole.iterations + 2 * settings.max_iterations,
+                   fmt::format("\"{}\" took {} iterations in one piece and is not solved after {} in pieces of {}",
+                               known.problem.name, whole.iterations, iterations, settings.max_iterations));
+        } while (piece.status == Status::IterationLimit);
+        expect_known_solution(known, solution, piece);
+        whole_sum += whole.iterations;
+        pieces_sum += iterations;
+    }
+    return fmt::format("{} iterations in one piece, {} in seven", whole_sum, pieces_sum);
+}
+
 std::string check_right_hand_sides(const Subject& subject) {
     std::int64_t analyses = 0;
     for (const auto& known : subject.problems()) {
@@ -80,6 +112,7 @@ std::string check_patterns(const Subject& subject) {
 
 std::vector<Check> reuse_checks() {
     return {{"reuse/warm_start", check_warm_start},
+            {"reuse/resume", check_resume},
             {"reuse/right_hand_sides", check_right_hand_sides},
             {"reuse/values", check_values},
             {"reuse/patterns", check_patterns}};

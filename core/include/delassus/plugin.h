@@ -36,7 +36,7 @@ extern "C" {
  * Of a descriptor the host checks that itself: it takes any that has all fields of 2.0.
  * Major version 1 was never released; its cones had no stride. */
 #define DELASSUS_ABI_MAJOR 2 /* must be equal on both sides */
-#define DELASSUS_ABI_MINOR 5
+#define DELASSUS_ABI_MINOR 6
 
 #if defined(_WIN32)
 #define DELASSUS_PLUGIN_EXPORT __declspec(dllexport)
@@ -234,6 +234,11 @@ typedef struct delassus_request {
     double time_limit;          /* seconds, INFINITY for none; for planning only: progress enforces it */
     delassus_progress progress; /* NULL: nobody listens */
     void* progress_context;
+    /* Since 2.6. 1: go on where the last call of this solver stopped, at max_iterations or as progress asked, after at
+     * least one iteration: it solved the same problem, and x and λ are as it left them. The iterates are to be those of
+     * a solve that was not stopped; they count anew. Only plugins with DELASSUS_FLAG_RESUMES are asked. */
+    int32_t resume;
+    int32_t reserved;
 } delassus_request;
 
 /* Since 2.4. What a solve spends its time on in one process. Every second belongs to one phase at most; what belongs to
@@ -283,6 +288,8 @@ typedef struct delassus_team {
 #define DELASSUS_FLAG_PEER 4u           /* for comparisons: works only where it is named, never as a last resort */
 /* Since 2.5. It converges fast near a solution and hardly elsewhere: `auto` starts it at the best iterate of all. */
 #define DELASSUS_FLAG_LOCAL 8u
+/* Since 2.6. It keeps its state after a solve that was stopped, and can go on from there (delassus_request.resume). */
+#define DELASSUS_FLAG_RESUMES 16u
 
 /* Since 2.5. Whether the compiler optimised the plugin. Its times say little if not, and the host says so wherever it
  * shows or compares them. DELASSUS_BUILD is the number of the compilation at hand. */

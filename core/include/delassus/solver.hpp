@@ -59,6 +59,9 @@ struct SolveSettings {
     bool fixed_iterations = false;
     double time_limit = std::numeric_limits<double>::infinity();  ///< seconds of the solver's own time
     bool warm_start = false;                                      ///< start from the Solution given
+    /// The last call of this solver was for the same problem and left this solution: where it stopped at a limit, it
+    /// goes on as if it had not, if it can (DELASSUS_FLAG_RESUMES); else the solution is a start like any other.
+    bool resume = false;
     Origin origin = Origin::Alone;
     /// Threads that the solver may share its work among; the answer is the same to the bit without them. May be null.
     std::shared_ptr<ThreadTeam> team;

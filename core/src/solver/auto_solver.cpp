@@ -140,6 +140,7 @@ public:
         Solution start = solution;
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
+        std::map<const Solver*, std::size_t> users;  // the member that used it last
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
             const RankedSolver& own = ranked[turn.member];
             report.near_goal = turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work);
@@ -154,7 +155,9 @@ public:
             Stage stage{.reason = fmt::format("round {}", turn.round + 1),
                         .iterations = turn.iterations,
                         .may_pass = turn.may_pass && !members[turn.member].local,
-                        .law = own.law};
+                        .law = own.law,
+                        .resume = turn.start == turn.member && users.contains(solver) && users[solver] == turn.member};
+            users[solver] = turn.member;
             // What Newton's method gains with its last iteration costs nothing.
             if (step && (members[turn.member].local || sharpens)) stage.tighter = sharper;
             Solution& iterate = left[turn.member];
@@ -182,8 +185,9 @@ public:
 
 private:
     [[nodiscard]] const Order& order_of(const Prepared& problem, Origin origin) const {
-        const auto rows = std::min<std::int64_t>(problem.all_rows(), std::numeric_limits<std::int32_t>::max());
-        return ranking_.order({needs_of(problem, {}), origin == Origin::Step}, static_cast<std::int32_t>(rows));
+        const auto m = static_cast<double>(problem.all_rows());
+        const auto n = static_cast<double>(problem.whole() ? problem.whole()->n : problem.part()->n_all);
+        return ranking_.order({needs_of(problem, {}), origin == Origin::Step}, {m, n > 0.0 ? m / n : 0.0});
     }
 
     struct Team {

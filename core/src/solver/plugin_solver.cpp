@@ -218,7 +218,7 @@ private:
                                            "analyze", [&] { return analyze(problem); }, limit));
             if (ending.status != DELASSUS_SOLVED) return ending;
         }
-        analyzed = false;
+        analyzed = stopped_ = false;
         Ending ending = agree(run, instance.guarded(
                                        "factorize", [&] { return factorize(problem); }, limit));
         analyzed = ending.status == DELASSUS_SOLVED;
@@ -231,7 +231,8 @@ private:
     OptionTexts chosen;
     const Registry* registry;
     bool analyzed = false;
-    SetUpCounts counts_;  // at the last solve
+    bool stopped_ = false;  // at a limit, in a state that it can go on from
+    SetUpCounts counts_;    // at the last solve
     std::uint64_t pattern_id = 0, values_id = 0;
 };
 
@@ -267,7 +268,10 @@ std::optional<Errors> PluginSolver::run(const Prepared& problem, Solution& solut
                                        settings.max_iterations,
                                        settings.time_limit,
                                        &Listener::callback,
-                                       &listener};
+                                       &listener,
+                                       settings.resume && stopped_ ? 1 : 0,
+                                       0};
+        stopped_ = false;
         TraceSpan span("plugin", "iterate");
         watch.start();
         ending = agree(run, instance.guarded([&] { return solve(problem, request, solution, outcome); }));
@@ -278,6 +282,8 @@ std::optional<Errors> PluginSolver::run(const Prepared& problem, Solution& solut
         if (ending.status != DELASSUS_ERROR) {
             report.iterations = outcome.iterations;
             counts_ = {outcome.analyses, outcome.factorizations};
+            stopped_ = (info().flags & DELASSUS_FLAG_RESUMES) != 0 && outcome.iterations > 0 &&
+                       (ending.status == DELASSUS_ITERATION_LIMIT || ending.status == DELASSUS_CANCELLED);
         }
         given_up = listener.given_up();
     }

@@ -24,10 +24,10 @@ void check_keys(const nlohmann::json& object, const std::vector<std::string_view
             throw InputError(fmt::format("{} has no key \"{}\"{}", where, key, nearest_name_hint(key, known)));
 }
 
-RowRange read_rows(const nlohmann::json& bounds) {
-    RowRange range;
-    range.smallest = bounds.at(0).get<std::int32_t>();
-    if (!bounds.at(1).is_null()) range.largest = bounds.at(1).get<std::int32_t>();
+Range read_range(const nlohmann::json& bounds) {
+    Range range;
+    range.smallest = bounds.at(0).get<double>();
+    if (!bounds.at(1).is_null()) range.largest = bounds.at(1).get<double>();
     return range;
 }
 
@@ -47,12 +47,14 @@ Order read_order(const nlohmann::json& json) {
     Order order;
     order.name = json.at("name").get<std::string>();
     const nlohmann::json& when = json.at("when");
-    check_keys(when, {"linear", "step", "partitioned", "law", "m"}, fmt::format("\"when\" of \"{}\"", order.name));
+    check_keys(when, {"linear", "step", "partitioned", "law", "m", "rows_per_velocity"},
+               fmt::format("\"when\" of \"{}\"", order.name));
     if (when.contains("linear")) order.linear = when.at("linear").get<bool>();
     if (when.contains("step")) order.step = when.at("step").get<bool>();
     if (when.contains("partitioned")) order.partitioned = when.at("partitioned").get<bool>();
     if (when.contains("law")) order.law = law_of(when.at("law").get<std::string>());
-    if (when.contains("m")) order.m = read_rows(when.at("m"));
+    if (when.contains("m")) order.m = read_range(when.at("m"));
+    if (when.contains("rows_per_velocity")) order.rows_per_velocity = read_range(when.at("rows_per_velocity"));
     for (const auto& solver : json.at("solvers")) order.solvers.push_back(read_solver(solver));
     return order;
 }
@@ -81,9 +83,10 @@ Ranking::Ranking(const std::filesystem::path& file) {
     }
 }
 
-const Order& Ranking::order(const RankedNeeds& asked, std::int32_t m) const {
-    return *std::find_if(orders_.begin(), orders_.end(),
-                         [&](const Order& order) { return order.matches(asked) && order.m.takes(m); });
+const Order& Ranking::order(const RankedNeeds& asked, const RankedSize& size) const {
+    return *std::find_if(orders_.begin(), orders_.end(), [&](const Order& order) {
+        return order.matches(asked) && order.m.takes(size.m) && order.rows_per_velocity.takes(size.rows_per_velocity);
+    });
 }
 
 std::vector<const Order*> Ranking::orders(const RankedNeeds& asked) const {
@@ -91,7 +94,7 @@ std::vector<const Order*> Ranking::orders(const RankedNeeds& asked) const {
     for (const auto& order : orders_) {
         if (!order.matches(asked)) continue;
         found.push_back(&order);
-        if (order.m == RowRange{}) break;  // none comes after it
+        if (order.m == Range{} && order.rows_per_velocity == Range{}) break;  // none comes after it
     }
     return found;
 }

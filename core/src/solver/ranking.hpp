@@ -15,12 +15,19 @@
 
 namespace delassus {
 
-/// Numbers of rows, both included.
-struct RowRange {
-    std::int32_t smallest = 0, largest = std::numeric_limits<std::int32_t>::max();
+/// Both bounds are included.
+struct Range {
+    double smallest = 0.0, largest = std::numeric_limits<double>::infinity();
 
-    [[nodiscard]] bool takes(std::int32_t m) const { return m >= smallest && m <= largest; }
-    bool operator==(const RowRange&) const = default;
+    [[nodiscard]] bool takes(double value) const { return value >= smallest && value <= largest; }
+    bool operator==(const Range&) const = default;
+};
+
+/// How large a problem is.
+struct RankedSize {
+    double m = 0.0;
+    /// m/n. From about three on reactions are far from unique, and sweeps over rows slow. 0 where n = 0.
+    double rows_per_velocity = 0.0;
 };
 
 /// A solver with its options, and its iterations in the first round (rounds.hpp).
@@ -33,7 +40,7 @@ struct RankedSolver {
     std::optional<Law> law = {};
 };
 
-/// What an order looks at, apart from m.
+/// What an order looks at, apart from the size.
 struct RankedNeeds {
     std::uint64_t needs = 0;  ///< DELASSUS_CAN_* bits of the problem
     bool step = false;        ///< a step of a simulation
@@ -46,10 +53,10 @@ struct Order {
     std::optional<bool> step;         ///< a step of a simulation, or a problem by itself
     std::optional<bool> partitioned;  ///< a distributed problem, or one that every process has as a whole
     std::optional<Law> law;           ///< of problems with friction
-    RowRange m;
+    Range m, rows_per_velocity;
     std::vector<RankedSolver> solvers;
 
-    /// For some m.
+    /// For some size.
     [[nodiscard]] bool matches(const RankedNeeds& asked) const;
 };
 
@@ -59,8 +66,8 @@ public:
     explicit Ranking(const std::filesystem::path& file);
 
     /// The first order that matches. The last one of a ranking matches everything (checked when it is read).
-    [[nodiscard]] const Order& order(const RankedNeeds& asked, std::int32_t m) const;
-    /// The orders that some m leads to.
+    [[nodiscard]] const Order& order(const RankedNeeds& asked, const RankedSize& size) const;
+    /// The orders that some size leads to.
     [[nodiscard]] std::vector<const Order*> orders(const RankedNeeds& asked) const;
 
 private:

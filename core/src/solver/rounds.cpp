@@ -57,11 +57,14 @@ RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnRe
             } else if (own.turn > 0) {
                 turn.start = k;
             }
+            const bool again = own.last == TurnEnd::Ended;
+            const double begun = turn.start ? records[*turn.start].error : no_iterate;
             const TurnResult result = take(turn);
             if (result.end == TurnEnd::Done) return RoundsEnd::Done;
             worked = true;
             work += static_cast<double>(result.iterations) / static_cast<double>(members[k].iterations);
-            own.last = result.end;
+            const bool in_vain = again && result.end == TurnEnd::Ended && !(result.error < better * begun);
+            own.last = in_vain && !members[k].local ? TurnEnd::Retired : result.end;
             own.error = result.error;
             own.turn = ++turns;
             if (own.error < better * own.lowest) {

@@ -60,7 +60,8 @@ enum class RoundsEnd {
 };
 
 /// Runs the rounds. take: runs a turn. A member that ended by itself begins next at the best iterate that another
-/// member has left since, and waits until there is one.
+/// member has left since, and waits until there is one; if it ends again without bettering that by a tenth, it is
+/// retired, unless it is local.
 DELASSUS_API RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnResult(const Turn&)>& take);
 
 }  // namespace delassus

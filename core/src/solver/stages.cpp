@@ -14,7 +14,7 @@ namespace delassus {
 
 Forecast::Forecast(double tolerance, std::int64_t iterations)
     : tolerance_(tolerance), iterations_(iterations), next_(iterations) {
-    constexpr std::int64_t earliest = 16;
+    const std::int64_t earliest = std::clamp<std::int64_t>(iterations / 4, 16, 32);
     while (next_ / 2 >= earliest) next_ /= 2;
 }
 
@@ -160,6 +160,7 @@ SolveSettings StageRunner::settings_of(const Stage& stage, const Prepared& probl
     const double seconds_before = report_.seconds_setup + report_.seconds_solve;
     settings.time_limit = settings_.time_limit - seconds_before;
     settings.warm_start = warm;
+    settings.resume = warm && stage.resume;
     const auto shifted = [iterations = report_.iterations, seconds_before](CurveSample sample) {
         sample.iteration += iterations;
         sample.seconds += seconds_before;

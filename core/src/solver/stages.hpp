@@ -25,14 +25,15 @@ struct Stage {
     /// The law that the stage solves with, if it is not the problem's own. The result is judged under the problem's
     /// own.
     std::optional<Law> law = {};
+    bool resume = false;  ///< SolveSettings::resume
 };
 
 /// Forecasts by measurement whether an iteration will reach a tolerance in twice the iterations of its turn, K. At …,
-/// K/4, K/2, K (from 16 on) the natural error e is taken; let ln e fall by r₁ and then by r₂ in the last two doublings.
-/// An algebraic rate e ~ k^(−p) has r₂ = r₁, a linear one e ~ q^k has r₂ = 2 r₁; so the next doublings are taken to
-/// bring g r₂, g² r₂, … with g = r₂/r₁ held between 1 and 2. Where that fails twice in a row before K, the turn is not
-/// worth its work; where it succeeds at K, the turn may go on to 2 K. Iterations, not seconds: the same on every
-/// machine.
+/// K/4, K/2, K (from 32 on, K/4 from 16 on) the natural error e is taken; let ln e fall by r₁ and then by r₂ in the
+/// last two doublings. An algebraic rate e ~ k^(−p) has r₂ = r₁, a linear one e ~ q^k has r₂ = 2 r₁; so the next
+/// doublings are taken to bring g r₂, g² r₂, … with g = r₂/r₁ held between 1 and 2. Where that fails twice in a row
+/// before K, the turn is not worth its work; where it succeeds at K, the turn may go on to 2 K. Iterations, not
+/// seconds: the same on every machine.
 class Forecast {
 public:
     DELASSUS_API Forecast(double tolerance, std::int64_t iterations);

@@ -20,6 +20,13 @@ public:
     /// True: stop now. x may be null. Iteration 0 is the starting point.
     [[nodiscard]] bool check(std::int64_t iteration, const double* x, const Vector& lambda, double residual);
 
+    /// Of a solve that goes on (Request::resume): the best iterate (m) until now, and its residual. Call it in place of
+    /// the check() of iteration 0.
+    void go_on(const Vector& best, double residual) {
+        best_ = best;
+        outcome_.residual = milestone_ = residual;
+    }
+
     /// The iterate with the smallest residual that check() has seen, and the first of them until one has a residual
     /// that is finite; m. Empty before the first check().
     [[nodiscard]] const Vector& best() const { return best_; }

@@ -30,6 +30,15 @@ public:
         return scaled;
     }
 
+    /// Of a solve that goes on (Request::resume): what the last run left in lambda (m), and its best residual. Call it
+    /// in place of the first check().
+    void go_on(const MutableVectorView& lambda, double residual) {
+        lambda_ = lambda;
+        latest_ = residual;
+        monitor_.go_on(lambda_, residual);
+        iteration_ = 1;
+    }
+
     /// Judges the iterate λ̂ with its û; true: stop now. Each call after the first counts as an iteration. A claim of
     /// convergence rests on û computed anew; where it fails, stale() tells the caller to renew its û.
     [[nodiscard]] bool check(const Vector& lambda, const Vector& velocity) {
@@ -61,6 +70,8 @@ public:
     }
 
     [[nodiscard]] bool stale() const { return stale_; }
+    /// The smallest natural error of all iterates.
+    [[nodiscard]] double best_residual() const { return monitor_.best_residual(); }
     /// The natural error of the latest iterate.
     [[nodiscard]] double residual() const { return latest_; }
     [[nodiscard]] std::int64_t iteration() const { return iteration_; }

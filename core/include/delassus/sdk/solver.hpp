@@ -15,6 +15,7 @@
 // DELASSUS_ERROR (anything else), with what() as the sentence.
 #pragma once
 
+#include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -42,6 +43,10 @@ public:
     [[nodiscard]] std::int64_t max_iterations() const { return raw_.max_iterations; }
     [[nodiscard]] double time_limit() const { return raw_.time_limit; }  ///< seconds; progress() enforces it
     [[nodiscard]] bool warm_start() const { return raw_.warm_start != 0; }
+    /// Go on where the last solve stopped (delassus_request.resume).
+    [[nodiscard]] bool resume() const {
+        return raw_.struct_size >= offsetof(delassus_request, resume) + sizeof raw_.resume && raw_.resume != 0;
+    }
     [[nodiscard]] bool has_listener() const { return raw_.progress != nullptr; }
 
     /// Shows an iterate (x may be null); what it returns must be obeyed.
