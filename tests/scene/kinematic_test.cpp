@@ -134,12 +134,13 @@ TEST(KinematicBody, CarriesABoxRoundForGood) {
             "s", overrides));
         run.finish();
         const auto x = run.pose("box").position;
-        return std::abs(std::hypot(x[0], x[1]) - 1.0);
+        return std::max(std::abs(std::hypot(x[0], x[1]) - 1.0),
+                        std::abs(std::remainder(std::atan2(x[1], x[0]) - 20.0, 2.0 * pi)));
     };
-    for (const double step : {1.0 / 60.0, 0.005}) {
+    for (const double step : {1.0 / 24.0, 1.0 / 60.0, 0.005}) {
         EXPECT_LT(grows("euler_implicit_linearized", step), 1e-8) << step;
         for (const char* integrator : {"moreau_jean", "linearly_implicit_trapezoidal", "switching"})
-            EXPECT_LT(grows(integrator, step), 2.0 * step * step) << integrator << ' ' << step;
+            EXPECT_LT(grows(integrator, step), 1.5 * step * step) << integrator << ' ' << step;
     }
 }
 
@@ -165,7 +166,7 @@ TEST(KinematicBody, HoldsWhatRidesInADrum) {
     EXPECT_NEAR(angle, 0.0, 1e-6);
     const auto [radius_2, angle_2] = ends("linearly_implicit_trapezoidal");
     EXPECT_NEAR(radius_2, 0.0, 1e-4);
-    EXPECT_NEAR(angle_2, 0.0, 5e-3) << "it slips as it is set down";
+    EXPECT_NEAR(angle_2, 0.0, 1e-3) << "it slips as it is set down";
 }
 
 // Round bodies that turn about their own axes do not change: a board rests on them for ever.

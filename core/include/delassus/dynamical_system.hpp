@@ -83,8 +83,13 @@ public:
 
     /// Keeps the memory for the next rows, and the velocities of measure_speeds_at().
     DELASSUS_API void clear();
-    /// v: n, valid as long as blocks are added; null: the speeds of blocks are 0.
-    void measure_speeds_at(const double* v) { velocity_ = v; }
+    /// v: n, valid as long as blocks are added; null: the speeds of blocks are 0. since: for how long the state that
+    /// rows are collected at has moved on with v, s.
+    void measure_speeds_at(const double* v, double since = 0.0) {
+        velocity_ = v;
+        since_ = since;
+    }
+    [[nodiscard]] double since() const { return since_; }
 
     /// Threads that may share the work of collecting rows; the rows are the same without them.
     sdk::Team team;
@@ -153,6 +158,7 @@ private:
     std::size_t block_count_ = 0, used_ = 0, rows_in_blocks_ = 0;
     bool ascending_ = true;  // the columns of the row that is being filled
     const double* velocity_ = nullptr;
+    double since_ = 0.0;
 };
 
 /// What a timestepper asks of a system; derive from it for a system of your own.

@@ -94,18 +94,25 @@ void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction)
         const Polytope::Face& cap = core.faces[core.faces.size() - (along > 0.0 ? 2 : 1)];
         for (std::size_t i = 0; i < cap.loop.size(); i += 3)
             put(placed.vertices[cap.loop[i]], cap.loop[i], cap.edges[i]);
-        if (placed.axis().cross(direction).norm() < 1e-12) return;
+        const double tilt = placed.axis().cross(direction).norm();
+        if (tilt < 1e-12) return;
         const Vector3d lowest = rim_point(placed, direction, along > 0.0);
         std::size_t nearest = 0;
         const auto to = [&](std::size_t i) { return (polygon_[i].point - lowest).squaredNorm(); };
         for (std::size_t i = 1; i < polygon_.size(); ++i) {
             if (to(i) < to(nearest)) nearest = i;
         }
+        const Manifold::Corner corner{lowest, along > 0.0 ? kUpperRim : kLowerRim, -1, -1, -1, kGenerator, -1};
+        // A cap that rolls on its rim passes its vertices: each touches at a cusp of its path, which no step resolves.
+        // So the rim point stands for the vertex that is nearest to it, unless the cap lies flat.
+        if (tilt > kFlatAngle) {
+            polygon_[nearest] = corner;
+            return;
+        }
         // It lies on the arc to the nearer neighbour of the nearest vertex.
         const std::size_t count = polygon_.size();
         const bool after = to((nearest + 1) % count) < to((nearest + count - 1) % count);
-        polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)),
-                        {lowest, along > 0.0 ? kUpperRim : kLowerRim, -1, -1, -1, kGenerator, -1});
+        polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)), corner);
         return;
     }
     if (core.faces.empty()) {

@@ -26,7 +26,8 @@ namespace delassus {
 //
 // Rates, those of bodies with a given motion, are means over the step that rows are collected for: at q over all of it,
 // at q̄ over the rest (1 − θ) h. So they belong to t + h/2 and t + (1 + θ) h/2, and the same formula gives the rate at
-// the end.
+// the end. Beside rates, D is extrapolated with means as well, (v + ṽ⁺)/2 in place of ṽ⁺: what errs is then ¼ h² d(Ḋ
+// v)/dt and not ¼ h² D̈ v⁺, so that what rides in a drum stays where it is. A step in which anything strikes keeps ṽ⁺.
 //
 // ---- Servos with a limit ----
 //
@@ -179,7 +180,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     deepest_ = 0.0;
     if (!system_.has_unilateral()) return;
     before_.measure_speeds_at(begin.v.data());
-    rows_.measure_speeds_at(begin.v.data());
+    rows_.measure_speeds_at(begin.v.data(), theta * h);
     system_.collect_unilateral(begin, h, before_);
     begin_speeds_ = begin.v.data();
     std::size_t row = 0;
@@ -387,11 +388,16 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
     const double share = std::max(settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
+    const bool smooth = std::none_of(contacts_.begin(), contacts_.end(),
+                                     [](const Contact& contact) { return contact.strikes || contact.impact; });
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         const std::size_t first = first_row_ + contact.row;
         if (settings_.once && iteration > 0 && (!contact.strikes || !(solution.lambda[first] > 0.0))) continue;
         const auto size = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
+        const auto own = std::span(rows_.rows()).subspan(contact.row, size);
+        const bool of_means =
+            smooth && std::any_of(own.begin(), own.end(), [](const auto& row) { return row.rate != 0.0; });
         double squares = 0.0, along = 0.0;  // of the sliding speed at the end; that times the one at the beginning
         for (std::size_t i = 0; i < size; ++i) {
             const std::size_t row = first + i;
@@ -403,7 +409,11 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                 b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
             } else if (contact.turns) {
                 const std::size_t then = contact.before + i;
-                b += (1.0 - theta_) / theta_ * (here + b - before_.speed(then, guess.data()));
+                double change = here + b - before_.speed(then, guess.data());
+                if (of_means)
+                    change = 0.5 * (change + D.row_times(static_cast<std::int32_t>(row), begin_speeds_) + b -
+                                    before_.speed(then, begin_speeds_));
+                b += (1.0 - theta_) / theta_ * change;
             }
             if (i == 0) continue;
             squares += (here + b) * (here + b);

@@ -272,9 +272,10 @@ struct MultibodySystem::Implementation {
     [[nodiscard]] std::optional<mechanics::Vector3d> axis_below(std::int32_t shape, const mechanics::Vector3d& point,
                                                                 const mechanics::Vector3d& outward) const;
     /// Of a point of an owner's surface, its mean over a step of length h (s) as what has this center meets it; 0 where
-    /// the owner's motion is not prescribed. place_for_step() has been called.
+    /// the owner's motion is not prescribed. since: UnilateralRows::since(). place_for_step() has been called.
     [[nodiscard]] mechanics::Vector3d prescribed_velocity(std::int32_t owner, const mechanics::Vector3d& point,
-                                                          const mechanics::Vector3d& center, double h) const;
+                                                          const mechanics::Vector3d& center, double since,
+                                                          double h) const;
     /// The same at the state itself.
     [[nodiscard]] mechanics::Vector3d prescribed_velocity_now(std::int32_t owner,
                                                               const mechanics::Vector3d& point) const;

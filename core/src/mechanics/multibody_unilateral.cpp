@@ -253,7 +253,9 @@ MultibodySystem::Implementation::PointOfOwner MultibodySystem::Implementation::p
 // rest about c. So a surface whose motion is prescribed goes there along the chord, from its place below c to that at
 // the end of the step, and beside it as the body would that rides on it: what rests on the surface has D v + rate = 0
 // at all its points, and stays where it is on it. Along the tangent it would be carried outwards by r (ω h)²/2 in each
-// step.
+// step. Rows at a state that has moved on along v for the time s since the step began are those of the place c + ½ a s²
+// where a body that rides is by then: along the tangent c is too far out, and what rests would creep by r (ω h)²/4. For
+// the same reason the surface is taken at the point of the body, which may be below it by then.
 //
 // A round surface does not change as it turns about its axis, whatever lies on it: there c is the point of the axis
 // below, and the surface has the speed of that point and what the spin adds to it. With the chord of a point of the
@@ -274,10 +276,16 @@ std::optional<Vector3d> MultibodySystem::Implementation::axis_below(std::int32_t
 }
 
 Vector3d MultibodySystem::Implementation::prescribed_velocity(std::int32_t owner, const Vector3d& point,
-                                                              const Vector3d& center, double h) const {
+                                                              const Vector3d& center, double since, double h) const {
     if (owner >= static_cast<std::int32_t>(bodies.size()) || !at[owner].prescribed()) return Vector3d::Zero();
     const auto& place = at[owner];
-    const Vector3d spin = place.A * place.omega, arm = center - place.x;
+    const auto& now = at_state[owner];
+    const Vector3d spin = place.A * place.omega;
+    Vector3d arm = center - place.x;
+    if (since > 0.0) {
+        const Vector3d pull = 2.0 / h * (place.v - now.v), spin_up = 2.0 / h * (spin - now.A * now.omega);
+        arm += 0.5 * since * since * (pull + spin_up.cross(arm) + spin.cross(spin.cross(arm)));
+    }
     const mechanics::Quaterniond turn = mechanics::exponential(h * spin);
     const Vector3d across = turn.vec().cross(arm);
     return place.v + 2.0 / h * (turn.w() * across + turn.vec().cross(across)) + spin.cross(point - center);
@@ -332,9 +340,13 @@ void MultibodySystem::Implementation::collect_contacts(double h, UnilateralRows&
         Vector3d prescribed_speed = Vector3d::Zero(), speed_now = Vector3d::Zero();
         if (!prescribed.empty()) {
             const Vector3d on_a = vector(contact.point_a), on_b = vector(contact.point_b);
-            prescribed_speed =
-                prescribed_velocity(owner_b, on_b, axis_below(contact.shape_b, on_b, -normal).value_or(a.center), h) -
-                prescribed_velocity(owner_a, on_a, axis_below(contact.shape_a, on_a, normal).value_or(b.center), h);
+            const auto mean_of = [&](std::int32_t owner, std::int32_t shape, const Vector3d& own,
+                                     const Vector3d& outward, const Vector3d& others, const PointOfOwner& other) {
+                const auto axis = axis_below(shape, own, outward);
+                return prescribed_velocity(owner, axis ? own : others, axis.value_or(other.center), rows.since(), h);
+            };
+            prescribed_speed = mean_of(owner_b, contact.shape_b, on_b, -normal, on_a, a) -
+                               mean_of(owner_a, contact.shape_a, on_a, normal, on_b, b);
             speed_now = prescribed_velocity_now(owner_b, on_b) - prescribed_velocity_now(owner_a, on_a);
         }
         const auto put_row = [&](const Vector3d& direction, double gap) {
