@@ -199,15 +199,13 @@ Vector3d on_cap(const Placed& placed, const Vector3d& direction, const Vector3d&
     return across + std::copysign(placed.solid->half_length, axis.dot(direction)) * axis;
 }
 
-}  // namespace
-
-std::optional<Separation> cylinder_separation(Placed& a, Placed& b, const Vector3d& offset, double limit) {
+/// Takes all directions that may be the best. False: they are further apart than limit.
+bool search_all(Search& search, Placed& a, Placed& b, const Vector3d& offset, double limit) {
     // A prism lies inside its cylinder, at most the sagitta R (1 − cos(π/sides)) from it.
     const double sagitta =
         (1.0 - std::cos(std::numbers::pi / kPrismSides)) * (a.solid->cylinder_radius + b.solid->cylinder_radius);
     const auto rough = polytope_separation(a, b, offset, limit + sagitta);
-    if (!rough) return std::nullopt;
-    Search search(a, b, offset);
+    if (!rough) return false;
     for (const Placed* placed : {&a, &b}) {
         if (placed->is_cylinder()) {
             search.take(placed->axis());
@@ -222,8 +220,45 @@ std::optional<Separation> cylinder_separation(Placed& a, Placed& b, const Vector
             search.take_around(apart->normal);
         }
     }
-    if (search.value() > limit) return std::nullopt;
+    return search.value() <= limit;
+}
 
+/// Where the segment of a capsule is nearest to a cylinder's side, from the cylinder outwards: the direction; none
+/// where it is nearest to a rim or inside. offset: from the cylinder to the capsule, whose core is rotated. An
+/// infinitely long cylinder is nowhere farther than the one that it holds, so that its nearest point is that of the
+/// other one if it lies on that.
+std::optional<Vector3d> out_of_side(const Placed& cylinder, const Placed& capsule, const Vector3d& offset) {
+    const Vector3d axis = cylinder.axis(), half = capsule.vertices.back();
+    const auto across = [&](const Vector3d& v) { return Vector3d(v - axis.dot(v) * axis); };
+    const Vector3d from_axis = across(offset), along = across(half);
+    const double square = along.squaredNorm();
+    const double s = square > 0.0 ? std::clamp(-from_axis.dot(along) / square, -1.0, 1.0) : 0.0;
+    const Vector3d outwards = from_axis + s * along;
+    const double distance = outwards.norm();
+    if (!(distance > cylinder.solid->cylinder_radius) ||
+        std::abs(axis.dot(offset + s * half)) > cylinder.solid->half_length)
+        return std::nullopt;
+    return outwards / distance;
+}
+
+}  // namespace
+
+std::optional<Separation> cylinder_separation(Placed& a, Placed& b, const Vector3d& offset, double limit) {
+    a.rotate_core();
+    b.rotate_core();
+    Search search(a, b, offset);
+    std::optional<Vector3d> side;
+    if (a.is_cylinder() && b.solid->kind == ShapeKind::Capsule) side = out_of_side(a, b, offset);
+    if (b.is_cylinder() && a.solid->kind == ShapeKind::Capsule) {
+        side = out_of_side(b, a, -offset);
+        if (side) side = -*side;
+    }
+    if (side) {
+        search.take(*side);
+        if (search.value() > limit) return std::nullopt;
+    } else if (!search_all(search, a, b, offset, limit)) {
+        return std::nullopt;
+    }
     Separation result;
     result.distance = search.value();
     result.normal = search.normal();
