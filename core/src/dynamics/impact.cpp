@@ -59,6 +59,7 @@ std::optional<Impact> impact_within(double h, const Approach& approach, double a
             }
         }
     }
+    impact.flight = left;
     impact.end_speed = leaves + after * left;
     const double end_gap = (leaves + 0.5 * after * left) * left;
     impact.change = impact.end_speed + impact.closing - acceleration * rest;

@@ -21,6 +21,7 @@ struct Impact {
     double meets = 0.0;      ///< after the beginning of the step, s
     double closing = 0.0;    ///< speed with which it meets then, > 0
     double end_speed = 0.0;  ///< at the end of the step; negative if it closes again there
+    double flight = 0.0;     ///< how long it has been apart again by then, s; 0 if it rests
     double change = 0.0;     ///< of the speed, from what it would be if nothing met
     double acts = 0.0;       ///< when in the step one impulse of that size would lead to the same gap at its end, s
 };

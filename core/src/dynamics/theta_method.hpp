@@ -58,7 +58,7 @@ private:
     void extrapolate(double h);
     template <class Act>
     void for_each_vector(const Act& act) const;
-    void move_late(double h);
+    void move_late(const State& begin, double h);
     void mark_struck(bool struck);
     void remember_change(const Vector& result, double h);
     void resolve_up_to(double h);
@@ -118,6 +118,7 @@ private:
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
+    Vector until_impact_;                        // the way of struck velocities until then
     Vector result_, back_, linear_;
     std::vector<double> constraint_;
     std::vector<double> last_a_, last_b_;

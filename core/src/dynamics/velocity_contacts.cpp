@@ -58,7 +58,9 @@ namespace delassus {
 // besides impulses, a = D̄ (ṽ⁺ − v)/h (time_meetings()). So with u⁻ = D̄ v a contact meets when g + u⁻ τ + ½ a τ² = 0,
 // strikes with the speed that it has then, and has moved on at the end of the step, or stays (impact.cpp): b = −u⁺ of
 // that. Speeds before and after are those of one D̄, so that e ≤ 1 gains no energy. What the velocities change by at τ
-// moves positions from then on (find_impacts()).
+// moves positions from then on (find_impacts()). Friction acts at the impact, too: after the flight F since the bodies
+// parted, tangential rows have a F of u⁺ from forces alone, so that b_t = −a F leaves the law that of u_t at the
+// impact.
 //
 // A body that is struck at τ moves as it did until then, so that its open contacts close by what comes after: g + u⁻ τ
 // + (h − τ) u⁺ ≥ 0. One that is closed by this would bounce with a speed that the step does not know. A step with such
@@ -169,7 +171,11 @@ void set_compliance(Problem& problem, std::span<const UnilateralRows::Block> blo
 }
 
 VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSettings settings)
-    : system_(system), settings_(settings), resolution_(system), bilateral_cones_(system.constraint_blocks().size()) {}
+    : system_(system),
+      settings_(settings),
+      resolution_(system),
+      bilateral_cones_(system.constraint_blocks().size()),
+      axes_(system) {}
 
 void VelocityContacts::collect(const State& begin, double h, double theta) {
     h_ = h;
@@ -183,6 +189,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     rows_.measure_speeds_at(begin.v.data(), theta * h);
     system_.collect_unilateral(begin, h, before_);
     begin_speeds_ = begin.v.data();
+    axes_.begin(begin_speeds_, theta * h);
     std::size_t row = 0;
     bool compliant = false;
     for (std::size_t k = 0; k < before_.blocks().size(); ++k) {
@@ -283,6 +290,17 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
         const auto e_end = static_cast<std::size_t>(rows_.row_start()[k + 1]);
         const auto f_end = static_cast<std::size_t>(before_.row_start()[l + 1]);
         while (e < e_end || f < f_end) {
+            if (axes_.at(rows_.column(), e, e_end) && axes_.at(before_.column(), f, f_end) &&
+                rows_.column()[e] == before_.column()[f]) {
+                const Eigen::Vector3d turned = axes_.from_middle(rows_.column()[e], &rows_.value()[e]);
+                for (Eigen::Index axis = 0; axis < 3; ++axis, ++e, ++f) {
+                    const double a = turned[axis], b = before_.value()[f];
+                    const double H = diagonal_[static_cast<std::size_t>(before_.column()[f])];
+                    change += (a - b) * (a - b) / H;
+                    size += a * a / H;
+                }
+                continue;
+            }
             const bool now = e < e_end && (f == f_end || rows_.column()[e] <= before_.column()[f]);
             const bool then = f < f_end && (e == e_end || before_.column()[f] <= rows_.column()[e]);
             const double H = diagonal_[static_cast<std::size_t>(now ? rows_.column()[e] : before_.column()[f])];
@@ -384,20 +402,19 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                              double natural_error) {
     const auto& D = problem.D;
     settled_ = true;
+    if (contacts_.empty()) return;
     if (iteration == 0) find_friction_reach(problem);
+    axes_.turn(guess, h_, theta_, in_begin_, in_middle_);
     const double share = std::max(settled_share, 10.0 * natural_error);
     double largest = 0.0;
     for (const double speed : guess) largest = std::max(largest, std::abs(speed));
-    const bool smooth = std::none_of(contacts_.begin(), contacts_.end(),
-                                     [](const Contact& contact) { return contact.strikes || contact.impact; });
+    const bool jumps = std::any_of(contacts_.begin(), contacts_.end(),
+                                   [](const Contact& contact) { return contact.strikes || contact.impact; });
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         const std::size_t first = first_row_ + contact.row;
         if (settings_.once && iteration > 0 && (!contact.strikes || !(solution.lambda[first] > 0.0))) continue;
         const auto size = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
-        const auto own = std::span(rows_.rows()).subspan(contact.row, size);
-        const bool of_means =
-            smooth && std::any_of(own.begin(), own.end(), [](const auto& row) { return row.rate != 0.0; });
         double squares = 0.0, along = 0.0;  // of the sliding speed at the end; that times the one at the beginning
         for (std::size_t i = 0; i < size; ++i) {
             const std::size_t row = first + i;
@@ -409,13 +426,15 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                 b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
             } else if (contact.turns) {
                 const std::size_t then = contact.before + i;
-                double change = here + b - before_.speed(then, guess.data());
-                if (of_means)
+                const double in_middle = D.row_times(static_cast<std::int32_t>(row), in_middle_.data());
+                double change = in_middle + b - before_.speed(then, in_begin_.data());
+                if (!jumps)
                     change = 0.5 * (change + D.row_times(static_cast<std::int32_t>(row), begin_speeds_) + b -
                                     before_.speed(then, begin_speeds_));
-                b += (1.0 - theta_) / theta_ * change;
+                b += in_middle - here + (1.0 - theta_) / theta_ * change;
             }
             if (i == 0) continue;
+            if (contact.impact) b -= contact.impact->flight * smooth_acceleration(problem, row);
             squares += (here + b) * (here + b);
             if (settings_.once && contact.was_there)
                 along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
@@ -510,9 +529,14 @@ double VelocityContacts::work(const Problem& problem, const Solution& solution, 
             const double impulse = solution.lambda[first_row_ + row];
             if (impulse == 0.0) continue;
             const auto row_of_problem = static_cast<std::int32_t>(first_row_ + row);
-            sum += impulse * (contact.impact && row == contact.row
-                                  ? 0.5 * contact.impact->change - contact.impact->closing
-                                  : problem.D.row_times(row_of_problem, mean.data()) + rows_.rows()[row].rate);
+            double speed = problem.D.row_times(row_of_problem, mean.data()) + rows_.rows()[row].rate;
+            if (contact.impact && row == contact.row) {
+                speed = 0.5 * contact.impact->change - contact.impact->closing;
+            } else if (contact.impact) {
+                speed += 0.5 * (contact.impact->meets - contact.impact->flight) *
+                         smooth_acceleration(problem, first_row_ + row);
+            }
+            sum += impulse * speed;
         }
     }
     return sum;

@@ -16,6 +16,7 @@
 #include "dynamics/gap_resolution.hpp"
 #include "dynamics/impact.hpp"
 #include "dynamics/kept_impulses.hpp"
+#include "dynamics/turning_axes.hpp"
 
 namespace delassus {
 
@@ -211,6 +212,8 @@ private:
     /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
     /// that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);
+    /// Of a row of the problem besides impacts, m/s² or rad/s²; after time_meetings().
+    [[nodiscard]] double smooth_acceleration(const Problem& problem, std::size_t row) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
@@ -234,6 +237,7 @@ private:
     VelocityContactSettings settings_;
     GapResolution resolution_;
     std::size_t bilateral_cones_;
+    TurningAxes axes_;
     double h_ = 0.0, theta_ = 0.5;
     UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken
     UnilateralRows servos_;            // those of a step of size θ h, if there are any
@@ -243,6 +247,7 @@ private:
     std::vector<Contact> contacts_;
     State middle_;
     std::vector<double> delta_, diagonal_;
+    std::vector<double> in_begin_, in_middle_;  // the guess in the axes of the beginning, and of where D is taken
     std::vector<OnVelocity> on_velocities_;
     struct Sum {
         double weight = 0.0, share = 0.0, late = 0.0;
@@ -253,6 +258,7 @@ private:
     std::vector<double> struck_;      // of each velocity, when an impact first changes it; empty where there is none
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
+    const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on
     std::size_t first_row_ = 0;             // in the problem
     std::vector<double> friction_reach_;
     bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;

@@ -63,10 +63,9 @@ void VelocityContacts::set_friction_direction(Problem& problem, const Contact& c
         const auto row = static_cast<std::int32_t>(first + i);
         const auto& then = before_.rows()[contact.before + i];
         const double begin = before_.speed(contact.before + i, begin_speeds_) - then.rate + then.rate_now;
-        const double of_guess = problem.D.row_times(row, guess.data());
-        end[i] = of_guess + problem.b[first + i];
-        middle[i] = (1.0 - theta_) * problem.D.row_times(row, begin_speeds_) + theta_ * of_guess +
-                    rows_.rows()[contact.row + i].rate_now;
+        end[i] = problem.D.row_times(row, guess.data()) + problem.b[first + i];
+        middle[i] = (1.0 - theta_) * problem.D.row_times(row, begin_speeds_) +
+                    theta_ * problem.D.row_times(row, in_middle_.data()) + rows_.rows()[contact.row + i].rate_now;
         begin_squares += begin * begin;
         middle_squares += middle[i] * middle[i];
         change += (begin - end[i]) * (begin - end[i]);

@@ -87,8 +87,9 @@ void VelocityContacts::take_out_open(Problem& problem) const {
 }
 
 // In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²),
-// and their rates likewise, which are means about h/2 and (1 + θ) h/2. What shapes meet on their way has rows of the
-// meeting at the beginning.
+// and their rates likewise, which are means about h/2 and (1 + θ) h/2. Beside an angular velocity ω, which has the axes
+// of its body, rows turn with these: exp(−[ω] τ) D and exp([ω] (θ h − τ)) D̄ stand in their place. What shapes meet on
+// their way has rows of the meeting at the beginning.
 bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& problem) {
     const Contact& contact = contacts_[block];
     if (!contact.nearly_as_before && !contact.met_on_the_way) return false;
@@ -104,8 +105,17 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
                     before_.column().begin() + static_cast<std::ptrdiff_t>(then)))
         return false;
     const double share = contact.met_on_the_way ? 0.0 : time / (theta_ * h_);
-    for (std::size_t e = 0; e < entries; ++e)
+    for (std::size_t e = 0; e < entries; ++e) {
+        if (share != 0.0 && axes_.at(D.column, begin + e, begin + entries)) {
+            const std::int32_t column = D.column[begin + e];
+            Eigen::Map<Eigen::Vector3d> row(&D.value[begin + e]);
+            row = (1.0 - share) * axes_.later(time, column, &before_.value()[then + e]) +
+                  share * axes_.later(time - theta_ * h_, column, row.data());
+            e += 2;
+            continue;
+        }
         D.value[begin + e] += (1.0 - share) * (before_.value()[then + e] - D.value[begin + e]);
+    }
     for (std::size_t i = 0; i < rows; ++i) {
         double& rate = rows_.rows()[contact.row + i].rate;
         rate += (1.0 - (time - 0.5 * h_) / (0.5 * theta_ * h_)) * (before_.rows()[contact.before + i].rate - rate);
@@ -126,6 +136,7 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // of the meeting, which stays, meets at the same time from another gap.
 void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth, double last_h,
                                      std::span<const double> last_struck) {
+    smooth_ = smooth.data();
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
@@ -182,6 +193,11 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         }
     }
     find_struck(problem, last_h, last_struck);
+}
+
+double VelocityContacts::smooth_acceleration(const Problem& problem, std::size_t row) const {
+    const auto number = static_cast<std::int32_t>(row);
+    return (problem.D.row_times(number, smooth_) - problem.D.row_times(number, begin_speeds_)) / h_;
 }
 
 // The friction of other contacts after an impact is not that before it: it turns round where a body bounces off a wall.
@@ -472,11 +488,12 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
     const auto slides_back = [&](std::size_t row, double change, double both) {
         return change > both * coupling(problem.D, diagonal_, first_row_ + row, first_row_ + row);
     };
+    axes_.turn(sliding, h_, theta_, in_begin_, in_middle_);
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         Cone& cone = problem.cones[bilateral_cones_ + k];
         const auto end_speed = [&](std::size_t i) {
-            return speed_at_end(problem, contact.row + i, contact.before + i, sliding.data());
+            return speed_at_end(problem, contact.row + i, contact.before + i, in_middle_.data());
         };
         if (const double before = sliding_speed(k); before != 0.0) {
             const double after = end_speed(0);

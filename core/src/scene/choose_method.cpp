@@ -278,7 +278,7 @@ void divide_by_error(SceneSystem& system) {
 void divide_while_cheap(SceneSystem& system) {
     const bool fixed = !system.control && !system.steps_by_accuracy() && !system.sleeping;
     const bool order_2 = system.integrator == "switching" || is_of_order_2(system);
-    if (!fixed || !order_2 || !system.system->has_unilateral() || system.system->restitutes()) return;
+    if (!fixed || !order_2 || !system.system->has_unilateral()) return;
     system.division = StepDivision::WhileCheap;
     system.method_reason += "; fixed steps that err are divided while that is cheap";
 }

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Angular velocities and rows in the axes of bodies that turn within a step (internal).
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "delassus/dynamical_system.hpp"
+
+namespace delassus {
+
+/// Angular velocities have the axes of their bodies, and so have the entries of D beside them: those of one row at two
+/// times of a step differ by the turn of these axes even where the bodies touch as they did. exp([ω] t) takes them from
+/// axes that are a time t older or younger to the same ones; what is left is the change that the motion of the contact
+/// makes.
+class TurningAxes {
+public:
+    explicit TurningAxes(const DynamicalSystem& system);
+
+    /// Begins a step with these velocities, n, which outlive it; D is taken at the time `middle` after its beginning,
+    /// at q ∘ exp(middle v).
+    void begin(const double* velocities, double middle);
+
+    /// Whether the entries of a row from e on, of those that stand before `end`, are beside one angular velocity.
+    [[nodiscard]] bool at(std::span<const std::int32_t> columns, std::size_t e, std::size_t end) const {
+        return e + 3 <= end && number_[static_cast<std::size_t>(columns[e])] >= 0 && columns[e + 2] == columns[e] + 2;
+    }
+    /// What stands at a column in the middle, in the axes of the beginning.
+    [[nodiscard]] Eigen::Vector3d from_middle(std::int32_t column, const double* entries) const {
+        return to_begin_[static_cast<std::size_t>(number_[static_cast<std::size_t>(column)])] *
+               Eigen::Map<const Eigen::Vector3d>(entries);
+    }
+    /// The same in the axes of a time that is so much later than theirs, s.
+    [[nodiscard]] Eigen::Vector3d later(double time, std::int32_t column, const double* entries) const;
+
+    /// Of velocities at the end of a step that moves by h ((1 − θ) v + θ v⁺), n: in_begin and in_middle have them in
+    /// the axes of its beginning and of the middle.
+    void turn(std::span<const double> end, double h, double theta, std::vector<double>& in_begin,
+              std::vector<double>& in_middle) const;
+
+private:
+    std::vector<std::int32_t> columns_;  // the first ones of angular velocities
+    std::vector<std::int32_t> number_;   // of the angular velocity that begins at a column; -1: none
+    std::vector<Eigen::Quaterniond> to_begin_;
+    const double* velocities_ = nullptr;
+};
+
+}  // namespace delassus
