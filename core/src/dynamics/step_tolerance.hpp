@@ -84,8 +84,8 @@ inline void set_step_tolerance(const SolverConfig& config, const IslandTraits& p
     if (!goal) {
         // Contacts may have no answer to a default tolerance that anybody finds: no work loosens it, but there is
         // last_resort().
-        const bool only_contacts = (part.needs & DELASSUS_CAN_FRICTION) != 0 && (part.needs & DELASSUS_CAN_FREE) == 0;
-        if (!config.tolerance && !of.fixed_iterations && only_contacts) of.loosest = of.tolerance;
+        const bool contacts = (part.needs & DELASSUS_CAN_FRICTION) != 0;
+        if (!config.tolerance && !of.fixed_iterations && contacts) of.loosest = of.tolerance;
         return;
     }
     if (config.tolerance && *goal >= *config.tolerance) return;

@@ -167,11 +167,14 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
         report.cut = contacts_.cut_between_impacts(problem_, solution_);
     }
     end_.v = solution_.x;
+    if (struck)
+        for (const StruckSpins::Spin& spin : struck_spins_.spins())
+            std::copy(spin.speed.begin(), spin.speed.end(), end_.v.begin() + spin.column);
     require_finite(state, end_, h, settings_.name);
     if (!stiff_.empty()) report.damped = lost_by_stiff_forces(state, h, result_);
     if (linearization_.wanted()) judge_linearization(state, h, result_, solver, report);
-    if (!settings_.linearly_implicit || struck || contacts_.landed(solution_))
-        projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
+    const bool projected = !settings_.linearly_implicit || struck || contacts_.landed(solution_);
+    if (projected) projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
     if (struck && m_ > 0) projection_.project_velocities(end_, problem_.H, solver, report);
     if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
     mark_struck(struck);
@@ -181,7 +184,11 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     contacts_.finish(solution_.lambda, report);
     result_ -= free_;
     if (position_error_.note({h, last_h_, result_, struck_, timed_, contacts_.all_bounce()}, report))
-        contacts_.add_release_error(problem_, solution_, last_h_, report.error);
+        contacts_.add_error(problem_, solution_, last_h_, report.error);
+    if (const auto moved = projection_.moved(); projected && !moved.empty()) {
+        report.error.resize(moved.size(), 0.0);
+        for (std::size_t i = 0; i < moved.size(); ++i) report.error[i] += std::abs(moved[i]);
+    }
     last_h_ = h;
     std::swap(state, end_);
     report.multipliers = multipliers_;
@@ -239,17 +246,17 @@ void ThetaMethod::extrapolate(double h) {
     });
 }
 
-// What positions lack by impacts (VelocityContacts::find_impacts()), added to the way of the step. Turns do not commute:
-// the way until τ comes first and the rest after it, or the axes of a body, and so its momentum, would be off by O(h²).
-// Of what moves after an impact in the step before, the guess ṽ may not know what holds it since; v is what it would be
-// then. The nearer one to v⁺ counts, by which nothing moves too far. Not in the parts of a step that is cut between
-// impacts, each of which follows one.
+// What positions lack by impacts (VelocityContacts::find_impacts()), added to the way of the step. Turns do not
+// commute: the way until τ comes first and the rest after it, or the axes of a body, and so its momentum, would be off
+// by O(h²). Of what moves after an impact in the step before, the guess ṽ may not know what holds it since; v is what
+// it would be then. The nearer one to v⁺ counts, by which nothing moves too far. Not in the parts of a step that is cut
+// between impacts, each of which follows one.
 void ThetaMethod::move_late(const State& begin, double h) {
     const Eigen::Map<const Vector> v(begin.v.data(), n_);
     until_impact_.setZero(n_);
     for_each_vector([&](std::int32_t first, std::int32_t size) {
         const auto k = static_cast<std::size_t>(first);
-        const auto [share, late] = contacts_.on_velocities()[k];
+        const double share = contacts_.on_velocities()[k].share, late = contacts_.on_velocities()[k].late;
         if (!(share > 0.0)) return;
         Vector change = result_.segment(first, size) - smooth_.segment(first, size);
         const auto held = result_.segment(first, size) - free_.segment(first, size);
@@ -261,6 +268,12 @@ void ThetaMethod::move_late(const State& begin, double h) {
         until = part * h * ((1.0 - 0.5 * part) * v.segment(first, size) + 0.5 * part * smooth_.segment(first, size));
         delta_.segment(first, size) += late * h * change - until;
     });
+    struck_spins_.find(system_, begin, h, theta_, spins_, contacts_.on_velocities(), solution_.x);
+    for (const StruckSpins::Spin& spin : struck_spins_.spins())
+        for (std::size_t i = 0; i < 3; ++i) {
+            until_impact_[spin.column + static_cast<Eigen::Index>(i)] = spin.until[i];
+            delta_[spin.column + static_cast<Eigen::Index>(i)] = spin.after[i];
+        }
     system_.increment(begin.q.data(), until_impact_.data(), end_.q.data());
     system_.increment(end_.q.data(), delta_.data(), end_.q.data());
 }
@@ -509,7 +522,7 @@ void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
-    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, last_h_, struck_);
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, changes_[0], last_h_, struck_);
     timed_ = true;
 }
 

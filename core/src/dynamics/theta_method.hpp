@@ -15,6 +15,7 @@
 #include "dynamics/position_error.hpp"
 #include "dynamics/position_projection.hpp"
 #include "dynamics/step_memory.hpp"
+#include "dynamics/struck_spins.hpp"
 #include "dynamics/untouched_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "dynamics/velocity_error.hpp"
@@ -111,6 +112,7 @@ private:
     std::vector<double> tensions_, tensions_at_theta_;
     std::vector<FreeSpin> spins_, theta_spins_;
     UntouchedSpins untouched_;
+    StruckSpins struck_spins_;
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
     /// implicit.
     std::array<std::vector<double>, 2> changes_;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dynamics/turning_axes.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace delassus {
 
 namespace {
@@ -22,16 +25,28 @@ TurningAxes::TurningAxes(const DynamicalSystem& system) : number_(static_cast<st
     }
 }
 
-void TurningAxes::begin(const double* velocities, double middle) {
+void TurningAxes::begin(const double* velocities, double middle, double h) {
+    constexpr double largest = 1.2;  // nobody resolves more of a turn
     velocities_ = velocities;
     to_begin_.clear();
-    for (const std::int32_t column : columns_)
-        to_begin_.push_back(turn_by(middle * Eigen::Map<const Eigen::Vector3d>(velocities + column)));
+    shares_.clear();
+    for (const std::int32_t column : columns_) {
+        const Eigen::Vector3d turn = middle * Eigen::Map<const Eigen::Vector3d>(velocities + column);
+        to_begin_.push_back(turn_by(turn));
+        const double x = std::min(turn.norm(), largest);
+        shares_.push_back(x > 0.0 && 2.0 * middle == h ? 1.0 / std::cos(x) : 1.0);
+    }
 }
 
-Eigen::Vector3d TurningAxes::later(double time, std::int32_t column, const double* entries) const {
-    return turn_by(-time * Eigen::Map<const Eigen::Vector3d>(velocities_ + column)) *
-           Eigen::Map<const Eigen::Vector3d>(entries);
+Eigen::Vector3d TurningAxes::later(double time, std::int32_t column, const Eigen::Vector3d& entries) const {
+    return turn_by(-time * Eigen::Map<const Eigen::Vector3d>(velocities_ + column)) * entries;
+}
+
+Eigen::Vector3d TurningAxes::across(std::int32_t column, const Eigen::Vector3d& vector, double share) const {
+    const Eigen::Map<const Eigen::Vector3d> omega(velocities_ + column);
+    const double square = omega.squaredNorm();
+    if (!(square > 0.0)) return vector;
+    return share * vector + (1.0 - share) * (omega.dot(vector) / square) * omega;
 }
 
 void TurningAxes::turn(std::span<const double> end, double h, double theta, std::vector<double>& in_begin,
@@ -43,7 +58,7 @@ void TurningAxes::turn(std::span<const double> end, double h, double theta, std:
         const Eigen::Map<const Eigen::Vector3d> before(velocities_ + column), after(end.data() + column);
         const Eigen::Vector3d turned = turn_by(h * ((1.0 - theta) * before + theta * after)) * after;
         Eigen::Map<Eigen::Vector3d>(in_begin.data() + column) = turned;
-        Eigen::Map<Eigen::Vector3d>(in_middle.data() + column) = to_begin_[k].conjugate() * turned;
+        Eigen::Map<Eigen::Vector3d>(in_middle.data() + column) = from_mean(column, to_begin_[k].conjugate() * turned);
     }
 }
 

@@ -68,9 +68,9 @@ namespace delassus {
 // which they meet.
 //
 // Without restitution a contact strikes if it is faster at the beginning of the step than the step makes it, u⁻ < −|a|
-// h. What is slower belongs to the smooth motion, as the next corner of what rolls: it lands by the last case, and its
-// time would change positions by O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of
-// order 1.
+// h, with the largest a of the body in this step and the one before and of the surface. What is slower belongs to the
+// smooth motion, as the next corner of what rolls: it lands by the last case, and its time would change positions by
+// O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of order 1.
 //
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)
@@ -189,7 +189,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta) {
     rows_.measure_speeds_at(begin.v.data(), theta * h);
     system_.collect_unilateral(begin, h, before_);
     begin_speeds_ = begin.v.data();
-    axes_.begin(begin_speeds_, theta * h);
+    axes_.begin(begin_speeds_, theta * h, h);
     std::size_t row = 0;
     bool compliant = false;
     for (std::size_t k = 0; k < before_.blocks().size(); ++k) {
@@ -395,6 +395,15 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         row += size;
     }
     rows_.move_into(problem.D);
+    for (std::size_t i = first_row_; i < problem.b.size(); ++i) {
+        const auto end = static_cast<std::size_t>(problem.D.row_start[i + 1]);
+        for (auto e = static_cast<std::size_t>(problem.D.row_start[i]); e < end; ++e) {
+            if (!axes_.at(problem.D.column, e, end)) continue;
+            Eigen::Map<Eigen::Vector3d> entries(&problem.D.value[e]);
+            entries = axes_.mean(problem.D.column[e], entries);
+            e += 2;
+        }
+    }
     set_compliance(problem, rows_.blocks(), compliances_);
 }
 
@@ -575,18 +584,23 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
 // With the mean forces F of the step and F₋ of the one before, of size h₋, a force changes at the rate
 // r = 2 (F − F₋)/(h + h₋), and is F + ½ h r at the end. Where that is negative nothing pulls in its place: the step
 // takes E²/(2 |r|) too little of impulse with E = −F − ½ h r, and so gives a speed that is wrong for as long as the
-// motion goes on: it counts as if it were wrong over all of the step.
-void VelocityContacts::add_release_error(const Problem& problem, const Solution& solution, double last_h,
-                                         std::vector<double>& error) const {
+// motion goes on: it counts as if it were wrong over all of the step. So does an impulse along rows that are off.
+void VelocityContacts::add_error(const Problem& problem, const Solution& solution, double last_h,
+                                 std::vector<double>& error) const {
     const auto& D = problem.D;
     for (const Contact& contact : contacts_) {
         const std::size_t row = first_row_ + contact.row;
-        if (!contact.along_normal || contact.impact || !(contact.last[0] > 0.0) || !(solution.lambda[row] > 0.0))
-            continue;
-        const double force = solution.lambda[row] / h_, rate = 2.0 * (force - contact.last[0] / last_h) / (h_ + last_h);
-        const double pulls = -force - 0.5 * h_ * rate;
-        if (!(pulls > 0.0)) continue;
-        const double impulse = 0.5 * pulls * pulls / -rate;
+        if (!contact.along_normal || !(solution.lambda[row] > 0.0)) continue;
+        double impulse = 0.0;
+        if (contact.impact) {
+            impulse = contact.row_error * solution.lambda[row];
+        } else if (contact.last[0] > 0.0) {
+            const double force = solution.lambda[row] / h_,
+                         rate = 2.0 * (force - contact.last[0] / last_h) / (h_ + last_h);
+            const double pulls = -force - 0.5 * h_ * rate;
+            if (pulls > 0.0) impulse = 0.5 * pulls * pulls / -rate;
+        }
+        if (impulse == 0.0) continue;
         for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
             const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
             error[column] += h_ * std::abs(D.value[static_cast<std::size_t>(e)]) * impulse / diagonal_[column];

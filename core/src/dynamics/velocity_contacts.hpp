@@ -64,9 +64,10 @@ public:
     /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
     void take_out_open(Problem& problem) const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
-    /// the velocities at the end of the step without impacts, n. last_h, last_struck: as of time_turns().
-    void time_meetings(Problem& problem, std::span<const double> smooth, double last_h,
-                       std::span<const double> last_struck);
+    /// the velocities at the end of the step without impacts, n. last_changes: accelerations of the step before, n or
+    /// empty. last_h, last_struck: as of time_turns().
+    void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> last_changes,
+                       double last_h, std::span<const double> last_struck);
     /// Whether impacts lead to other speeds, since other contacts act otherwise after them in the answer than before
     /// them: then b has those, and the problem is to be solved again.
     [[nodiscard]] bool follow_others(const Problem& problem, const Solution& solution);
@@ -101,6 +102,7 @@ public:
     struct OnVelocity {
         double share = -1.0;  ///< of its change against a motion without them; below 0 where none acts
         double late = 0.0;  ///< share · (1 − θ − τ/h), for impacts at the time τ after the beginning of the step
+        bool alone = false;  ///< of all contacts only these act on it
     };
     /// Whether contacts struck in this step at times within it; on_velocities() then has what they do. solution: of the
     /// whole problem.
@@ -127,9 +129,9 @@ public:
     bool only_take();
 
     /// error += what the step errs by in positions, n, because contacts and stops that push until its end let go within
-    /// it, as their forces in this step and in the one before, of size last_h, show. solution: of the whole problem.
-    void add_release_error(const Problem& problem, const Solution& solution, double last_h,
-                           std::vector<double>& error) const;
+    /// it, as their forces in this step and in the one before, of size last_h, show, and because rows of impacts are
+    /// not known at their time. solution: of the whole problem.
+    void add_error(const Problem& problem, const Solution& solution, double last_h, std::vector<double>& error) const;
 
     /// result += D_Aᵀ P of what pushed steadily: not of impacts. P: impulses, `lambda` of the whole problem; n.
     void add_steady_impulse(const Problem& problem, const std::vector<double>& lambda, double* result) const;
@@ -182,6 +184,7 @@ private:
         bool strikes = false;                        ///< b is that of an impact
         std::optional<Impact> impact;                ///< it strikes at a time within the step
         Approach before_impact;                      ///< until then
+        double row_error = 0.0;                      ///< of its rows then, as a share of their size
         double struck = HUGE_VAL;       ///< when an impact first strikes one of its bodies, if it has none itself
         std::array<double, 3> last{};   ///< its impulse in the step before, where it pushed
         double goes_on = 0.0;           ///< after that impact, if all went on: of `last`

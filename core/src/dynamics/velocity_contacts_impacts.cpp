@@ -89,9 +89,10 @@ void VelocityContacts::take_out_open(Problem& problem) const {
 // In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²),
 // and their rates likewise, which are means about h/2 and (1 + θ) h/2. Beside an angular velocity ω, which has the axes
 // of its body, rows turn with these: exp(−[ω] τ) D and exp([ω] (θ h − τ)) D̄ stand in their place. What shapes meet on
-// their way has rows of the meeting at the beginning.
+// their way has rows of the meeting at the beginning. Rows that turn by φ on the way from D to D̄ are off by
+// ½ w (1 − w) φ² of their length.
 bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& problem) {
-    const Contact& contact = contacts_[block];
+    Contact& contact = contacts_[block];
     if (!contact.nearly_as_before && !contact.met_on_the_way) return false;
     const std::size_t first = first_row_ + contact.row;
     const auto rows = static_cast<std::size_t>(rows_.blocks()[block].cone.rows);
@@ -105,17 +106,26 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
                     before_.column().begin() + static_cast<std::ptrdiff_t>(then)))
         return false;
     const double share = contact.met_on_the_way ? 0.0 : time / (theta_ * h_);
+    double change = 0.0, size = 0.0;
+    const auto between = [&](std::size_t e, double earlier, double later) {
+        const double H = diagonal_[static_cast<std::size_t>(D.column[e])];
+        D.value[e] = (1.0 - share) * earlier + share * later;
+        change += (later - earlier) * (later - earlier) / H;
+        size += D.value[e] * D.value[e] / H;
+    };
     for (std::size_t e = 0; e < entries; ++e) {
-        if (share != 0.0 && axes_.at(D.column, begin + e, begin + entries)) {
-            const std::int32_t column = D.column[begin + e];
-            Eigen::Map<Eigen::Vector3d> row(&D.value[begin + e]);
-            row = (1.0 - share) * axes_.later(time, column, &before_.value()[then + e]) +
-                  share * axes_.later(time - theta_ * h_, column, row.data());
-            e += 2;
+        if (!axes_.at(D.column, begin + e, begin + entries)) {
+            between(begin + e, before_.value()[then + e], D.value[begin + e]);
             continue;
         }
-        D.value[begin + e] += (1.0 - share) * (before_.value()[then + e] - D.value[begin + e]);
+        const std::int32_t column = D.column[begin + e];
+        const Eigen::Map<const Eigen::Vector3d> before(&before_.value()[then + e]), middle(&D.value[begin + e]);
+        const Eigen::Vector3d earlier = axes_.later(time, column, before),
+                              later = axes_.later(time - theta_ * h_, column, axes_.from_mean(column, middle));
+        for (Eigen::Index axis = 0; axis < 3; ++axis, ++e) between(begin + e, earlier[axis], later[axis]);
+        --e;
     }
+    if (size > 0.0) contact.row_error = 0.5 * std::abs(share * (1.0 - share)) * change / size;
     for (std::size_t i = 0; i < rows; ++i) {
         double& rate = rows_.rows()[contact.row + i].rate;
         rate += (1.0 - (time - 0.5 * h_) / (0.5 * theta_ * h_)) * (before_.rows()[contact.before + i].rate - rate);
@@ -134,7 +144,8 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate,
 // whose means are those of times θ h/2 apart; the speed at the beginning is that with the rate of this instant. The row
 // of the meeting, which stays, meets at the same time from another gap.
-void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth, double last_h,
+void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth,
+                                     std::span<const double> last_changes, double last_h,
                                      std::span<const double> last_struck) {
     smooth_ = smooth.data();
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -153,9 +164,11 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
         };
         const auto acceleration = [&] { return (speed_of(smooth.data()) - speed_of(begin_speeds_)) / h_; };
+        const double last_pull = last_changes.empty() ? 0.0 : problem.D.row_times(row, last_changes.data());
         const auto strikes = [&] {
             return bounces ? speed < -settings_.restitution_speed
-                           : speed < -h_ * std::abs(acceleration()) - contact.resolution / h_;
+                           : speed < -h_ * std::max({std::abs(acceleration()), std::abs(pull), std::abs(last_pull)}) -
+                                         contact.resolution / h_;
         };
         if (!bounces && gap <= 0.0 && !strikes()) {
             if (contact.was_there) take_rates_of_end(contact, block);
@@ -318,7 +331,8 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
         const bool any = !found_.empty();
         for (const std::size_t column : found_) {
             const Sum& sum = sums_[column];
-            on_velocities_[column] = {sum.share / sum.weight, sum.late / sum.weight};
+            on_velocities_[column].share = sum.share / sum.weight;
+            on_velocities_[column].late = sum.late / sum.weight;
         }
         found_.clear();
         return any;
@@ -331,6 +345,15 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
         for_each_entry(D, first, 1,
                        [&](std::size_t, std::size_t column, double) { add(column, value, solution.lambda[first]); });
     }
+    const std::vector<std::size_t> directly = found_;
+    settle();
+    for (const std::size_t column : directly) on_velocities_[column].alone = true;
+    for (std::size_t k = 0; k < contacts_.size(); ++k)
+        if (const std::size_t first = first_row_ + contacts_[k].row; !acts(contacts_[k]))
+            for_each_entry(D, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
+                           [&](std::size_t row, std::size_t column, double) {
+                               if (solution.lambda[row] != 0.0) on_velocities_[column].alone = false;
+                           });
     const auto pass_on = [&](const SparseMatrix& matrix, std::size_t first, std::size_t rows) {
         OnVelocity mean{.share = 0.0};
         double known = 0.0, unknown = 0.0;
@@ -346,13 +369,13 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
         mean.late /= known;
         for_each_entry(matrix, first, rows, [&](std::size_t, std::size_t column, double) { add(column, mean, 1.0); });
     };
-    while (settle()) {
+    do {
         for (std::size_t row = 0; row < n; ++row) pass_on(problem.H, row, 1);
         for (std::size_t row = 0; row < first_row_; ++row) pass_on(D, row, 1);
         for (std::size_t k = 0; k < contacts_.size(); ++k)
             if (solution.lambda[first_row_ + contacts_[k].row] > 0.0)
                 pass_on(D, first_row_ + contacts_[k].row, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
-    }
+    } while (settle());
     return true;
 }
 

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bodies that spin and bounce, without options: what an impact does depends neither on where in a step it is nor on how
+// far the body turns in one.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/scenes.hpp"
+
+namespace delassus::spinning_bounces_test {
+namespace {
+
+using Eigen::Vector3d;
+using tests::Running;
+
+Running run_of(const std::string& text) {
+    return Running(parse_scene(text, "test.yaml"));
+}
+
+Vector3d vector(const Vector3& v) {
+    return {v[0], v[1], v[2]};
+}
+
+std::string list(const Vector3d& v) {
+    return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", v[0], v[1], v[2]);
+}
+
+struct Ball {
+    double radius, friction, restitution;
+    Vector3d place, velocity, spin;
+};
+
+/// Where the centre may not get nearer to `offset` along the normal than the radius.
+struct Wall {
+    Vector3d normal;
+    double offset;
+};
+
+/// Parabolas between impacts, at each of which a ball of uniform density sticks or slides (Garwin, Am. J. Phys. 37,
+/// 1969, without his elastic spin).
+void move(Ball& ball, const std::vector<Wall>& walls, const Vector3d& gravity, double time) {
+    for (;;) {
+        const Wall* next = nullptr;
+        double first = std::numeric_limits<double>::infinity();
+        for (const Wall& wall : walls) {
+            const double a = 0.5 * gravity.dot(wall.normal), b = ball.velocity.dot(wall.normal),
+                         c = ball.place.dot(wall.normal) - wall.offset - ball.radius, root = b * b - 4.0 * a * c;
+            if (!(root > 0.0) || (a == 0.0 && b >= 0.0)) continue;
+            const double t = a == 0.0 ? -c / b : (-b - std::sqrt(root)) / (2.0 * a);
+            if (t > 1e-9 && t < first) {
+                first = t;
+                next = &wall;
+            }
+        }
+        const double t = std::min(first, time);
+        ball.place += t * ball.velocity + 0.5 * t * t * gravity;
+        ball.velocity += t * gravity;
+        time -= t;
+        if (!(time > 0.0)) return;
+        const Vector3d n = next->normal, arm = -ball.radius * n;
+        const double push = -(1.0 + ball.restitution) * ball.velocity.dot(n);
+        Vector3d slip = ball.velocity + ball.spin.cross(arm);
+        slip -= slip.dot(n) * n;
+        Vector3d rub = -slip / 3.5;
+        if (rub.norm() > ball.friction * push) rub *= ball.friction * push / rub.norm();
+        ball.velocity += push * n + rub;
+        ball.spin += arm.cross(rub) / (0.4 * ball.radius * ball.radius);
+    }
+}
+
+// In a room that is turned, with gravity along no axis of it.
+TEST(SpinningBounces, ABallLeavesFloorsAndWallsAsClosedFormsSay) {
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Vector3d(0.3, -0.7, 0.5).normalized()));
+    const double end = 1.37, half = 0.95;
+    const Vector3d gravity = turn * Vector3d(0.0, 0.0, -9.81);
+    for (const bool boxes : {false, true})
+        for (const auto& [friction, spin] :
+             {std::pair(0.4, Vector3d(5.0, 20.0, -10.0)), {0.05, {-30.0, 10.0, 25.0}}, {0.9, {50.0, 20.0, -100.0}}})
+            for (const double h : {1.0 / 60.0, 0.0107, 0.005}) {
+                SCOPED_TRACE(
+                    fmt::format("walls are {}, friction {}, step {}", boxes ? "boxes" : "planes", friction, h));
+                Ball ball{0.06, friction, 0.8, turn * Vector3d(0.0, 0.0, 0.6), turn * Vector3d(4.0, 0.5, 2.0), spin};
+                std::string text = fmt::format(
+                    "step: {:.17g}\nend: {}\ngravity: {}\nmaterials: {{m: {{friction: {}, restitution: "
+                    "{}}}}}\nbodies:\n"
+                    "- {{name: ball, mass: 0.3, position: {}, velocity: {}, angular_velocity: {}, shapes: [{{sphere: "
+                    "{{radius: {}}}, material: m}}]}}\n",
+                    h, end, list(gravity), friction, ball.restitution, list(ball.place), list(ball.velocity),
+                    list(spin), ball.radius);
+                std::vector<Wall> walls;
+                for (const Vector3d& n : {Vector3d(0.0, 0.0, 1.0), Vector3d(-1.0, 0.0, 0.0), Vector3d(1.0, 0.0, 0.0)}) {
+                    const double offset = n[2] > 0.0 ? 0.0 : -half;
+                    walls.push_back({turn * n, offset});
+                    const Eigen::Quaterniond q = turn * Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), n);
+                    const double depth = boxes ? 0.1 : 0.0;
+                    text += fmt::format(
+                        "- {{name: wall{}, fixed: true, position: {}, orientation: [{:.17g}, {:.17g}, {:.17g}, "
+                        "{:.17g}], shapes: [{{{}, material: m}}]}}\n",
+                        walls.size(), list((offset - depth) * (turn * n)), q.w(), q.x(), q.y(), q.z(),
+                        boxes ? "box: {size: [9, 9, 0.2]}" : "plane: {}");
+                }
+                auto run = run_of(text);
+                run.finish();
+                move(ball, walls, gravity, end);
+                const auto& [place, q] = run.pose("ball");
+                const auto [v, omega] = run.velocities("ball");
+                const Vector3d spins = Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * vector(omega);
+                EXPECT_LT((vector(place) - ball.place).norm(), 1e-9);
+                EXPECT_LT((vector(v) - ball.velocity).norm(), 1e-9);
+                EXPECT_LT((spins - ball.spin).norm(), 1e-9 * spin.norm());
+            }
+}
+
+// A box that tumbles has a gyroscopic torque, which an impact changes within a step.
+TEST(SpinningBounces, ATumblingBoxBouncesAsInShortSteps) {
+    const auto place_after = [](double friction, double restitution, double h) {
+        auto run = run_of(fmt::format(
+            "step: {:.17g}\nend: 0.62\nmaterials: {{m: {{friction: {}, restitution: {}}}}}\nbodies:\n"
+            "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+            "- {{name: a, density: 700, position: [0, 0, 0.8], velocity: [0.7, -0.3, 0], angular_velocity: [8, 5, -7], "
+            "orientation: {{axis: [1, 0.2, 0.3], angle: 20}}, shapes: [{{box: {{size: [0.3, 0.2, 0.1]}}, material: "
+            "m}}]}}\n",
+            h, friction, restitution));
+        run.finish();
+        return vector(run.pose("a").position);
+    };
+    for (const auto& [friction, restitution] : {std::pair(0.0, 1.0), {0.4, 0.8}}) {
+        const Vector3d right = place_after(friction, restitution, 2e-5);
+        for (const double h : {0.001, 0.002, 0.005, 1.0 / 60.0}) {
+            SCOPED_TRACE(fmt::format("restitution {}, step {}", restitution, h));
+            EXPECT_LT((place_after(friction, restitution, h) - right).norm(), 2e-4);
+        }
+    }
+}
+
+// The upper ball follows the lower one, which bounces back at it: they were not nearing each other when the step began.
+TEST(SpinningBounces, WhatABounceLeadsToWithinAStepIsAtItsTime) {
+    const double g = 9.81, e = 0.7, R = 0.1, r = 0.05, low = 0.5, high = 0.68, aside = 0.013, end = 0.45;
+    const double lands = std::sqrt(2.0 * (low - R) / g),
+                 after = high - low - std::sqrt((R + r) * (R + r) - aside * aside);
+    const double meets = after / ((1.0 + e) * g * lands), up = (e * lands - meets) * g, down = -(lands + meets) * g;
+    const Vector3d n = Vector3d(aside, 0.0, high - low - after) / (R + r);
+    const double impulse = (1.0 + e) * (up - down) * n[2] / (1.0 + 10.0);
+    const double left = end - lands - meets;
+    const double x = aside + 10.0 * impulse * n[0] * left;
+    const double z = high - 0.5 * g * (lands + meets) * (lands + meets) + (down + 10.0 * impulse * n[2]) * left -
+                     0.5 * g * left * left;
+    for (const double h : {1.0 / 60.0, 0.0143, 0.01}) {
+        SCOPED_TRACE(h);
+        auto run = run_of(fmt::format(
+            "step: {:.17g}\nend: {}\nmaterials: {{m: {{friction: 0, restitution: {}}}}}\nbodies:\n"
+            "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+            "- {{name: low, mass: 1, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}, material: m}}]}}\n"
+            "- {{name: high, mass: 0.1, position: [{}, 0, {}], shapes: [{{sphere: {{radius: {}}}, material: m}}]}}\n",
+            h, end, e, low, R, aside, high, r));
+        run.finish();
+        const auto& at = run.pose("high").position;
+        EXPECT_NEAR(at[0], x, 2e-3);
+        EXPECT_NEAR(at[2], z, 2e-3);
+    }
+}
+
+}  // namespace
+}  // namespace delassus::spinning_bounces_test
