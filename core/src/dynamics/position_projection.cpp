@@ -114,7 +114,7 @@ void PositionProjection::solve(StepSolver& solver, StepReport& report) {
 void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
                                  const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
                                  std::string_view method) {
-    moved_.clear();
+    moved_ = false;
     if (n_ == 0 || !assemble(end, h, contacts)) return;
     problem_.name = "position";
     problem_.law = Law::Associated;
@@ -128,7 +128,7 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     solve(solver, report);
     delta_ = solution_.x;
     for (double& entry : delta_) entry *= h;
-    if (!contacts.begins_deep()) moved_ = delta_;
+    moved_ = !contacts.begins_deep();
     const auto pushed = [](double impulse) { return impulse > 0.0; };
     if (std::any_of(solution_.lambda.begin() + m_, solution_.lambda.end(), pushed)) {
         force_.assign(static_cast<std::size_t>(n_), 0.0);

@@ -25,9 +25,11 @@ public:
     /// constraints nearer to 0.
     void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
                  StepSolver& solver, StepReport& report, std::string_view method);
-    /// What the last project() moved by, n: the step had erred by as much. Empty if it moved nothing, or if the step began
-    /// with a penetration.
-    [[nodiscard]] std::span<const double> moved() const { return moved_; }
+    /// What the last project() moved by, n: the step had erred by as much. Empty if it moved nothing, or if the step
+    /// began with a penetration.
+    [[nodiscard]] std::span<const double> moved() const {
+        return moved_ ? std::span<const double>(delta_) : std::span<const double>();
+    }
     /// Changes end.v by the least, in the norm of H, to where the constraints stay: C_q v + C_t = 0.
     void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 
@@ -45,7 +47,8 @@ private:
     MatrixAssembler D_;
     Problem problem_;
     Solution solution_;
-    std::vector<double> constraint_, delta_, moved_, force_, diagonal_;
+    std::vector<double> constraint_, delta_, force_, diagonal_;
+    bool moved_ = false;
 };
 
 }  // namespace delassus

@@ -11,10 +11,10 @@ void StruckSpins::find(const DynamicalSystem& system, const State& begin, double
                        std::span<const FreeSpin> spins, std::span<const VelocityContacts::OnVelocity> impacts,
                        std::span<const double> result) {
     struck_.clear();
-    state_ = begin;
     for (std::size_t k = 0; k < spins.size(); ++k) {
         const VelocityContacts::OnVelocity& impact = impacts[static_cast<std::size_t>(spins[k].column)];
         if (!spins[k].alone || !impact.alone) continue;
+        if (struck_.empty()) state_ = begin;
         Spin& spin = struck_.emplace_back();
         spin.number = k;
         spin.column = spins[k].column;

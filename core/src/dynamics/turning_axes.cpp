@@ -29,12 +29,12 @@ void TurningAxes::begin(const double* velocities, double middle, double h) {
     constexpr double largest = 1.2;  // nobody resolves more of a turn
     velocities_ = velocities;
     to_begin_.clear();
-    shares_.clear();
+    stretches_.clear();
     for (const std::int32_t column : columns_) {
         const Eigen::Vector3d turn = middle * Eigen::Map<const Eigen::Vector3d>(velocities + column);
         to_begin_.push_back(turn_by(turn));
         const double x = std::min(turn.norm(), largest);
-        shares_.push_back(x > 0.0 && 2.0 * middle == h ? 1.0 / std::cos(x) : 1.0);
+        stretches_.push_back(x > 0.0 && 2.0 * middle == h ? 1.0 / std::cos(x) : 1.0);
     }
 }
 
@@ -49,6 +49,18 @@ Eigen::Vector3d TurningAxes::across(std::int32_t column, const Eigen::Vector3d& 
     return share * vector + (1.0 - share) * (omega.dot(vector) / square) * omega;
 }
 
+void TurningAxes::stretch(std::size_t first_row, SparseMatrix& D) const {
+    for (std::size_t row = first_row; row < static_cast<std::size_t>(D.rows); ++row) {
+        const auto end = static_cast<std::size_t>(D.row_start[row + 1]);
+        for (auto e = static_cast<std::size_t>(D.row_start[row]); e < end; ++e) {
+            if (!at(D.column, e, end)) continue;
+            Eigen::Map<Eigen::Vector3d> entries(&D.value[e]);
+            entries = across(D.column[e], entries, stretches_[number(D.column[e])]);
+            e += 2;
+        }
+    }
+}
+
 void TurningAxes::turn(std::span<const double> end, double h, double theta, std::vector<double>& in_begin,
                        std::vector<double>& in_middle) const {
     in_begin.assign(end.begin(), end.end());
@@ -58,7 +70,7 @@ void TurningAxes::turn(std::span<const double> end, double h, double theta, std:
         const Eigen::Map<const Eigen::Vector3d> before(velocities_ + column), after(end.data() + column);
         const Eigen::Vector3d turned = turn_by(h * ((1.0 - theta) * before + theta * after)) * after;
         Eigen::Map<Eigen::Vector3d>(in_begin.data() + column) = turned;
-        Eigen::Map<Eigen::Vector3d>(in_middle.data() + column) = from_mean(column, to_begin_[k].conjugate() * turned);
+        Eigen::Map<Eigen::Vector3d>(in_middle.data() + column) = unstretched(column, to_begin_[k].conjugate() * turned);
     }
 }
 

@@ -39,12 +39,10 @@ public:
     }
     /// The same in the axes of a time that is so much later than theirs, s.
     [[nodiscard]] Eigen::Vector3d later(double time, std::int32_t column, const Eigen::Vector3d& entries) const;
-    /// S of what stands at a column, and back.
-    [[nodiscard]] Eigen::Vector3d mean(std::int32_t column, const Eigen::Vector3d& entries) const {
-        return across(column, entries, shares_[number(column)]);
-    }
-    [[nodiscard]] Eigen::Vector3d from_mean(std::int32_t column, const Eigen::Vector3d& entries) const {
-        return across(column, entries, 1.0 / shares_[number(column)]);
+    /// S of the rows from the first one on; and back, of what stands at a column.
+    void stretch(std::size_t first_row, SparseMatrix& D) const;
+    [[nodiscard]] Eigen::Vector3d unstretched(std::int32_t column, const Eigen::Vector3d& entries) const {
+        return across(column, entries, 1.0 / stretches_[number(column)]);
     }
 
     /// Of velocities w at the end of a step that moves by h ((1 − θ) v + θ v⁺), n: in_begin has them in the axes of its
@@ -62,7 +60,7 @@ private:
     std::vector<std::int32_t> columns_;  // the first ones of angular velocities
     std::vector<std::int32_t> number_;   // of the angular velocity that begins at a column; -1: none
     std::vector<Eigen::Quaterniond> to_begin_;
-    std::vector<double> shares_;  // 1/cos(φ/2)
+    std::vector<double> stretches_;  // 1/cos(φ/2)
     const double* velocities_ = nullptr;
 };
 

@@ -26,8 +26,10 @@ namespace delassus {
 //
 // Rates, those of bodies with a given motion, are means over the step that rows are collected for: at q over all of it,
 // at q̄ over the rest (1 − θ) h. So they belong to t + h/2 and t + (1 + θ) h/2, and the same formula gives the rate at
-// the end. Beside rates, D is extrapolated with means as well, (v + ṽ⁺)/2 in place of ṽ⁺: what errs is then ¼ h² d(Ḋ
-// v)/dt and not ¼ h² D̈ v⁺, so that what rides in a drum stays where it is. A step in which anything strikes keeps ṽ⁺.
+// the end. D is extrapolated with means as well, (v + ṽ⁺)/2 in place of ṽ⁺: what errs is then ¼ h² d(Ḋ v)/dt and not
+// ¼ h² D̈ v⁺, so that what rides in a drum stays where it is, and what rolls over an edge leaves it as it should. A step
+// in which anything strikes keeps ṽ⁺. All this is about what the contact's own motion changes: entries beside angular
+// velocities are brought to the same axes first (turning_axes.hpp).
 //
 // ---- Servos with a limit ----
 //
@@ -395,15 +397,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         row += size;
     }
     rows_.move_into(problem.D);
-    for (std::size_t i = first_row_; i < problem.b.size(); ++i) {
-        const auto end = static_cast<std::size_t>(problem.D.row_start[i + 1]);
-        for (auto e = static_cast<std::size_t>(problem.D.row_start[i]); e < end; ++e) {
-            if (!axes_.at(problem.D.column, e, end)) continue;
-            Eigen::Map<Eigen::Vector3d> entries(&problem.D.value[e]);
-            entries = axes_.mean(problem.D.column[e], entries);
-            e += 2;
-        }
-    }
+    axes_.stretch(first_row_, problem.D);
     set_compliance(problem, rows_.blocks(), compliances_);
 }
 

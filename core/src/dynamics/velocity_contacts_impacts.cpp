@@ -121,7 +121,7 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
         const std::int32_t column = D.column[begin + e];
         const Eigen::Map<const Eigen::Vector3d> before(&before_.value()[then + e]), middle(&D.value[begin + e]);
         const Eigen::Vector3d earlier = axes_.later(time, column, before),
-                              later = axes_.later(time - theta_ * h_, column, axes_.from_mean(column, middle));
+                              later = axes_.later(time - theta_ * h_, column, axes_.unstretched(column, middle));
         for (Eigen::Index axis = 0; axis < 3; ++axis, ++e) between(begin + e, earlier[axis], later[axis]);
         --e;
     }

@@ -274,7 +274,7 @@ void divide_by_error(SceneSystem& system) {
 }
 
 /// What happens within a fixed step is early or late by up to its length. Where bodies sleep, what it did is not
-/// undone; with restitution steps are cut between impacts instead.
+/// undone.
 void divide_while_cheap(SceneSystem& system) {
     const bool fixed = !system.control && !system.steps_by_accuracy() && !system.sleeping;
     const bool order_2 = system.integrator == "switching" || is_of_order_2(system);
