@@ -115,9 +115,9 @@ TEST_P(SecondOrder, OfABallInTheAirBeforeItLands) {
     EXPECT_NEAR(measured.velocity, 2.0, 0.1);
 }
 
-// The error of an impact depends on its phase in the step: the mean over many step sizes has a slope. The height is
-// rid of what the impact's time is off by at rate u⁺ − u⁻: order 1.
-TEST_P(SecondOrder, IsOneOverImpactsWithFixedSteps) {
+// The error of an impact depends on its phase in the step: the mean over many step sizes has a slope. The drag turns
+// round with the ball, at the time of the impact; in nonsmooth_generalized_alpha that is off by up to a step.
+TEST_P(SecondOrder, OverImpactsWithDragAndFixedSteps) {
     int impacts = 0;
     const double end = 2.0;
     const State exact = bounced({0.7, 1.0, 0.0}, 0.8, end, &impacts);
@@ -138,8 +138,9 @@ TEST_P(SecondOrder, IsOneOverImpactsWithFixedSteps) {
     if (std::getenv("DELASSUS_PRINT_ORDERS"))
         std::printf("%s, over impacts: q %.2f, error %.1e with h = %.1e\n", GetParam().c_str(), order,
                     measured.position.back(), measured.h.back());
-    EXPECT_NEAR(order, 1.0, 0.25);
-    EXPECT_LT(measured.position.back(), 10.0 * measured.h.back());
+    const bool early = GetParam() == "nonsmooth_generalized_alpha";
+    EXPECT_NEAR(order, early ? 1.0 : 2.0, 0.25);
+    EXPECT_LT(measured.position.back(), early ? 10.0 * measured.h.back() : measured.h.back());
 }
 
 // Newton's law at any phase of the impact within the step. Before it the ball falls at 1 m/s, hardly accelerated.

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -248,6 +249,67 @@ TEST(KinematicBody, ShakesAMassOverASpring) {
     }
     const double expected = Z * std::hypot(k, c * omega) / std::hypot(k - m * omega * omega, c * omega);
     EXPECT_NEAR(largest, expected, 2e-4 * expected);
+}
+
+/// The first t > 0 with f(t) = 0, where f falls; f(0) > 0.
+template <class Function>
+double first_zero(const Function& f) {
+    double last = 0.0, next = 1e-4;
+    while (f(next) > 0.0) last = next, next += 1e-4;
+    for (int k = 0; k < 60; ++k) (f(0.5 * (last + next)) > 0.0 ? last : next) = 0.5 * (last + next);
+    return last;
+}
+
+// A bat of the thickness 2 b turns at ω about the origin; a ball at rest at c is hit where its distance from the bat's
+// middle is b + r, and leaves along the normal of then.
+TEST(KinematicBody, HitsABallAsItMovesAtThatInstant) {
+    const double omega = 3.0, b = 0.03, r = 0.05, x = 0.8, y = 0.35, e = 0.6, end = 0.7;
+    const double hit = first_zero([&](double t) { return y * std::cos(omega * t) - x * std::sin(omega * t) - b - r; });
+    const double along = x * std::cos(omega * hit) + y * std::sin(omega * hit);
+    const double way = (1.0 + e) * omega * along * (end - hit);
+    for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+        SCOPED_TRACE(h);
+        Running run(parse_scene(
+            fmt::format("step: {:.17g}\nend: {}\ngravity: [0, 0, 0]\nmaterials: {{m: {{restitution: {}}}}}\nbodies:\n"
+                        "- {{name: bat, position: [0.5, 0, 0], motion: {{rotation: {{angle: {{linear: {{rate: {}}}}}, "
+                        "point: [0, 0, 0]}}}}, shapes: [{{box: {{size: [1, {}, 0.3]}}, material: m}}]}}\n"
+                        "- {{name: ball, mass: 0.3, position: [{}, {}, 0], shapes: [{{sphere: {{radius: {}}}, "
+                        "material: m}}]}}\n",
+                        h, end, e, omega, 2.0 * b, x, y, r),
+            "s"));
+        run.finish();
+        EXPECT_NEAR(run.pose("ball").position[0], x - way * std::sin(omega * hit), 4.0 * h * h);
+        EXPECT_NEAR(run.pose("ball").position[1], y + way * std::cos(omega * hit), 4.0 * h * h);
+    }
+}
+
+// Parabolas between bounces off a plate that goes up and down: its speed of that instant counts.
+TEST(KinematicBody, ThrowsUpWhatBouncesOnIt) {
+    const double a = 0.03, omega = 2.0 * pi * 4.0, e = 0.7, r = 0.05, end = 1.4;
+    double z = 0.3, u = 0.0, t = 0.0;
+    for (;;) {
+        const auto gap = [&](double d) { return z + u * d - 0.5 * g * d * d - a * std::sin(omega * (t + d)) + 1e-12; };
+        const double flight = std::min(first_zero(gap), end - t);
+        z += u * flight - 0.5 * g * flight * flight;
+        u -= g * flight;
+        t += flight;
+        if (!(t < end)) break;
+        const double plate = a * omega * std::cos(omega * t);
+        u = plate + e * (plate - u);
+    }
+    for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+        SCOPED_TRACE(h);
+        Running run(parse_scene(
+            fmt::format("step: {:.17g}\nend: {}\nmaterials: {{m: {{restitution: {}}}}}\nbodies:\n"
+                        "- {{name: plate, position: [0, 0, -0.1], motion: {{translation: [0, 0, {{sine: {{amplitude: "
+                        "{}, frequency: 4}}}}]}}, shapes: [{{box: {{size: [4, 4, 0.2]}}, material: m}}]}}\n"
+                        "- {{name: ball, mass: 1, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}, material: "
+                        "m}}]}}\n",
+                        h, end, e, a, 0.3 + r, r),
+            "s"));
+        run.finish();
+        EXPECT_NEAR(run.pose("ball").position[2], z + r, 15.0 * h * h);
+    }
 }
 
 TEST(KinematicBody, IsInThePlanAndStartsWhereItsMotionDoes) {

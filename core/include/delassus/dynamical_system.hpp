@@ -14,6 +14,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -78,7 +79,7 @@ public:
     struct Row {
         double gap = 0.0;   ///< position-level value Φ of the row, 0 for tangential and box rows
         double rate = 0.0;  ///< ∂Φ/∂t, or the prescribed part of the velocity; it may be its mean over the step
-        double rate_now = 0.0;  ///< that of a tangential row of a contact at the state itself
+        double rate_now = 0.0;  ///< that of a row of a contact at the state itself
     };
 
     /// Keeps the memory for the next rows, and the velocities of measure_speeds_at().
@@ -261,6 +262,12 @@ public:
     [[nodiscard]] virtual bool has_unilateral() const;
     /// The rows that may become active within a step of size h.
     virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);
+    /// The velocity at the time t of the point of a contact's shape_b, as far as it is prescribed, less that of
+    /// shape_a, m/s, world frame. contact: with its points at t, or on the way from those that collect_unilateral() had
+    /// at the time `begin`. Nothing where the system does not know: then rates between those of its rows are taken.
+    /// Default: nothing.
+    [[nodiscard]] virtual std::optional<Vector3> prescribed_velocity(const ContactPoint& contact, double begin,
+                                                                     double t) const;
 
     /// Largest speed with which a step should push apart what penetrates, where its user says nothing. Default: 0.01,
     /// the source's advice in m/s (seed footnote 5).

@@ -12,6 +12,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -113,6 +114,8 @@ public:
     [[nodiscard]] double next_jump(double t) const override;
     [[nodiscard]] double longest_step(double t) const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
+    [[nodiscard]] std::optional<Vector3> prescribed_velocity(const ContactPoint& contact, double begin,
+                                                             double t) const override;
     [[nodiscard]] double recovery_speed() const override;
     [[nodiscard]] double free_fall() const override;
     [[nodiscard]] double gap_resolution() const override;

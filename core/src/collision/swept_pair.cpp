@@ -103,9 +103,11 @@ void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& 
         return;
     const double gap = std::min(nearest->gap, envelope);
     const Vector3d normal = vector(nearest->normal);
+    const bool at_begin = !nearest->on_the_way;
     begin_.swap(found_);
     advance_to(meeting * gap, by, a, b, of_a, of_b, envelope);
-    if (!found_.empty() && vector(nearest_of(found_)->normal).dot(normal) >= same_cosine) found_.swap(begin_);
+    if (at_begin && !found_.empty() && vector(nearest_of(found_)->normal).dot(normal) >= same_cosine)
+        found_.swap(begin_);
 }
 
 void SweptPair::advance_to(double distance, NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a,

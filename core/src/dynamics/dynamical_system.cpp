@@ -164,6 +164,10 @@ double DynamicalSystem::longest_step(double /*t*/) const {
 bool DynamicalSystem::has_unilateral() const {
     return false;
 }
+std::optional<Vector3> DynamicalSystem::prescribed_velocity(const ContactPoint&, double, double) const {
+    return std::nullopt;
+}
+
 void DynamicalSystem::collect_unilateral(const State&, double, UnilateralRows& rows) {
     rows.clear();
 }

@@ -149,6 +149,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     note_velocity_error(state, h);
     find_spins(state, h);
     timed_ = false;
+    damped_.resize(0);
     if (settings_.linearly_implicit) extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
     if (settings_.linearly_implicit) {
@@ -347,6 +348,7 @@ void ThetaMethod::linearize(const State& begin, double h) {
     system_.multiply_mass(at_theta_, 1.0, back_.data(), problem_.a.data());
     problem_.H.multiply_add(1.0, guess_.data(), problem_.a.data());
     contacts_.add_known_impulses(problem_);
+    for (Eigen::Index i = 0; i < damped_.size(); ++i) problem_.a[static_cast<std::size_t>(i)] += damped_[i];
     if (m_ > 0) set_constraint_rows(begin, h);
 }
 
@@ -484,9 +486,11 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
             time_turns(solver, report);
             turns = true;
         }
-        if (iteration == 0 && timed_ && contacts_.follow_others(problem_, solution_)) turns = true;
-        if (guess_.allFinite() && !taking && contacts_gain(begin) && contacts_.only_take()) {
+        if (iteration == 0 && timed_ && follow_impacts(h)) turns = true;
+        if (timed_ && iteration == (turns ? 1 : 0) && contacts_.release_forces(problem_, solution_)) turns = true;
+        if (guess_.allFinite() && !taking && contacts_gain(begin) && contacts_.only_take(problem_)) {
             taking = true;  // from the start, which is not where energy came from
+            damped_.resize(0);
             guess_ = free_;
             solution_.x.assign(guess_.begin(), guess_.end());
             std::fill(solution_.lambda.begin(), solution_.lambda.end(), 0.0);
@@ -526,6 +530,32 @@ void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver
     timed_ = true;
 }
 
+// Forces that depend on velocities are not the same before and after an impact. With the derivative −C of what they
+// are, the way h v_θ + x that an answer gives (VelocityContacts::find_impacts()) changes their impulse by −C x, and
+// from the impact on they differ by −C (v⁺ − ṽ) from those of ṽ.
+/// Of a step that is solved: whether impacts change what acts besides them.
+bool ThetaMethod::follow_impacts(double h) {
+    if (!contacts_.any_impact(solution_)) return false;
+    const auto n = static_cast<std::size_t>(n_);
+    damped_after_.setZero(n_);
+    if (system_.has_stiffness()) {
+        Solution answer = solution_;
+        contacts_.add_known_impulses(answer.lambda);
+        if (!contacts_.find_impacts(problem_, answer)) return false;
+        H_.begin(n_, n_);
+        system_.add_damping(at_theta_, 1.0, Tangent::Symmetric, H_);
+        H_.finish_into(damping_);
+        back_ = Eigen::Map<const Vector>(solution_.x.data(), n_) - smooth_;
+        damping_.multiply_add(-1.0, back_.data(), damped_after_.data());
+        for (std::size_t k = 0; k < n; ++k)
+            back_[static_cast<Eigen::Index>(k)] *= h * contacts_.on_velocities()[k].late;
+        damped_.setZero(n_);
+        damping_.multiply_add(-1.0, back_.data(), damped_.data());
+    }
+    const bool others = contacts_.follow_others(problem_, solution_, {damped_after_.data(), n});
+    return others || (damped_.size() > 0 && !damped_.isZero(0.0));
+}
+
 // One problem. Two in the first step, which has no history to extrapolate from, and where contacts become persistent; a
 // few where a contact strikes with friction and the solver does not know Coulomb's law.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
@@ -547,7 +577,11 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     linearize_at_guess();
     if (!found()) return;
     const bool persists = contacts_.make_persistent(solution_);
-    if ((timed_ && contacts_.follow_others(problem_, solution_)) || changes_[0].empty() || persists) {
+    if ((timed_ && follow_impacts(h)) || changes_[0].empty() || persists) {
+        linearize_at_guess();
+        if (!found()) return;
+    }
+    if (timed_ && contacts_.release_forces(problem_, solution_)) {
         linearize_at_guess();
         if (!found()) return;
     }

@@ -77,6 +77,7 @@ private:
     [[nodiscard]] Vector without_impacts(const State& begin, double h, StepSolver& solver, StepReport& report);
     void time_turns(StepSolver& solver, StepReport& report);
     void time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report);
+    [[nodiscard]] bool follow_impacts(double h);
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_velocity_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
@@ -121,6 +122,8 @@ private:
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
     Vector until_impact_;                        // the way of struck velocities until then
+    SparseMatrix damping_;                       // C at θ
+    Vector damped_, damped_after_;               // −C x and −C (v⁺ − ṽ) of impacts; empty without
     Vector result_, back_, linear_;
     std::vector<double> constraint_;
     std::vector<double> last_a_, last_b_;

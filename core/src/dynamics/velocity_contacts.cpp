@@ -31,14 +31,6 @@ namespace delassus {
 // in which anything strikes keeps ṽ⁺. All this is about what the contact's own motion changes: entries beside angular
 // velocities are brought to the same axes first (turning_axes.hpp).
 //
-// ---- Servos with a limit ----
-//
-// A row with a compliance c is the law of a force τ = (−rate − u)/c between bounds, u being a speed (UnilateralRows).
-// The mean force of a step is the one at θ, so the row is that of a step of size θ h from its beginning, with the speed
-// u_θ = D̄ ((1 − θ) v + θ v⁺). With P = h τ,
-//
-//     D̄ v⁺ + ((1 − θ) D̄ v + rate)/θ + c/(θ h) P = 0
-//
 // ---- The law ----
 //
 // With the gap g and the speed u⁻ at the beginning of the step, b of a normal row is (Moreau 1988; Jean 1999; Acary and
@@ -92,22 +84,6 @@ namespace delassus {
 // mechanism is nearly jammed between contacts; and rows that turn far in a step are not those of its end. A step whose
 // contacts gain more than a hundredth of the kinetic energy is solved again without restitution and with D̄ for both
 // sides: then u⁺ = 0 where P_n > 0.
-//
-// ---- Friction in joints, motors at their limit ----
-//
-// A force between the bounds F₋ and F₊ is F₋ while the speed u of its row is above 0, and F₊ while it is below. Where u
-// passes 0 at the time τ of the step, the impulse is τ F₋ and that of a force between the bounds from then on:
-//
-//     P ∈ τ F₋ + (h − τ) [F₋, F₊],      τ = h u⁻/(u⁻ − ũ)
-//
-// with the speed ũ that the row would have at the end under F₋ alone; likewise for u⁻ < 0. Bounds of h [F₋, F₊] would
-// change the speed at the end by τ (F₊ − F₋)/m at every turn, which makes the method one of order 1. Where the row then
-// slides the other way under F₊, |u⁻ − ũ| is more than h (F₊ − F₋)/m. With less it rests from τ on, as it does by the
-// bounds h [F₋, F₊]: these stay.
-//
-// Friction in a contact that turns round against its sliding velocity u_t⁻ likewise (`once`, which knows ũ): until τ it
-// is −μ (τ/h) P_n u_t⁻/|u_t⁻|, with the P_n of the step before, unless an impact has changed that, a known impulse;
-// what is left has the cone of μ (1 − τ/h).
 //
 // ---- Friction ----
 //
@@ -269,17 +245,18 @@ const VelocityContacts::Before* VelocityContacts::find_before(std::uint64_t key)
     return &*found;
 }
 
-/// Finds the row of a servo in servos_; its entry of E.
-double VelocityContacts::set_servo(std::uint64_t key, Contact& contact) const {
-    std::size_t row = 0;
-    for (const auto& block : servos_.blocks()) {
-        if (block.key == key) {
-            contact.servo = &servos_.rows()[row];
-            return block.compliance / (theta_ * h_);
-        }
-        row += static_cast<std::size_t>(block.cone.rows);
-    }
-    throw InputError("a system gave a row with a compliance within a step that it had not at its beginning");
+LimitedServo VelocityContacts::find_servo(std::uint64_t key, const Before& before, const Contact& contact) const {
+    std::size_t row = 0, block = 0;
+    while (servos_.blocks()[block].key != key) row += static_cast<std::size_t>(servos_.blocks()[block++].cone.rows);
+    double mobility = 0.0;
+    for (auto e = static_cast<std::size_t>(rows_.row_start()[contact.row]);
+         e < static_cast<std::size_t>(rows_.row_start()[contact.row + 1]); ++e)
+        mobility += rows_.value()[e] * rows_.value()[e] / diagonal_[static_cast<std::size_t>(rows_.column()[e])];
+    return {{servos_.rows()[row].rate, servos_.blocks()[block].compliance},
+            {before_.rows()[before.row].rate, before_.blocks()[before.block].compliance},
+            theta_,
+            h_,
+            mobility};
 }
 
 /// Whether rows of rows_ are those of before_, but for a turn that a smooth motion explains. Rows act on lengths and
@@ -339,6 +316,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
+    holds_forces_ = false;
     contacts_.clear();
     compliances_.clear();
     kept_.begin_walk();
@@ -361,7 +339,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.along_normal = block.along_normal();
         const ContactPoint* point = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
         contact.pushed = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
-        if (contact.pushed && contact.along_normal)
+        if ((contact.pushed && contact.along_normal) || is_between_bounds(k))
             std::copy_n(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_ + row), std::min<std::size_t>(size, 3),
                         contact.last.begin());
         const Before* before = find_before(block.key);
@@ -391,7 +369,13 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.resolution =
             point ? resolution_.of(std::span(rows_.column()).subspan(entry, entries), h_) : resolution_.least();
         if (contact.along_normal) set_normal(block, contact, block.speed);
-        compliances_.push_back(block.compliance > 0.0 ? set_servo(block.key, contact) : 0.0);
+        if (block.compliance > 0.0) {
+            if (!before)
+                throw InputError(
+                    "a system gave a row with a compliance within a step that it had not at its beginning");
+            contact.servo = find_servo(block.key, *before, contact);
+        }
+        compliances_.push_back(contact.servo ? contact.servo->compliance(contact.struck) : 0.0);
         if (block.cone.kind == ConeKind::Friction && block.cone.parameters[0] > 0.0 && !coulomb)
             contact.friction = block.cone.parameters[0];
         row += size;
@@ -425,8 +409,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
             double& b = problem.b[row];
             b = rows_.rows()[contact.row + i].rate;
             if (contact.servo) {
-                const double speed = D.row_times(static_cast<std::int32_t>(row), begin_speeds_);
-                b = ((1.0 - theta_) * speed + contact.servo->rate) / theta_;
+                b = contact.servo->rate(contact.struck, D.row_times(static_cast<std::int32_t>(row), begin_speeds_));
             } else if (contact.turns) {
                 const std::size_t then = contact.before + i;
                 const double in_middle = D.row_times(static_cast<std::int32_t>(row), in_middle_.data());
@@ -545,10 +528,11 @@ double VelocityContacts::work(const Problem& problem, const Solution& solution, 
     return sum;
 }
 
-bool VelocityContacts::only_take() {
+bool VelocityContacts::only_take(Problem& problem) {
     bool changed = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
+        if (holds_forces_ && is_between_bounds(k) && contact.goes_on != 0.0) release(problem, k);
         if (!contact.along_normal) continue;
         changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
         contact.turns = contact.strikes = false;
@@ -559,6 +543,7 @@ bool VelocityContacts::only_take() {
         const double gap = contact.resolved_gap();
         contact.normal = gap > 0.0 ? std::max(gap - (1.0 - theta_) * h_ * contact.approach, 0.0) / (theta_ * h_) : 0.0;
     }
+    holds_forces_ = false;
     return changed;
 }
 
@@ -642,11 +627,13 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
         if (settings_.once && speed <= 0.25 * contact.change) continue;
         note_impact(rows_.blocks()[k], gap, contact.approach, contact.pushed, h_, settings_.restitution_speed, report);
     }
-    // What pushed until an impact alone does not push any more.
+    // What pushed until an impact alone does not push any more; a force between bounds is that after it.
     ended_.assign(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_), lambda.end());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
-        if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0])
+        if (!contact.along_normal && contact.struck < h_)
+            ended_[contact.row] = (ended_[contact.row] - contact.known[0]) / rest_after(contact.struck);
+        else if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0])
             std::fill_n(ended_.begin() + static_cast<std::ptrdiff_t>(contact.row), rows_.blocks()[k].cone.rows, 0.0);
     }
     kept_.keep(rows_.blocks(), rows_.contacts(), ended_);

@@ -16,6 +16,7 @@
 #include "dynamics/gap_resolution.hpp"
 #include "dynamics/impact.hpp"
 #include "dynamics/kept_impulses.hpp"
+#include "dynamics/limited_servo.hpp"
 #include "dynamics/turning_axes.hpp"
 
 namespace delassus {
@@ -68,9 +69,13 @@ public:
     /// empty. last_h, last_struck: as of time_turns().
     void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> last_changes,
                        double last_h, std::span<const double> last_struck);
-    /// Whether impacts lead to other speeds, since other contacts act otherwise after them in the answer than before
-    /// them: then b has those, and the problem is to be solved again.
-    [[nodiscard]] bool follow_others(const Problem& problem, const Solution& solution);
+    /// Whether impacts lead to other speeds, since contacts and other forces act otherwise after them in the answer
+    /// than before them: then b has those, and the problem is to be solved again. changes: of other forces, n, N or N
+    /// m.
+    [[nodiscard]] bool follow_others(const Problem& problem, const Solution& solution, std::span<const double> changes);
+    /// After follow_others() and its solve: forces between bounds, which went on through what bounces, act as they do
+    /// after it. Whether there are any: then the problem is to be solved again.
+    [[nodiscard]] bool release_forces(Problem& problem, const Solution& solution);
     /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
     [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
@@ -104,7 +109,9 @@ public:
         double late = 0.0;  ///< share · (1 − θ − τ/h), for impacts at the time τ after the beginning of the step
         bool alone = false;  ///< of all contacts only these act on it
     };
-    /// Whether contacts struck in this step at times within it; on_velocities() then has what they do. solution: of the
+    /// Whether contacts struck in this step at times within it.
+    [[nodiscard]] bool any_impact(const Solution& solution) const;
+    /// The same; on_velocities() then has what they do. solution: of the
     /// whole problem.
     [[nodiscard]] bool find_impacts(const Problem& problem, const Solution& solution);
     [[nodiscard]] std::span<const OnVelocity> on_velocities() const { return on_velocities_; }  ///< n
@@ -126,7 +133,7 @@ public:
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
     /// For the rest of the step nothing bounces, and rows stay as they are in the middle of it: such contacts take
     /// energy only. Whether that changes anything.
-    bool only_take();
+    bool only_take(Problem& problem);
 
     /// error += what the step errs by in positions, n, because contacts and stops that push until its end let go within
     /// it, as their forces in this step and in the one before, of size last_h, show, and because rows of impacts are
@@ -163,32 +170,32 @@ private:
         std::size_t row = 0;     ///< its first one in rows_
         std::size_t before = 0;  ///< its first one in before_, where it turns
         bool along_normal = false;
-        bool was_there = false;         ///< it is in before_
-        bool turns = false;             ///< b has what its rows turn until the end of the step
-        bool nearly_as_before = false;  ///< it is known, and its rows turn as a smooth motion lets them
-        bool met_on_the_way = false;    ///< its rows in before_ are those of the meeting
-        double gap = 0.0;               ///< at the beginning
-        double resolution = 0.0;        ///< of it
-        double approach = 0.0;          ///< speed with which it closes there
-        double normal = 0.0;            ///< b of the first row but for what follows from the guess
-        double friction = 0.0;          ///< of a contact with De Saxcé's term
-        double sliding = -1.0;          ///< the term; negative: not known yet
-        double moved = 0.0;             ///< by which it changed last
-        double wanted = 0.0;            ///< what it should have been before
-        double end_speed = 0.0;         ///< of the normal row
-        double change = 0.0;            ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
-        double recovery = 0.0;          ///< speed with which it is pushed apart
-        const UnilateralRows::Row* servo = nullptr;  ///< of a row with a compliance; in servos_
-        bool pushed = false;                         ///< in the step before
-        bool left = false;                           ///< `once`: it bounced in the step before, and opens
-        bool strikes = false;                        ///< b is that of an impact
-        std::optional<Impact> impact;                ///< it strikes at a time within the step
-        Approach before_impact;                      ///< until then
-        double row_error = 0.0;                      ///< of its rows then, as a share of their size
-        double struck = HUGE_VAL;       ///< when an impact first strikes one of its bodies, if it has none itself
-        std::array<double, 3> last{};   ///< its impulse in the step before, where it pushed
-        double goes_on = 0.0;           ///< after that impact, if all went on: of `last`
-        std::array<double, 3> known{};  ///< of this step's, until an impact or until friction turned round
+        bool was_there = false;             ///< it is in before_
+        bool turns = false;                 ///< b has what its rows turn until the end of the step
+        bool nearly_as_before = false;      ///< it is known, and its rows turn as a smooth motion lets them
+        bool met_on_the_way = false;        ///< its rows in before_ are those of the meeting
+        double gap = 0.0;                   ///< at the beginning
+        double resolution = 0.0;            ///< of it
+        double approach = 0.0;              ///< speed with which it closes there
+        double normal = 0.0;                ///< b of the first row but for what follows from the guess
+        double friction = 0.0;              ///< of a contact with De Saxcé's term
+        double sliding = -1.0;              ///< the term; negative: not known yet
+        double moved = 0.0;                 ///< by which it changed last
+        double wanted = 0.0;                ///< what it should have been before
+        double end_speed = 0.0;             ///< of the normal row
+        double change = 0.0;                ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        double recovery = 0.0;              ///< speed with which it is pushed apart
+        std::optional<LimitedServo> servo;  ///< of a row with a compliance
+        bool pushed = false;                ///< in the step before
+        bool left = false;                  ///< `once`: it bounced in the step before, and opens
+        bool strikes = false;               ///< b is that of an impact
+        std::optional<Impact> impact;       ///< it strikes at a time within the step
+        Approach before_impact;             ///< until then
+        double row_error = 0.0;             ///< of its rows then, as a share of their size
+        double struck = HUGE_VAL;           ///< when an impact first strikes one of its bodies, if it has none itself
+        std::array<double, 3> last{};       ///< its impulse in the step before, where it pushed
+        double goes_on = 0.0;               ///< after that impact, if all went on: of `last`
+        std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
@@ -202,25 +209,38 @@ private:
         [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 
+    [[nodiscard]] bool acts(const Contact& contact, const Solution& solution) const;
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     /// Of rows in rows_ and before_, with the rates of these times, m/s or rad/s.
     [[nodiscard]] double speed_at_begin(std::size_t row, std::size_t before) const;
     [[nodiscard]] double speed_at_end(const Problem& problem, std::size_t row, std::size_t before,
                                       const double* v) const;
+    /// The share of the step after that time.
+    [[nodiscard]] double rest_after(double time) const { return std::max(1.0 - time / h_, 1e-9); }
+    /// Whether the block is the friction of a joint, or a motor or servo with a limit.
+    [[nodiscard]] bool is_between_bounds(std::size_t block) const;
     /// The speed at the beginning of the step of a force between bounds that may turn round; 0 of all else.
     [[nodiscard]] double sliding_speed(std::size_t block) const;
-    [[nodiscard]] double set_servo(std::uint64_t key, Contact& contact) const;
+    /// Whether a force between bounds needs more than a faint impulse to stop its row from that speed.
+    [[nodiscard]] bool slides(const Problem& problem, std::size_t block, double speed) const;
+    /// Gives a force between bounds those of the rest of the step.
+    void release(Problem& problem, std::size_t block) const;
+    /// Of a force between bounds, what a solver may leave.
+    [[nodiscard]] double faint_impulse(const Problem& problem, std::size_t block) const;
+    [[nodiscard]] LimitedServo find_servo(std::uint64_t key, const Before& before, const Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);
     /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
     /// that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);
+    /// Gives its rows the rates at that time after the beginning, s.
+    void set_rates_at(double time, std::size_t block);
     /// Of a row of the problem besides impacts, m/s² or rad/s²; after time_meetings().
     [[nodiscard]] double smooth_acceleration(const Problem& problem, std::size_t row) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
-    void find_struck(const Problem& problem, double last_h, std::span<const double> last_struck);
+    void find_struck(Problem& problem, double last_h, std::span<const double> last_struck);
     /// What the friction of others does to the speed of an impact's row after it, less what it would if it went on as
     /// before, m/s or rad/s.
     [[nodiscard]] double change_of_others(const Problem& problem, const Solution& solution,
@@ -264,6 +284,7 @@ private:
     const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on
     std::size_t first_row_ = 0;             // in the problem
     std::vector<double> friction_reach_;
+    bool holds_forces_ = false;  // those between bounds, through what bounces
     bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;
 };
 

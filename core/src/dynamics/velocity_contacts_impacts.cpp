@@ -6,34 +6,11 @@
 #include <optional>
 #include <vector>
 
+#include "dynamics/row_entries.hpp"
 #include "dynamics/velocity_contacts.hpp"
+#include "support/frames.hpp"
 
 namespace delassus {
-
-namespace {
-
-/// act(row, column, value) for the entries of so many rows from the first on.
-template <class Act>
-void for_each_entry(const SparseMatrix& matrix, std::size_t first, std::size_t rows, const Act& act) {
-    for (std::size_t row = first; row < first + rows; ++row)
-        for (auto e = static_cast<std::size_t>(matrix.row_start[row]);
-             e < static_cast<std::size_t>(matrix.row_start[row + 1]); ++e)
-            act(row, static_cast<std::size_t>(matrix.column[e]), matrix.value[e]);
-}
-
-/// A row of D diag(H)⁻¹ Dᵀ at a column. diagonal: of H; columns of D ascend.
-double coupling(const SparseMatrix& D, const std::vector<double>& diagonal, std::size_t row, std::size_t other) {
-    const auto begin = D.column.begin() + D.row_start[other], end = D.column.begin() + D.row_start[other + 1];
-    double sum = 0.0;
-    for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double value) {
-        const auto found = std::lower_bound(begin, end, static_cast<std::int32_t>(column));
-        if (found != end && *found == static_cast<std::int32_t>(column))
-            sum += value * D.value[static_cast<std::size_t>(found - D.column.begin())] / diagonal[column];
-    });
-    return sum;
-}
-
-}  // namespace
 
 bool VelocityContacts::may_strike() const {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -86,11 +63,10 @@ void VelocityContacts::take_out_open(Problem& problem) const {
     if (compliant) problem.E.columns = problem.E.rows;
 }
 
-// In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²),
-// and their rates likewise, which are means about h/2 and (1 + θ) h/2. Beside an angular velocity ω, which has the axes
-// of its body, rows turn with these: exp(−[ω] τ) D and exp([ω] (θ h − τ)) D̄ stand in their place. What shapes meet on
-// their way has rows of the meeting at the beginning. Rows that turn by φ on the way from D to D̄ are off by
-// ½ w (1 − w) φ² of their length.
+// In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²).
+// Beside an angular velocity ω, which has the axes of its body, rows turn with these: exp(−[ω] τ) D and exp([ω] (θ h −
+// τ)) D̄ stand in their place. What shapes meet on their way has rows of the meeting at the beginning. Rows that turn by
+// φ on the way from D to D̄ are off by ½ w (1 − w) φ² of their length.
 bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& problem) {
     Contact& contact = contacts_[block];
     if (!contact.nearly_as_before && !contact.met_on_the_way) return false;
@@ -126,11 +102,42 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
         --e;
     }
     if (size > 0.0) contact.row_error = 0.5 * std::abs(share * (1.0 - share)) * change / size;
-    for (std::size_t i = 0; i < rows; ++i) {
-        double& rate = rows_.rows()[contact.row + i].rate;
-        rate += (1.0 - (time - 0.5 * h_) / (0.5 * theta_ * h_)) * (before_.rows()[contact.before + i].rate - rate);
-    }
+    set_rates_at(time, block);
     return true;
+}
+
+// Impacts are at an instant, whose rates are those of the prescribed motion then, where the contact is then.
+void VelocityContacts::set_rates_at(double time, std::size_t block) {
+    const Contact& contact = contacts_[block];
+    const auto count = static_cast<std::size_t>(rows_.blocks()[block].cone.rows);
+    const std::span rows = std::span(rows_.rows()).subspan(contact.row, count);
+    const std::span then = std::span(before_.rows()).subspan(contact.before, count);
+    const double share = time / (theta_ * h_);
+    bool any = false;
+    for (std::size_t i = 0; i < count; ++i) {
+        any = any || then[i].rate_now != 0.0 || rows[i].rate_now != 0.0;
+        rows[i].rate = then[i].rate_now + share * (rows[i].rate_now - then[i].rate_now);
+    }
+    const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
+    if (!any || block < first_contact) return;
+    const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
+    ContactPoint point = before_.contacts()[find_before(rows_.blocks()[block].key)->block - first_before];
+    const ContactPoint& later = rows_.contacts()[block - first_contact];
+    Eigen::Map<Eigen::Vector3d> normal(point.normal.data());
+    if (!point.on_the_way) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            point.point_a[i] += share * (later.point_a[i] - point.point_a[i]);
+            point.point_b[i] += share * (later.point_b[i] - point.point_b[i]);
+            point.normal[i] += share * (later.normal[i] - point.normal[i]);
+        }
+        normal.normalize();
+    }
+    const double begin = middle_.t - theta_ * h_;
+    const auto velocity = system_.prescribed_velocity(point, begin, begin + time);
+    if (!velocity) return;
+    const Eigen::Matrix3d frame = contact_frame(normal);
+    for (std::size_t i = 0; i < count; ++i)
+        rows[i].rate = frame.col(static_cast<Eigen::Index>(i)).dot(Eigen::Map<const Eigen::Vector3d>(velocity->data()));
 }
 
 // Where a contact touches and did not push, its rows stay those of the middle, and its rates become those of the end.
@@ -141,9 +148,9 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
     }
 }
 
-// The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate,
-// whose means are those of times θ h/2 apart; the speed at the beginning is that with the rate of this instant. The row
-// of the meeting, which stays, meets at the same time from another gap.
+// The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate:
+// those of the beginning and of D̄ are θ h apart. The row of the meeting, which stays, meets at the same time from
+// another gap.
 void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth,
                                      std::span<const double> last_changes, double last_h,
                                      std::span<const double> last_struck) {
@@ -154,10 +161,11 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         double gap = contact.resolved_gap();
         const bool bounces = block.restitution > 0.0;
         if (!contact.along_normal || (!bounces && contact.pushed)) continue;
-        const double rate = contact.was_there && !contact.met_on_the_way ? before_.rows()[contact.before].rate
-                                                                         : rows_.rows()[contact.row].rate;
-        const double change = rows_.rows()[contact.row].rate - rate, pull = change / (0.5 * theta_ * h_);
-        double speed = -contact.approach - 0.5 * h_ * pull;
+        const UnilateralRows::Row& later = rows_.rows()[contact.row];
+        const UnilateralRows::Row& earlier =
+            contact.was_there && !contact.met_on_the_way ? before_.rows()[contact.before] : later;
+        const double pull = (later.rate_now - earlier.rate_now) / (theta_ * h_);
+        double speed = -contact.approach + earlier.rate_now - earlier.rate;
         if (contact.pushes_on((1.0 - theta_) * h_ * speed)) continue;
         const auto row = static_cast<std::int32_t>(first_row_ + contact.row);
         const auto speed_of = [&](const double* v) {
@@ -180,7 +188,9 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
-            contact.met_on_the_way ? 0.0 : pull + (block.speed + contact.approach - change) / (theta_ * h_);
+            contact.met_on_the_way
+                ? 0.0
+                : pull + (block.speed + contact.approach - later.rate + earlier.rate) / (theta_ * h_);
         const auto meeting = meeting_from(open, speed, turning);
         const double time = meeting ? meeting->meets : h_;
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
@@ -219,15 +229,21 @@ double VelocityContacts::smooth_acceleration(const Problem& problem, std::size_t
 //
 //     a' = a + W_t (P_f,t − P_o,t)/(h − τ),      P_f,t = min(1, Σ P_o,n/Σ P_n) P_t,      W = D diag(H)⁻¹ Dᵀ
 //
-// in which P is that of the first answer. Only what slows it down counts, and no normal force: in a stack, where
-// several impacts meet, one that is left faster could gain energy.
-bool VelocityContacts::follow_others(const Problem& problem, const Solution& solution) {
+// in which P is that of the first answer. Only what slows the row down counts, and no normal force: in a stack, where
+// several impacts meet, one that is left faster could gain energy. What other forces change by changes the row's
+// acceleration by D diag(H)⁻¹ of it.
+bool VelocityContacts::follow_others(const Problem& problem, const Solution& solution,
+                                     std::span<const double> changes) {
     constexpr double faint = 1e-9;
     bool any = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
-        if (!contact.impact || !(solution.lambda[first_row_ + contact.row] > 0.0)) continue;
-        const double rest = h_ - contact.impact->meets, change = change_of_others(problem, solution, contact);
+        if (!acts(contact, solution)) continue;
+        const double rest = h_ - contact.impact->meets;
+        double change = change_of_others(problem, solution, contact);
+        for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double value) {
+            change += rest * value * changes[column] / diagonal_[column];
+        });
         if (!(rest > 0.0) || !(-change > faint * contact.impact->closing)) continue;
         contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change / rest,
                                        rows_.blocks()[k].restitution);
@@ -240,19 +256,22 @@ bool VelocityContacts::follow_others(const Problem& problem, const Solution& sol
 double VelocityContacts::change_of_others(const Problem& problem, const Solution& solution,
                                           const Contact& impact) const {
     double found = 0.0, expected = 0.0, normal_found = 0.0, normal_expected = 0.0;
+    const auto coupled = [&](std::size_t row) {
+        return coupling(problem.D, diagonal_, first_row_ + impact.row, first_row_ + row);
+    };
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& other = contacts_[k];
-        if (other.goes_on == 0.0) continue;
-        bool coupled = false;
+        if (other.goes_on == 0.0 || !other.along_normal) continue;
+        const double* impulse = solution.lambda.data() + first_row_ + other.row;
+        bool any = false;
         for (std::size_t i = 1; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
-            const std::size_t row = first_row_ + other.row + i;
-            const double W = coupling(problem.D, diagonal_, first_row_ + impact.row, row);
-            found += W * solution.lambda[row];
+            const double W = coupled(other.row + i);
+            found += W * impulse[i];
             expected += W * other.goes_on * other.last[i];
-            coupled = coupled || W != 0.0;
+            any = any || W != 0.0;
         }
-        if (!coupled) continue;
-        normal_found += solution.lambda[first_row_ + other.row];
+        if (!any) continue;
+        normal_found += impulse[0];
         normal_expected += other.goes_on * other.last[0];
     }
     return (normal_found > normal_expected ? normal_expected / normal_found : 1.0) * found - expected;
@@ -265,8 +284,16 @@ double VelocityContacts::change_of_others(const Problem& problem, const Solution
 // step before is known, unless an impact was in that, or the step was of quite another size, as one for an impact is. A
 // block that rocks from one edge to the other stands on the first one until then; with P = 0 there, as u⁺ > 0 asks for,
 // the second would carry it for the whole step, which takes h g b/k² of its rotation at each impact.
-void VelocityContacts::find_struck(const Problem& problem, double last_h, std::span<const double> last_struck) {
-    constexpr double shortest_rest = 1e-9, like = 2.0;
+//
+// A force between bounds acts until τ as its speed u⁻ says, or where that is 0, as in the step before. From then on it
+// has the rest of the step: its bounds are those of h − τ.
+//
+// Between bounds nothing holds against an impact, however wide they are: a bounce is over before they act. So where
+// something bounces, forces go on at first as before it, which gives the impulse of the bounce. With that as a known
+// one, the step is solved again for what comes after it (release_forces()). Joints pass what strikes one of their
+// bodies on to the others.
+void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<const double> last_struck) {
+    constexpr double like = 2.0;
     const auto& D = problem.D;
     struck_.clear();
     const auto for_each_column = [&](const Contact& contact, const auto& act) {
@@ -279,22 +306,63 @@ void VelocityContacts::find_struck(const Problem& problem, double last_h, std::s
             contact, [&](std::size_t column) { struck_[column] = std::min(struck_[column], contact.impact->meets); });
     }
     if (struck_.empty()) return;
-    for (Contact& contact : contacts_) {
+    bool bounces = false;
+    for (std::size_t k = 0; k < contacts_.size(); ++k)
+        bounces = bounces || (contacts_[k].impact && rows_.blocks()[k].restitution > 0.0);
+    for (bool passed_on = true; passed_on;) {
+        passed_on = false;
+        for (std::size_t row = 0; row < first_row_; ++row) {
+            double first = HUGE_VAL;
+            for_each_entry(D, row, 1,
+                           [&](std::size_t, std::size_t column, double) { first = std::min(first, struck_[column]); });
+            for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double) {
+                passed_on = passed_on || first < struck_[column];
+                struck_[column] = first;
+            });
+        }
+    }
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[k];
         const double gap = contact.resolved_gap();
-        if (!contact.along_normal || contact.impact || (!contact.pushed && !(gap > 0.0))) continue;
+        const bool between_bounds = is_between_bounds(k) && last_h > 0.0;
+        if (!between_bounds && (!contact.along_normal || contact.impact || (!contact.pushed && !(gap > 0.0)))) continue;
+        const double sliding = sliding_speed(k);
         for_each_column(contact,
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
         if (!(contact.struck < h_)) continue;
-        if (contact.pushed) {
-            if (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)) continue;
+        if (between_bounds) {
+            Cone& cone = problem.cones[bilateral_cones_ + k];
+            const double force =
+                slides(problem, k, sliding) ? (sliding > 0.0 ? cone.lo : cone.hi)[0] / h_ : contact.last[0] / last_h;
+            contact.last[0] = last_h * std::clamp(force, cone.lo[0] / h_, cone.hi[0] / h_);
+            if (bounces) {
+                cone.lo[0] = cone.hi[0] = (h_ - contact.struck) / last_h * contact.last[0];
+                holds_forces_ = true;
+            } else {
+                release(problem, k);
+            }
+        }
+        if (contact.pushed || between_bounds) {
+            if (!between_bounds &&
+                (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)))
+                continue;
             for (std::size_t i = 0; i < contact.known.size(); ++i)
                 contact.known[i] = contact.struck / last_h * contact.last[i];
             contact.goes_on = (h_ - contact.struck) / last_h;
             continue;
         }
         const double then = std::max(gap - contact.approach * contact.struck, 0.0);
-        contact.normal = std::max(then / std::max(h_ - contact.struck, shortest_rest * h_), -contact.approach);
+        contact.normal = std::max(then / (rest_after(contact.struck) * h_), -contact.approach);
     }
+}
+
+bool VelocityContacts::acts(const Contact& contact, const Solution& solution) const {
+    return contact.impact && solution.lambda[first_row_ + contact.row] > 0.0;
+}
+
+bool VelocityContacts::any_impact(const Solution& solution) const {
+    return std::any_of(contacts_.begin(), contacts_.end(),
+                       [&](const Contact& contact) { return acts(contact, solution); });
 }
 
 // An impact at τ changes the velocities by v⁺ − ṽ, with all that holds against it; what presses besides is in ṽ as
@@ -307,13 +375,10 @@ void VelocityContacts::find_struck(const Problem& problem, double last_h, std::s
 // the share of the rest. Masses, joints and contacts that push pass an impact on to velocities on which none acts, and
 // with it s and τ.
 bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solution) {
-    const auto acts = [&](const Contact& contact) {
-        return contact.impact && solution.lambda[first_row_ + contact.row] > 0.0;
-    };
-    if (std::none_of(contacts_.begin(), contacts_.end(), acts)) return false;
+    if (!any_impact(solution)) return false;
     all_bounce_ = true;
     for (std::size_t k = 0; k < contacts_.size(); ++k)
-        all_bounce_ = all_bounce_ && (!acts(contacts_[k]) || rows_.blocks()[k].restitution > 0.0);
+        all_bounce_ = all_bounce_ && (!acts(contacts_[k], solution) || rows_.blocks()[k].restitution > 0.0);
     const auto& D = problem.D;
     const auto n = static_cast<std::size_t>(D.columns);
     on_velocities_.assign(n, {});
@@ -339,7 +404,7 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
     };
     for (const Contact& contact : contacts_) {
         const std::size_t first = first_row_ + contact.row;
-        if (!acts(contact)) continue;
+        if (!acts(contact, solution)) continue;
         const double share = std::max(1.0 - contact.last[0] / solution.lambda[first], 0.0);
         const OnVelocity value{share, share * (1.0 - theta_ - contact.impact->acts / h_)};
         for_each_entry(D, first, 1,
@@ -349,7 +414,7 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
     settle();
     for (const std::size_t column : directly) on_velocities_[column].alone = true;
     for (std::size_t k = 0; k < contacts_.size(); ++k)
-        if (const std::size_t first = first_row_ + contacts_[k].row; !acts(contacts_[k]))
+        if (const std::size_t first = first_row_ + contacts_[k].row; !acts(contacts_[k], solution))
             for_each_entry(D, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
                            [&](std::size_t row, std::size_t column, double) {
                                if (solution.lambda[row] != 0.0) on_velocities_[column].alone = false;
@@ -463,15 +528,6 @@ double VelocityContacts::speed_at_end(const Problem& problem, std::size_t row, s
            (1.0 - theta_) / theta_ * change;
 }
 
-double VelocityContacts::sliding_speed(std::size_t block) const {
-    const Contact& contact = contacts_[block];
-    const UnilateralRows::Block& own = rows_.blocks()[block];
-    const bool bounded = own.cone.kind == ConeKind::Box && own.cone.rows == 1 && std::isfinite(own.cone.lo[0]) &&
-                         std::isfinite(own.cone.hi[0]);
-    if (!bounded || contact.servo || !contact.was_there) return 0.0;
-    return speed_at_begin(contact.row, contact.before);
-}
-
 bool VelocityContacts::was_struck(const Problem& problem, const Contact& contact,
                                   std::span<const double> shares) const {
     constexpr double faint = 0.05;
@@ -480,86 +536,6 @@ bool VelocityContacts::was_struck(const Problem& problem, const Contact& contact
         found = found || (!shares.empty() && shares[column] > faint);
     });
     return found;
-}
-
-bool VelocityContacts::any_turns_round(const Problem& problem, const Solution& solution) const {
-    constexpr double share = 1e-3;  // of the bounds' distance, which a solver may leave
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const double before = sliding_speed(k);
-        if (before == 0.0) continue;
-        const std::size_t row = first_row_ + contacts_[k].row;
-        const Cone& cone = problem.cones[bilateral_cones_ + k];
-        const double faint = share * (cone.hi[0] - cone.lo[0]), own = before > 0.0 ? cone.lo[0] : cone.hi[0];
-        if (std::abs(before) > faint * coupling(problem.D, diagonal_, row, row) &&
-            std::abs(solution.lambda[row] - own) > faint)
-            return true;
-    }
-    return false;
-}
-
-void VelocityContacts::let_slide_on(Problem& problem) const {
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const double before = sliding_speed(k);
-        Cone& cone = problem.cones[bilateral_cones_ + k];
-        if (before > 0.0) cone.hi = cone.lo;
-        if (before < 0.0) cone.lo = cone.hi;
-    }
-}
-
-void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding, double last_h,
-                                  std::span<const double> last_struck) {
-    const auto slides_back = [&](std::size_t row, double change, double both) {
-        return change > both * coupling(problem.D, diagonal_, first_row_ + row, first_row_ + row);
-    };
-    axes_.turn(sliding, h_, theta_, in_begin_, in_middle_);
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        Contact& contact = contacts_[k];
-        Cone& cone = problem.cones[bilateral_cones_ + k];
-        const auto end_speed = [&](std::size_t i) {
-            return speed_at_end(problem, contact.row + i, contact.before + i, in_middle_.data());
-        };
-        if (const double before = sliding_speed(k); before != 0.0) {
-            const double after = end_speed(0);
-            if (!(before * after < 0.0) || !slides_back(contact.row, std::abs(before - after), cone.hi[0] - cone.lo[0]))
-                continue;
-            const double share = before / (before - after);  // τ/h
-            (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
-            continue;
-        }
-        const bool stays =
-            contact.pushed && contact.was_there && !contact.impact && !(contact.known[0] > 0.0) && last_h > 0.0;
-        if (cone.kind != ConeKind::Friction || !stays) continue;
-        const auto axes = static_cast<std::size_t>(cone.rows) - 1;
-        std::array<double, 2> before{};
-        double squares = 0.0, along = 0.0;
-        for (std::size_t i = 0; i < axes; ++i) {
-            before[i] = speed_at_begin(contact.row + 1 + i, contact.before + 1 + i);
-            squares += before[i] * before[i];
-            along += before[i] * end_speed(1 + i);
-        }
-        if (!(along < 0.0) || was_struck(problem, contact, last_struck)) continue;
-        const double size = std::sqrt(squares), force = cone.parameters[0] * contact.last[0] * h_ / last_h;
-        if (!slides_back(contact.row + 1, size - along / size, 2.0 * force)) continue;
-        const double share = squares / (squares - along);  // τ/h
-        for (std::size_t i = 0; i < axes; ++i) contact.known[1 + i] = -share * force * before[i] / size;
-        cone.parameters[0] *= 1.0 - share;
-    }
-}
-
-void VelocityContacts::add_known_impulses(Problem& problem) const {
-    for (const Contact& contact : contacts_)
-        for (std::size_t i = 0; i < contact.known.size(); ++i)
-            if (contact.known[i] != 0.0)
-                for_each_entry(problem.D, first_row_ + contact.row + i, 1,
-                               [&](std::size_t, std::size_t column, double value) {
-                                   problem.a[column] += value * contact.known[i];
-                               });
-}
-
-void VelocityContacts::add_known_impulses(std::vector<double>& lambda) const {
-    for (const Contact& contact : contacts_)
-        for (std::size_t i = 0; i < contact.known.size(); ++i)
-            if (contact.known[i] != 0.0) lambda[first_row_ + contact.row + i] += contact.known[i];
 }
 
 }  // namespace delassus

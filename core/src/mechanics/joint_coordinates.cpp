@@ -708,6 +708,11 @@ void JointCoordinates::collect_unilateral(const State& state, double h, Unilater
     rows.contacts() = from.contacts();
 }
 
+std::optional<Vector3> JointCoordinates::prescribed_velocity(const ContactPoint& contact, double begin,
+                                                             double t) const {
+    return implementation_->bodies.prescribed_velocity(contact, begin, t);
+}
+
 // ---- Reactions ----
 //
 // The joint of a link carries what the link and all beyond it need besides the forces that act on them. With

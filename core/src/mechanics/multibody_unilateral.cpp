@@ -297,6 +297,20 @@ Vector3d MultibodySystem::Implementation::prescribed_velocity_now(std::int32_t o
     return place.v + (place.A * place.omega).cross(point - place.x);
 }
 
+std::optional<Vector3> MultibodySystem::prescribed_velocity(const ContactPoint& contact, double begin, double t) const {
+    const auto& self = *implementation_;
+    const auto velocity = [&](std::int32_t shape, const Vector3& point) -> Vector3d {
+        const auto owner = static_cast<std::size_t>(self.owner_of(shape));
+        if (owner >= self.bodies.size() || !self.bodies[owner].prescribed) return Vector3d::Zero();
+        const auto& motion = *self.bodies[owner].prescribed;
+        mechanics::Placement place;
+        motion.place(t, place);
+        const Vector3d origin = contact.on_the_way ? vector(motion.pose(begin).position) : place.x;
+        return place.v + (place.A * place.omega).cross(vector(point) - origin);
+    };
+    return mechanics::array(velocity(contact.shape_b, contact.point_b) - velocity(contact.shape_a, contact.point_a));
+}
+
 // Inline in the loop over contacts, which calls it six times for each.
 inline void MultibodySystem::Implementation::PointOfOwner::put(const Vector3d& direction, double sign,
                                                                UnilateralRows& rows) const {

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Motors, servos, dry friction in joints and dampers beside impacts, without options: their forces are finite, so that
+// nothing of them is in a bounce, and they act until it as before it, and from then on as after it.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "support/scenes.hpp"
+
+namespace delassus::forces_at_impacts_test {
+namespace {
+
+using tests::Running;
+
+Vector3 place_after(const std::string& text, const std::string& body) {
+    Running run(parse_scene(text, "test.yaml"));
+    run.finish();
+    return run.pose(body).position;
+}
+
+// A ball hits a bar on a hinge, which leaves it with ω = (1 + e) m v r/(I + m r²).
+struct Bar {
+    static constexpr double mass = 0.1, speed = 3.0, arm = 0.8, inertia = 0.3, restitution = 0.5, radius = 0.05,
+                            half = 0.02, meets = 0.1033, end = 0.9;
+
+    [[nodiscard]] static double spin() {
+        return (1.0 + restitution) * mass * speed * arm / (inertia + mass * arm * arm);
+    }
+    [[nodiscard]] static double start() { return -half - radius - speed * meets; }
+    [[nodiscard]] static double ball_at_end() {
+        return start() + speed * end - inertia * spin() / (mass * arm) * (end - meets);
+    }
+    [[nodiscard]] static std::string scene(double h, const std::string& joint, const std::string& rest) {
+        return fmt::format(
+            "step: {:.17g}\nend: {}\ngravity: [0, 0, 0]\nmaterials: {{m: {{restitution: {}}}}}\nbodies:\n"
+            "- {{name: bar, mass: 1, inertia: {{xx: 1, yy: 1, zz: {:.17g}}}, position: [0.4, 0, 0], shapes: [{{box: "
+            "{{size: [1, {}, 0.2]}}, material: m}}]}}\n"
+            "- {{name: ball, mass: {}, position: [{}, {:.17g}, 0], velocity: [0, {}, 0], shapes: [{{sphere: {{radius: "
+            "{}}}, material: m}}]}}\n"
+            "joints: [{{name: hinge, kind: revolute, second: bar, axis: [0, 0, 1]{}}}]\n{}\n",
+            h, end, restitution, inertia - 0.16, 2.0 * half, mass, arm, start(), speed, radius, joint, rest);
+    }
+};
+
+TEST(ForcesAtImpacts, ABallBouncesOffABarTheSameHoweverItsHingeIsHeld) {
+    for (const std::string held :
+         {", friction: 0.8", ", friction: 50", ", friction: 5000", "motor 5", "motor 5000", "kd: 5, limit: 1000",
+          "kd: 500, limit: 1000", "kp: 900, kd: 30, position: 0, limit: 40"})
+        for (const std::string method : {"", "coordinates: maximal", "integrator: moreau_jean"})
+            for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+                SCOPED_TRACE(fmt::format("{}, {}, step {}", held, method, h));
+                const bool motor = held.starts_with("motor"), friction = held.starts_with(",");
+                std::string rest = method;
+                if (motor)
+                    rest +=
+                        fmt::format("\nmotors: [{{name: m, joint: hinge, motion: 0, speed: true, force_limit: {}}}]",
+                                    held.substr(6));
+                else if (!friction)
+                    rest += fmt::format("\nactuators: [{{name: a, joint: hinge, {}{}}}]", held,
+                                        held.starts_with("kp") ? "" : ", speed: 0");
+                const Vector3 ball = place_after(Bar::scene(h, friction ? held : "", rest), "ball");
+                EXPECT_NEAR(ball[0], Bar::arm, 1e-9);
+                EXPECT_NEAR(ball[1], Bar::ball_at_end(), 1e-6);
+            }
+}
+
+TEST(ForcesAtImpacts, AStruckJointSlidesAgainstItsFriction) {
+    const double friction = 0.8;
+    for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+        SCOPED_TRACE(h);
+        const Vector3 bar = place_after(Bar::scene(h, fmt::format(", friction: {}", friction), ""), "bar");
+        const double turn = 0.5 * Bar::inertia * Bar::spin() * Bar::spin() / friction;
+        EXPECT_NEAR(std::atan2(bar[1], bar[0]), turn, 2e-5);
+    }
+}
+
+// A slider is driven towards 0.8 m/s, meets a box that nothing holds, and pushes it until both have that speed. The
+// third drive is a servo that is far stiffer than a step resolves.
+TEST(ForcesAtImpacts, WhatIsDrivenPushesOnAfterItStrikes) {
+    const double limit = 15.0, wanted = 0.8, mass = 2.0, box = 4.0, end = 0.7;
+    for (const double gap : {0.05, 0.03}) {
+        const double reaches = wanted * mass / limit, way = 0.5 * wanted * reaches;
+        const double meets = way < gap ? reaches + (gap - way) / wanted : std::sqrt(2.0 * gap * mass / limit);
+        const double after = std::min(wanted, limit / mass * meets) * mass / (mass + box);
+        const double pulls = limit / (mass + box), pushed = (wanted - after) / pulls;
+        const double at_end = 0.5 * (after + wanted) * pushed + wanted * (end - meets - pushed);
+        for (const char* drive : {"motors: [{name: m, joint: slide, motion: 0.8, speed: true, force_limit: 15}]",
+                                  "actuators: [{name: a, joint: slide, speed: 0.8, kd: 1.0e+7, limit: 15}]"})
+            for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+                SCOPED_TRACE(fmt::format("{}, gap {}, step {}", drive, gap, h));
+                const Vector3 place = place_after(
+                    fmt::format("step: {:.17g}\nend: {}\ngravity: [0, 0, 0]\nbodies:\n"
+                                "- {{name: ram, mass: {}, inertia: {{xx: 1, yy: 1, zz: 1}}, position: [{:.17g}, 0, 0], "
+                                "shapes: [{{box: {{size: [0.1, 0.1, 0.1]}}}}]}}\n"
+                                "- {{name: box, mass: {}, shapes: [{{box: {{size: [0.2, 0.2, 0.2]}}}}]}}\n"
+                                "joints: [{{name: slide, kind: prismatic, second: ram, axis: [1, 0, 0]}}]\n{}\n",
+                                h, end, mass, -0.15 - gap, box, drive),
+                    "box");
+                EXPECT_NEAR(place[0], at_end, 1e-5);
+            }
+    }
+}
+
+// v = v₀ − (c/m) x until a wall, and so again after it.
+TEST(ForcesAtImpacts, ADashpotTurnsRoundWithWhatBounces) {
+    const double rate = 4.0, speed = 2.0, gap = 0.3177, restitution = 0.5, end = 1.0;
+    const double meets = -std::log(1.0 - gap * rate / speed) / rate, back = restitution * (speed - rate * gap);
+    const double at_end = gap - back / rate * (1.0 - std::exp(-rate * (end - meets)));
+    for (const char* damper : {"springs: [{name: d, second: a, first_point: [-5, 0, 0], damping: 4}]",
+                               "joints: [{name: s, kind: prismatic, second: a, axis: [1, 0, 0]}]\n"
+                               "actuators: [{name: d, joint: s, speed: 0, kd: 4, limit: 1000}]"})
+        for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+            SCOPED_TRACE(fmt::format("{}, step {}", damper, h));
+            const Vector3 place = place_after(
+                fmt::format(
+                    "step: {:.17g}\nend: {}\ngravity: [0, 0, 0]\nmaterials: {{m: {{restitution: {}}}}}\nbodies:\n"
+                    "- {{name: a, mass: 1, inertia: {{xx: 1, yy: 1, zz: 1}}, velocity: [{}, 0, 0], shapes: "
+                    "[{{box: {{size: [0.1, 0.1, 0.1]}}, material: m}}]}}\n"
+                    "- {{name: wall, fixed: true, position: [{:.17g}, 0, 0], shapes: [{{box: {{size: [0.1, 1, "
+                    "1]}}, material: m}}]}}\n{}\n",
+                    h, end, restitution, speed, gap + 0.1, damper),
+                "a");
+            EXPECT_NEAR(place[0], at_end, 1e-4);
+        }
+}
+
+}  // namespace
+}  // namespace delassus::forces_at_impacts_test
