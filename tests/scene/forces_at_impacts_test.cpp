@@ -104,6 +104,31 @@ TEST(ForcesAtImpacts, WhatIsDrivenPushesOnAfterItStrikes) {
     }
 }
 
+// A ball that rolls hits one at rest, which slides at first and then rolls with 5/7 of its speed: however slow it is,
+// friction does not hold it while it is struck.
+TEST(ForcesAtImpacts, FrictionHasNoPartInABounce) {
+    const double r = 0.03, gap = 0.0137, e = 0.9, mu = 0.3, g = 9.81;
+    for (const double speed : {0.02, 0.05, 0.1, 1.0})
+        for (const double h : {1.0 / 60.0, 0.0073, 0.005, 0.001}) {
+            SCOPED_TRACE(fmt::format("{} m/s, step {}", speed, h));
+            const double meets = gap / speed, end = meets + 0.5, left = 0.5 * (1.0 + e) * speed;
+            const double slides = 2.0 / 7.0 * left / (mu * g);
+            const double way = left * slides - 0.5 * mu * g * slides * slides + 5.0 / 7.0 * left * (0.5 - slides);
+            const Vector3 place = place_after(
+                fmt::format("step: {:.17g}\nend: {:.17g}\nmaterials: {{f: {{friction: {}}}, b: {{friction: 0, "
+                            "restitution: {}}}}}\n"
+                            "material_pairs: [{{first: f, second: b, friction: {}, restitution: 0}}]\nbodies:\n"
+                            "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: f}}]}}\n"
+                            "- {{name: a, mass: 1, position: [{:.17g}, 0, {}], velocity: [{}, 0, 0], angular_velocity: "
+                            "[0, {:.17g}, 0], shapes: [{{sphere: {{radius: {}}}, material: b}}]}}\n"
+                            "- {{name: b, mass: 1, position: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}, material: "
+                            "b}}]}}\n",
+                            h, end, mu, e, mu, -2.0 * r - gap, r, speed, speed / r, r, r, r),
+                "b");
+            EXPECT_NEAR(place[0], way, 5e-3 * way);
+        }
+}
+
 // v = v₀ − (c/m) x until a wall, and so again after it.
 TEST(ForcesAtImpacts, ADashpotTurnsRoundWithWhatBounces) {
     const double rate = 4.0, speed = 2.0, gap = 0.3177, restitution = 0.5, end = 1.0;

@@ -364,7 +364,7 @@ TEST(PlainMotion, AStackThatBouncesGainsNoEnergy) {
         least = std::min(least, energy);
     }
     EXPECT_LT(least, start - 0.3);
-    EXPECT_LT(rise, 5e-2 * (start - least));
+    EXPECT_LT(rise, 3e-2 * (start - least));
 }
 
 // A plate that lands on an edge turns and meets the ground again within a step: it does not go in by more than its

@@ -150,6 +150,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     find_spins(state, h);
     timed_ = false;
     damped_.resize(0);
+    bounced_.resize(0);
     if (settings_.linearly_implicit) extrapolate(h);
     assemble(state, h, solver.law() == Law::Coulomb);
     if (settings_.linearly_implicit) {
@@ -157,6 +158,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     } else {
         iterate(state, h, solver, report);
     }
+    const double acting = bounced_.size() > 0 ? contacts_.share_of_rest(problem_, solution_) : 0.0;
     contacts_.add_known_impulses(solution_.lambda);
     contacts_.drop_negligible(problem_, solution_);
 
@@ -164,7 +166,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     move(state, h, result_, 1.0, end_);
     const bool struck = timed_ && contacts_.find_impacts(problem_, solution_);
     if (struck) {
-        move_late(state, h);
+        move_late(state, h, acting);
         report.cut = contacts_.cut_between_impacts(problem_, solution_);
     }
     end_.v = solution_.x;
@@ -252,7 +254,11 @@ void ThetaMethod::extrapolate(double h) {
 // by O(h²). Of what moves after an impact in the step before, the guess ṽ may not know what holds it since; v is what
 // it would be then. The nearer one to v⁺ counts, by which nothing moves too far. Not in the parts of a step that is cut
 // between impacts, each of which follows one.
-void ThetaMethod::move_late(const State& begin, double h) {
+//
+// What friction and forces between bounds change after a bounce, from v⁺ of the bounce alone, comes in the course of
+// the rest r of the step: in the share a of it that they act, after which what they stop is at rest. Positions go less
+// far by ½ a r of it.
+void ThetaMethod::move_late(const State& begin, double h, double acting) {
     const Eigen::Map<const Vector> v(begin.v.data(), n_);
     until_impact_.setZero(n_);
     for_each_vector([&](std::int32_t first, std::int32_t size) {
@@ -268,6 +274,9 @@ void ThetaMethod::move_late(const State& begin, double h) {
         auto until = until_impact_.segment(first, size);
         until = part * h * ((1.0 - 0.5 * part) * v.segment(first, size) + 0.5 * part * smooth_.segment(first, size));
         delta_.segment(first, size) += late * h * change - until;
+        if (bounced_.size() > 0)
+            delta_.segment(first, size) -=
+                0.5 * acting * (1.0 - part) * h * (result_.segment(first, size) - bounced_.segment(first, size));
     });
     struck_spins_.find(system_, begin, h, theta_, spins_, contacts_.on_velocities(), solution_.x);
     for (const StruckSpins::Spin& spin : struck_spins_.spins())
@@ -464,12 +473,12 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     if (contacts_.any() && contacts_.may_strike()) time_meetings(begin, h, solver, report);
     scale();
     const bool before = report.solved;
-    bool taking = false, turns = false;
+    bool taking = false;
+    int revised = 0;  // the iteration that solves the problem which the answers before have changed
     for (int iteration = 0;; ++iteration) {
         linearize(begin, h);
         set_b_of_contacts(iteration, report);
-        if (iteration > (turns ? 1 : 0) && (unchanged() || (iteration >= settings_.iterations && contacts_.settled())))
-            return;
+        if (iteration > revised && (unchanged() || (iteration >= settings_.iterations && contacts_.settled()))) return;
         if (iteration == most_iterations) {
             report.solved = false;
             report.message = "the speeds of sliding contacts did not settle";
@@ -484,13 +493,16 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
         if (iteration == 0 && !taking && solved && contacts_.any_turns_round(problem_, solution_)) {
             time_turns(solver, report);
-            turns = true;
+            revised = 1;
         }
-        if (iteration == 0 && timed_ && follow_impacts(h)) turns = true;
-        if (timed_ && iteration == (turns ? 1 : 0) && contacts_.release_forces(problem_, solution_)) turns = true;
-        if (guess_.allFinite() && !taking && contacts_gain(begin) && contacts_.only_take(problem_)) {
+        if (iteration == 0 && timed_ && revise_impacts(h)) revised = 1;
+        if (iteration == revised && go_on_after_bounces()) ++revised;
+        const bool complete = iteration >= revised;
+        if (guess_.allFinite() && !taking && complete && contacts_gain(begin) && contacts_.only_take()) {
             taking = true;  // from the start, which is not where energy came from
+            revised = 0;
             damped_.resize(0);
+            bounced_.resize(0);
             guess_ = free_;
             solution_.x.assign(guess_.begin(), guess_.end());
             std::fill(solution_.lambda.begin(), solution_.lambda.end(), 0.0);
@@ -534,26 +546,30 @@ void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver
 // are, the way h v_θ + x that an answer gives (VelocityContacts::find_impacts()) changes their impulse by −C x, and
 // from the impact on they differ by −C (v⁺ − ṽ) from those of ṽ.
 /// Of a step that is solved: whether impacts change what acts besides them.
-bool ThetaMethod::follow_impacts(double h) {
+bool ThetaMethod::revise_impacts(double h) {
     if (!contacts_.any_impact(solution_)) return false;
+    if (!system_.has_stiffness()) return contacts_.revise_impacts(problem_, solution_, {});
     const auto n = static_cast<std::size_t>(n_);
+    Solution answer = solution_;
+    contacts_.add_known_impulses(answer.lambda);
+    if (!contacts_.find_impacts(problem_, answer)) return false;
+    H_.begin(n_, n_);
+    system_.add_damping(at_theta_, 1.0, Tangent::Symmetric, H_);
+    H_.finish_into(damping_);
+    back_ = Eigen::Map<const Vector>(solution_.x.data(), n_) - smooth_;
     damped_after_.setZero(n_);
-    if (system_.has_stiffness()) {
-        Solution answer = solution_;
-        contacts_.add_known_impulses(answer.lambda);
-        if (!contacts_.find_impacts(problem_, answer)) return false;
-        H_.begin(n_, n_);
-        system_.add_damping(at_theta_, 1.0, Tangent::Symmetric, H_);
-        H_.finish_into(damping_);
-        back_ = Eigen::Map<const Vector>(solution_.x.data(), n_) - smooth_;
-        damping_.multiply_add(-1.0, back_.data(), damped_after_.data());
-        for (std::size_t k = 0; k < n; ++k)
-            back_[static_cast<Eigen::Index>(k)] *= h * contacts_.on_velocities()[k].late;
-        damped_.setZero(n_);
-        damping_.multiply_add(-1.0, back_.data(), damped_.data());
-    }
-    const bool others = contacts_.follow_others(problem_, solution_, {damped_after_.data(), n});
-    return others || (damped_.size() > 0 && !damped_.isZero(0.0));
+    damping_.multiply_add(-1.0, back_.data(), damped_after_.data());
+    for (std::size_t k = 0; k < n; ++k) back_[static_cast<Eigen::Index>(k)] *= h * contacts_.on_velocities()[k].late;
+    damped_.setZero(n_);
+    damping_.multiply_add(-1.0, back_.data(), damped_.data());
+    const bool others = contacts_.revise_impacts(problem_, solution_, {damped_after_.data(), n});
+    return others || !damped_.isZero(0.0);
+}
+
+bool ThetaMethod::go_on_after_bounces() {
+    if (!contacts_.go_on_after_bounces(problem_, solution_)) return false;
+    bounced_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
+    return true;
 }
 
 // One problem. Two in the first step, which has no history to extrapolate from, and where contacts become persistent; a
@@ -577,11 +593,11 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     linearize_at_guess();
     if (!found()) return;
     const bool persists = contacts_.make_persistent(solution_);
-    if ((timed_ && follow_impacts(h)) || changes_[0].empty() || persists) {
+    if ((timed_ && revise_impacts(h)) || changes_[0].empty() || persists) {
         linearize_at_guess();
         if (!found()) return;
     }
-    if (timed_ && contacts_.release_forces(problem_, solution_)) {
+    if (timed_ && go_on_after_bounces()) {
         linearize_at_guess();
         if (!found()) return;
     }

@@ -59,7 +59,7 @@ private:
     void extrapolate(double h);
     template <class Act>
     void for_each_vector(const Act& act) const;
-    void move_late(const State& begin, double h);
+    void move_late(const State& begin, double h, double acting);
     void mark_struck(bool struck);
     void remember_change(const Vector& result, double h);
     void resolve_up_to(double h);
@@ -77,7 +77,8 @@ private:
     [[nodiscard]] Vector without_impacts(const State& begin, double h, StepSolver& solver, StepReport& report);
     void time_turns(StepSolver& solver, StepReport& report);
     void time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report);
-    [[nodiscard]] bool follow_impacts(double h);
+    [[nodiscard]] bool revise_impacts(double h);
+    [[nodiscard]] bool go_on_after_bounces();
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_velocity_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
@@ -122,6 +123,7 @@ private:
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
     Vector until_impact_;                        // the way of struck velocities until then
+    Vector bounced_;                             // v⁺ of bounces alone, where more comes after them; else empty
     SparseMatrix damping_;                       // C at θ
     Vector damped_, damped_after_;               // −C x and −C (v⁺ − ṽ) of impacts; empty without
     Vector result_, back_, linear_;

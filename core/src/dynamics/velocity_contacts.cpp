@@ -245,15 +245,19 @@ const VelocityContacts::Before* VelocityContacts::find_before(std::uint64_t key)
     return &*found;
 }
 
-LimitedServo VelocityContacts::find_servo(std::uint64_t key, const Before& before, const Contact& contact) const {
+LimitedServo VelocityContacts::find_servo(std::uint64_t key, const Before* before, const Contact& contact) const {
     std::size_t row = 0, block = 0;
-    while (servos_.blocks()[block].key != key) row += static_cast<std::size_t>(servos_.blocks()[block++].cone.rows);
+    const auto blocks = servos_.blocks();
+    while (block < blocks.size() && blocks[block].key != key)
+        row += static_cast<std::size_t>(blocks[block++].cone.rows);
+    if (!before || block == blocks.size())
+        throw InputError("a system gave a row with a compliance within a step that it had not at its beginning");
     double mobility = 0.0;
     for (auto e = static_cast<std::size_t>(rows_.row_start()[contact.row]);
          e < static_cast<std::size_t>(rows_.row_start()[contact.row + 1]); ++e)
         mobility += rows_.value()[e] * rows_.value()[e] / diagonal_[static_cast<std::size_t>(rows_.column()[e])];
-    return {{servos_.rows()[row].rate, servos_.blocks()[block].compliance},
-            {before_.rows()[before.row].rate, before_.blocks()[before.block].compliance},
+    return {{servos_.rows()[row].rate, blocks[block].compliance},
+            {before_.rows()[before->row].rate, before_.blocks()[before->block].compliance},
             theta_,
             h_,
             mobility};
@@ -316,7 +320,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
-    holds_forces_ = false;
+    goes_on_ = false;
     contacts_.clear();
     compliances_.clear();
     kept_.begin_walk();
@@ -369,12 +373,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.resolution =
             point ? resolution_.of(std::span(rows_.column()).subspan(entry, entries), h_) : resolution_.least();
         if (contact.along_normal) set_normal(block, contact, block.speed);
-        if (block.compliance > 0.0) {
-            if (!before)
-                throw InputError(
-                    "a system gave a row with a compliance within a step that it had not at its beginning");
-            contact.servo = find_servo(block.key, *before, contact);
-        }
+        if (block.compliance > 0.0) contact.servo = find_servo(block.key, before, contact);
         compliances_.push_back(contact.servo ? contact.servo->compliance(contact.struck) : 0.0);
         if (block.cone.kind == ConeKind::Friction && block.cone.parameters[0] > 0.0 && !coulomb)
             contact.friction = block.cone.parameters[0];
@@ -505,18 +504,26 @@ bool VelocityContacts::make_persistent(const Solution& solution) {
     return any;
 }
 
+// What acted until an impact on others did so at the speeds of the beginning, what acts from then on at those of the
+// end.
 double VelocityContacts::work(const Problem& problem, const Solution& solution, std::span<const double> mean) const {
     double sum = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         if (!contact.along_normal) continue;
-        for (std::size_t row = contact.row; row < contact.row + static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
-             ++row) {
-            const double impulse = solution.lambda[first_row_ + row];
-            if (impulse == 0.0) continue;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
+            const std::size_t row = contact.row + i;
+            const double known = i < contact.known.size() ? contact.known[i] : 0.0;
+            const double rest = solution.lambda[first_row_ + row], impulse = known + rest;
+            if (known == 0.0 && rest == 0.0) continue;
             const auto row_of_problem = static_cast<std::int32_t>(first_row_ + row);
             double speed = problem.D.row_times(row_of_problem, mean.data()) + rows_.rows()[row].rate;
-            if (contact.impact && row == contact.row) {
+            if (contact.goes_on != 0.0) {
+                const double begin = problem.D.row_times(row_of_problem, begin_speeds_) + rows_.rows()[row].rate;
+                sum += known * begin + rest * (speed - (1.0 - theta_) * begin) / theta_;
+                continue;
+            }
+            if (contact.impact && i == 0) {
                 speed = 0.5 * contact.impact->change - contact.impact->closing;
             } else if (contact.impact) {
                 speed += 0.5 * (contact.impact->meets - contact.impact->flight) *
@@ -528,11 +535,10 @@ double VelocityContacts::work(const Problem& problem, const Solution& solution, 
     return sum;
 }
 
-bool VelocityContacts::only_take(Problem& problem) {
+bool VelocityContacts::only_take() {
     bool changed = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
-        if (holds_forces_ && is_between_bounds(k) && contact.goes_on != 0.0) release(problem, k);
         if (!contact.along_normal) continue;
         changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
         contact.turns = contact.strikes = false;
@@ -543,7 +549,6 @@ bool VelocityContacts::only_take(Problem& problem) {
         const double gap = contact.resolved_gap();
         contact.normal = gap > 0.0 ? std::max(gap - (1.0 - theta_) * h_ * contact.approach, 0.0) / (theta_ * h_) : 0.0;
     }
-    holds_forces_ = false;
     return changed;
 }
 

@@ -69,13 +69,15 @@ public:
     /// empty. last_h, last_struck: as of time_turns().
     void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> last_changes,
                        double last_h, std::span<const double> last_struck);
-    /// Whether impacts lead to other speeds, since contacts and other forces act otherwise after them in the answer
-    /// than before them: then b has those, and the problem is to be solved again. changes: of other forces, n, N or N
-    /// m.
-    [[nodiscard]] bool follow_others(const Problem& problem, const Solution& solution, std::span<const double> changes);
-    /// After follow_others() and its solve: forces between bounds, which went on through what bounces, act as they do
-    /// after it. Whether there are any: then the problem is to be solved again.
-    [[nodiscard]] bool release_forces(Problem& problem, const Solution& solution);
+    /// Whether impacts lead to other speeds than in the first answer: since friction is to go on through them, or
+    /// other forces change by `changes` from then on, n, N or N m, or empty. Then the problem is to be solved again.
+    [[nodiscard]] bool revise_impacts(Problem& problem, const Solution& solution, std::span<const double> changes);
+    /// After revise_impacts() and its solve: friction and forces between bounds that went on through what bounces act
+    /// as they do after it. Whether there are any: then the problem is to be solved again.
+    [[nodiscard]] bool go_on_after_bounces(Problem& problem, const Solution& solution);
+    /// In which share of the time after bounces, on the average, friction and forces between bounds act at their bounds
+    /// in the answer that follows them, in [0, 1].
+    [[nodiscard]] double share_of_rest(const Problem& problem, const Solution& solution) const;
     /// Whether in the answer the friction of a joint, or a motor at its limit, does not act all the step as it began.
     [[nodiscard]] bool any_turns_round(const Problem& problem, const Solution& solution) const;
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
@@ -133,7 +135,7 @@ public:
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
     /// For the rest of the step nothing bounces, and rows stay as they are in the middle of it: such contacts take
     /// energy only. Whether that changes anything.
-    bool only_take(Problem& problem);
+    bool only_take();
 
     /// error += what the step errs by in positions, n, because contacts and stops that push until its end let go within
     /// it, as their forces in this step and in the one before, of size last_h, show, and because rows of impacts are
@@ -195,6 +197,7 @@ private:
         double struck = HUGE_VAL;           ///< when an impact first strikes one of its bodies, if it has none itself
         std::array<double, 3> last{};       ///< its impulse in the step before, where it pushed
         double goes_on = 0.0;               ///< after that impact, if all went on: of `last`
+        bool rubs_on = false;               ///< its friction goes on through the impact
         std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
 
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
@@ -224,10 +227,10 @@ private:
     /// Whether a force between bounds needs more than a faint impulse to stop its row from that speed.
     [[nodiscard]] bool slides(const Problem& problem, std::size_t block, double speed) const;
     /// Gives a force between bounds those of the rest of the step.
-    void release(Problem& problem, std::size_t block) const;
+    void give_rest_of_step(Problem& problem, std::size_t block) const;
     /// Of a force between bounds, what a solver may leave.
     [[nodiscard]] double faint_impulse(const Problem& problem, std::size_t block) const;
-    [[nodiscard]] LimitedServo find_servo(std::uint64_t key, const Before& before, const Contact& contact) const;
+    [[nodiscard]] LimitedServo find_servo(std::uint64_t key, const Before* before, const Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);
     /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
@@ -241,10 +244,6 @@ private:
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
     void find_struck(Problem& problem, double last_h, std::span<const double> last_struck);
-    /// What the friction of others does to the speed of an impact's row after it, less what it would if it went on as
-    /// before, m/s or rad/s.
-    [[nodiscard]] double change_of_others(const Problem& problem, const Solution& solution,
-                                          const Contact& impact) const;
     /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.
     [[nodiscard]] bool was_struck(const Problem& problem, const Contact& contact, std::span<const double> shares) const;
     /// friction_reach_ ← by what the friction of all contacts can change each velocity, as large as it was in the step
@@ -284,7 +283,7 @@ private:
     const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on
     std::size_t first_row_ = 0;             // in the problem
     std::vector<double> friction_reach_;
-    bool holds_forces_ = false;  // those between bounds, through what bounces
+    bool goes_on_ = false;  // friction or forces between bounds, through what bounces
     bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;
 };
 

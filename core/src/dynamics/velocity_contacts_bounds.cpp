@@ -123,7 +123,7 @@ void VelocityContacts::add_known_impulses(std::vector<double>& lambda) const {
             if (contact.known[i] != 0.0) lambda[first_row_ + contact.row + i] += contact.known[i];
 }
 
-void VelocityContacts::release(Problem& problem, std::size_t block) const {
+void VelocityContacts::give_rest_of_step(Problem& problem, std::size_t block) const {
     const Contact& contact = contacts_[block];
     const Cone& own = rows_.blocks()[block].cone;
     Cone& cone = problem.cones[bilateral_cones_ + block];
@@ -136,20 +136,45 @@ void VelocityContacts::release(Problem& problem, std::size_t block) const {
 }
 
 // What bounced may come back as fast as it left, by which its gap is closed again.
-bool VelocityContacts::release_forces(Problem& problem, const Solution& solution) {
-    if (!holds_forces_) return false;
-    holds_forces_ = false;
+bool VelocityContacts::go_on_after_bounces(Problem& problem, const Solution& solution) {
+    if (!goes_on_) return false;
+    goes_on_ = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
-        if (is_between_bounds(k) && contact.goes_on != 0.0) release(problem, k);
-        if (!contact.impact || rows_.blocks()[k].restitution == 0.0) continue;
-        const double* impulse = solution.lambda.data() + first_row_ + contact.row;
-        if (!(impulse[0] > 0.0)) continue;
-        std::copy_n(impulse, rows_.blocks()[k].cone.rows, contact.known.begin());
+        if (is_between_bounds(k) && contact.goes_on != 0.0) give_rest_of_step(problem, k);
+        if (contact.rubs_on) {
+            for (std::size_t i = 1; i < contact.known.size(); ++i)
+                contact.known[i] -= contact.goes_on * contact.last[i];
+            problem.cones[bilateral_cones_ + k].parameters[0] = rows_.blocks()[k].cone.parameters[0];
+            contact.rubs_on = false;
+        }
+        if (!acts(contact, solution) || !(contact.impact->end_speed > 0.0)) continue;
+        std::copy_n(solution.lambda.begin() + static_cast<std::ptrdiff_t>(first_row_ + contact.row),
+                    rows_.blocks()[k].cone.rows, contact.known.begin());
         contact.normal = contact.impact->change - contact.impact->closing;
         contact.strikes = false;
     }
     return true;
+}
+
+double VelocityContacts::share_of_rest(const Problem& problem, const Solution& solution) const {
+    double sum = 0.0, weight = 0.0;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        const Cone& cone = problem.cones[bilateral_cones_ + k];
+        if (contacts_[k].goes_on == 0.0 || (cone.kind != ConeKind::Friction && !is_between_bounds(k))) continue;
+        const double* impulse = solution.lambda.data() + first_row_ + contacts_[k].row;
+        double size = std::abs(impulse[0]), bound = 0.0;
+        if (cone.kind == ConeKind::Friction) {
+            size = cone.rows == 3 ? std::hypot(impulse[1], impulse[2]) : std::abs(impulse[1]);
+            bound = cone.parameters[0] * impulse[0];
+        } else {
+            bound = impulse[0] > 0.0 ? cone.hi[0] : -cone.lo[0];
+        }
+        if (!(bound > 0.0)) continue;
+        sum += size * std::min(size / bound, 1.0);
+        weight += size;
+    }
+    return weight > 0.0 ? sum / weight : 0.0;
 }
 
 }  // namespace delassus

@@ -223,58 +223,44 @@ double VelocityContacts::smooth_acceleration(const Problem& problem, std::size_t
     return (problem.D.row_times(number, smooth_) - problem.D.row_times(number, begin_speeds_)) / h_;
 }
 
-// The friction of other contacts after an impact is not that before it: it turns round where a body bounces off a wall.
-// Until τ they push as in the step before; the solver finds the rest P. Of that as much is force as they would push
-// with if they went on, P_o, and the remainder is of the impact itself. So the row's acceleration after τ is
-//
-//     a' = a + W_t (P_f,t − P_o,t)/(h − τ),      P_f,t = min(1, Σ P_o,n/Σ P_n) P_t,      W = D diag(H)⁻¹ Dᵀ
-//
-// in which P is that of the first answer. Only what slows the row down counts, and no normal force: in a stack, where
-// several impacts meet, one that is left faster could gain energy. What other forces change by changes the row's
-// acceleration by D diag(H)⁻¹ of it.
-bool VelocityContacts::follow_others(const Problem& problem, const Solution& solution,
-                                     std::span<const double> changes) {
+// Of the impulse P_n of the first answer P_o,n is what a contact would press with if it went on. The rest is of the
+// impact, and friction is μ (1 − P_o,n/P_n) P_n besides P_o,t until that is over. Of what other forces change by, what
+// slows the row down counts alone: in a stack, where several impacts meet, one that is left faster could gain energy.
+bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution, std::span<const double> changes) {
     constexpr double faint = 1e-9;
+    double largest = 0.0;  // impulse of what leaves an impact
     bool any = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         if (!acts(contact, solution)) continue;
-        const double rest = h_ - contact.impact->meets;
-        double change = change_of_others(problem, solution, contact);
-        for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double value) {
-            change += rest * value * changes[column] / diagonal_[column];
-        });
-        if (!(rest > 0.0) || !(-change > faint * contact.impact->closing)) continue;
-        contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change / rest,
+        if (contact.impact->end_speed > 0.0) largest = std::max(largest, solution.lambda[first_row_ + contact.row]);
+        double change = 0.0;
+        if (!changes.empty())
+            for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double value) {
+                change += value * changes[column] / diagonal_[column];
+            });
+        if (!(-change * (h_ - contact.impact->meets) > faint * contact.impact->closing)) continue;
+        contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change,
                                        rows_.blocks()[k].restitution);
         contact.normal = -contact.impact->end_speed;
         any = true;
     }
-    return any;
-}
-
-double VelocityContacts::change_of_others(const Problem& problem, const Solution& solution,
-                                          const Contact& impact) const {
-    double found = 0.0, expected = 0.0, normal_found = 0.0, normal_expected = 0.0;
-    const auto coupled = [&](std::size_t row) {
-        return coupling(problem.D, diagonal_, first_row_ + impact.row, first_row_ + row);
-    };
+    if (largest == 0.0) return any;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const Contact& other = contacts_[k];
-        if (other.goes_on == 0.0 || !other.along_normal) continue;
-        const double* impulse = solution.lambda.data() + first_row_ + other.row;
-        bool any = false;
-        for (std::size_t i = 1; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
-            const double W = coupled(other.row + i);
-            found += W * impulse[i];
-            expected += W * other.goes_on * other.last[i];
-            any = any || W != 0.0;
-        }
-        if (!any) continue;
-        normal_found += impulse[0];
-        normal_expected += other.goes_on * other.last[0];
+        Contact& contact = contacts_[k];
+        const auto rows = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
+        if (!contact.along_normal || contact.goes_on == 0.0 || rows == 1) continue;
+        const double* impulse = solution.lambda.data() + first_row_ + contact.row;
+        double change = 0.0;
+        for (std::size_t i = 1; i < rows; ++i)
+            change = std::max(change, std::abs(impulse[i] - contact.goes_on * contact.last[i]));
+        if (!(change > faint * largest)) continue;
+        for (std::size_t i = 1; i < rows; ++i) contact.known[i] += contact.goes_on * contact.last[i];
+        const double pressed = contact.goes_on * contact.last[0];
+        problem.cones[bilateral_cones_ + k].parameters[0] *= impulse[0] > pressed ? 1.0 - pressed / impulse[0] : 0.0;
+        contact.rubs_on = goes_on_ = any = true;
     }
-    return (normal_found > normal_expected ? normal_expected / normal_found : 1.0) * found - expected;
+    return any;
 }
 
 // An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ), but no less
@@ -288,10 +274,13 @@ double VelocityContacts::change_of_others(const Problem& problem, const Solution
 // A force between bounds acts until τ as its speed u⁻ says, or where that is 0, as in the step before. From then on it
 // has the rest of the step: its bounds are those of h − τ.
 //
-// Between bounds nothing holds against an impact, however wide they are: a bounce is over before they act. So where
-// something bounces, forces go on at first as before it, which gives the impulse of the bounce. With that as a known
-// one, the step is solved again for what comes after it (release_forces()). Joints pass what strikes one of their
-// bodies on to the others.
+// Such forces are finite however wide their bounds are, and so is friction without what impacts press: a bounce is over
+// before they act. So where something leaves an impact, forces between bounds go on at first as before it, and so does
+// friction, if the first answer has another one (revise_impacts()). That gives the impulse of the bounce. With it as a
+// known one the step is solved again for what comes after (go_on_after_bounces()). Where what met stays together one
+// solve does both: what the impact and what forces press with afterwards add up.
+//
+// Joints pass what strikes one of their bodies on to the others.
 void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<const double> last_struck) {
     constexpr double like = 2.0;
     const auto& D = problem.D;
@@ -306,9 +295,9 @@ void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<co
             contact, [&](std::size_t column) { struck_[column] = std::min(struck_[column], contact.impact->meets); });
     }
     if (struck_.empty()) return;
-    bool bounces = false;
-    for (std::size_t k = 0; k < contacts_.size(); ++k)
-        bounces = bounces || (contacts_[k].impact && rows_.blocks()[k].restitution > 0.0);
+    const bool bounces = std::any_of(contacts_.begin(), contacts_.end(), [](const Contact& contact) {
+        return contact.impact && contact.impact->end_speed > 0.0;
+    });
     for (bool passed_on = true; passed_on;) {
         passed_on = false;
         for (std::size_t row = 0; row < first_row_; ++row) {
@@ -330,29 +319,25 @@ void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<co
         for_each_column(contact,
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
         if (!(contact.struck < h_)) continue;
+        if (!contact.pushed && !between_bounds) {
+            const double then = std::max(gap - contact.approach * contact.struck, 0.0);
+            contact.normal = std::max(then / (rest_after(contact.struck) * h_), -contact.approach);
+            continue;
+        }
         if (between_bounds) {
             Cone& cone = problem.cones[bilateral_cones_ + k];
             const double force =
                 slides(problem, k, sliding) ? (sliding > 0.0 ? cone.lo : cone.hi)[0] / h_ : contact.last[0] / last_h;
             contact.last[0] = last_h * std::clamp(force, cone.lo[0] / h_, cone.hi[0] / h_);
-            if (bounces) {
-                cone.lo[0] = cone.hi[0] = (h_ - contact.struck) / last_h * contact.last[0];
-                holds_forces_ = true;
-            } else {
-                release(problem, k);
-            }
-        }
-        if (contact.pushed || between_bounds) {
-            if (!between_bounds &&
-                (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)))
-                continue;
-            for (std::size_t i = 0; i < contact.known.size(); ++i)
-                contact.known[i] = contact.struck / last_h * contact.last[i];
-            contact.goes_on = (h_ - contact.struck) / last_h;
+            if (bounces) cone.lo[0] = cone.hi[0] = (h_ - contact.struck) / last_h * contact.last[0];
+            if (!bounces) give_rest_of_step(problem, k);
+            goes_on_ = goes_on_ || bounces;
+        } else if (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)) {
             continue;
         }
-        const double then = std::max(gap - contact.approach * contact.struck, 0.0);
-        contact.normal = std::max(then / (rest_after(contact.struck) * h_), -contact.approach);
+        for (std::size_t i = 0; i < contact.known.size(); ++i)
+            contact.known[i] = contact.struck / last_h * contact.last[i];
+        contact.goes_on = (h_ - contact.struck) / last_h;
     }
 }
 
