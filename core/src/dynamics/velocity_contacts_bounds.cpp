@@ -150,7 +150,8 @@ bool VelocityContacts::go_on_after_bounces(Problem& problem, const Solution& sol
         }
         if (!acts(contact, solution) || !(contact.impact->end_speed > 0.0)) continue;
         std::copy_n(solution.lambda.begin() + static_cast<std::ptrdiff_t>(first_row_ + contact.row),
-                    rows_.blocks()[k].cone.rows, contact.known.begin());
+                    std::min(static_cast<std::size_t>(rows_.blocks()[k].cone.rows), contact.known.size()),
+                    contact.known.begin());
         contact.normal = contact.impact->change - contact.impact->closing;
         contact.strikes = false;
     }
@@ -165,7 +166,7 @@ double VelocityContacts::share_of_rest(const Problem& problem, const Solution& s
         const double* impulse = solution.lambda.data() + first_row_ + contacts_[k].row;
         double size = std::abs(impulse[0]), bound = 0.0;
         if (cone.kind == ConeKind::Friction) {
-            size = cone.rows == 3 ? std::hypot(impulse[1], impulse[2]) : std::abs(impulse[1]);
+            size = cone.rows > 2 ? std::hypot(impulse[1], impulse[2]) : std::abs(impulse[1]);
             bound = cone.parameters[0] * impulse[0];
         } else {
             bound = impulse[0] > 0.0 ? cone.hi[0] : -cone.lo[0];

@@ -248,8 +248,8 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
     if (largest == 0.0) return any;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
-        const auto rows = static_cast<std::size_t>(rows_.blocks()[k].cone.rows);
-        if (!contact.along_normal || contact.goes_on == 0.0 || rows == 1) continue;
+        const auto rows = std::min(static_cast<std::size_t>(rows_.blocks()[k].cone.rows), contact.known.size());
+        if (rows_.blocks()[k].cone.kind != ConeKind::Friction || contact.goes_on == 0.0) continue;
         const double* impulse = solution.lambda.data() + first_row_ + contact.row;
         double change = 0.0;
         for (std::size_t i = 1; i < rows; ++i)
