@@ -263,8 +263,8 @@ public:
     /// The rows that may become active within a step of size h.
     virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);
     /// The velocity at the time t of the point of a contact's shape_b, as far as it is prescribed, less that of
-    /// shape_a, m/s, world frame. contact: with its points at t, or on the way from those that collect_unilateral() had
-    /// at the time `begin`. Nothing where the system does not know: then rates between those of its rows are taken.
+    /// shape_a, m/s, world frame. contact: where it is at t; one that is met on the way, as collect_unilateral() gave
+    /// it at the time `begin`. Nothing where the system does not know: then rates between those of its rows are taken.
     /// Default: nothing.
     [[nodiscard]] virtual std::optional<Vector3> prescribed_velocity(const ContactPoint& contact, double begin,
                                                                      double t) const;

@@ -164,13 +164,15 @@ double DynamicalSystem::longest_step(double /*t*/) const {
 bool DynamicalSystem::has_unilateral() const {
     return false;
 }
-std::optional<Vector3> DynamicalSystem::prescribed_velocity(const ContactPoint&, double, double) const {
-    return std::nullopt;
-}
 
 void DynamicalSystem::collect_unilateral(const State&, double, UnilateralRows& rows) {
     rows.clear();
 }
+
+std::optional<Vector3> DynamicalSystem::prescribed_velocity(const ContactPoint&, double, double) const {
+    return std::nullopt;
+}
+
 double DynamicalSystem::energy(const State&) const {
     return std::numeric_limits<double>::quiet_NaN();
 }

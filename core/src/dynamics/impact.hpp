@@ -2,6 +2,7 @@
 // What Newton's law makes of a contact that meets within a step (internal).
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "delassus/export.hpp"
@@ -25,6 +26,12 @@ struct Impact {
     double change = 0.0;     ///< of the speed, from what it would be if nothing met
     double acts = 0.0;       ///< when in the step one impulse of that size would lead to the same gap at its end, s
 };
+
+/// How much of a step of size h is left after that time in it, s: never nothing, as forces are impulses over it.
+[[nodiscard]] inline double rest_after(double time, double h) {
+    constexpr double least = 1e-9;
+    return std::max(h - time, least * h);
+}
 
 /// Nothing if the contact does not meet in the step of size h > 0. after: acceleration of the row from then on;
 /// restitution in [0, 1].

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/impact.hpp"
+
 namespace delassus {
 
 namespace {
@@ -25,11 +27,6 @@ LimitedServo::LimitedServo(const Row& at_theta, const Row& at_end, double theta,
       pull_at_end_(at_end.rate / at_end.compliance),
       share_(std::max(theta, share_of_decay(h * std::max(damping_, 0.0) * mobility))) {}
 
-double LimitedServo::rest_after(double struck) const {
-    constexpr double least = 1e-9;
-    return std::max(h_ - struck, least * h_);
-}
-
 double LimitedServo::pull(double share) const {
     const double part = theta_ < 1.0 ? (share - theta_) / (1.0 - theta_) : 0.0;
     return pull_at_theta_ + part * (pull_at_end_ - pull_at_theta_);
@@ -37,13 +34,13 @@ double LimitedServo::pull(double share) const {
 
 double LimitedServo::compliance(double struck) const {
     if (!(struck < h_)) return 1.0 / (gain(share_ * h_) * share_ * h_);
-    const double rest = rest_after(struck);
+    const double rest = rest_after(struck, h_);
     return 1.0 / (gain(0.5 * rest) * rest);
 }
 
 double LimitedServo::rate(double struck, double speed) const {
     if (!(struck < h_)) return ((1.0 - share_) * speed + pull(share_) / gain(share_ * h_)) / share_;
-    const double rest = rest_after(struck);
+    const double rest = rest_after(struck, h_);
     return (stiffness_ * struck * speed + pull(1.0 - 0.5 * rest / h_)) / gain(0.5 * rest);
 }
 

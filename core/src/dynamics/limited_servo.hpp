@@ -19,11 +19,9 @@
 // and the way τ u⁻ + ½ r D̄ v⁺.
 #pragma once
 
-#include "delassus/export.hpp"
-
 namespace delassus {
 
-class DELASSUS_API LimitedServo {
+class LimitedServo {
 public:
     /// Of a row for steps of a size, m/s or rad/s, and that over N or N m.
     struct Row {
@@ -38,7 +36,6 @@ public:
     [[nodiscard]] double rate(double struck, double speed) const;
 
 private:
-    [[nodiscard]] double rest_after(double struck) const;
     [[nodiscard]] double gain(double way) const { return damping_ + way * stiffness_; }
     /// g · rate at a share of the step.
     [[nodiscard]] double pull(double share) const;

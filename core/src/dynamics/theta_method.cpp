@@ -553,16 +553,17 @@ bool ThetaMethod::revise_impacts(double h) {
     Solution answer = solution_;
     contacts_.add_known_impulses(answer.lambda);
     if (!contacts_.find_impacts(problem_, answer)) return false;
+    SparseMatrix C;
     H_.begin(n_, n_);
     system_.add_damping(at_theta_, 1.0, Tangent::Symmetric, H_);
-    H_.finish_into(damping_);
+    H_.finish_into(C);
     back_ = Eigen::Map<const Vector>(solution_.x.data(), n_) - smooth_;
-    damped_after_.setZero(n_);
-    damping_.multiply_add(-1.0, back_.data(), damped_after_.data());
+    linear_.setZero(n_);
+    C.multiply_add(-1.0, back_.data(), linear_.data());
     for (std::size_t k = 0; k < n; ++k) back_[static_cast<Eigen::Index>(k)] *= h * contacts_.on_velocities()[k].late;
     damped_.setZero(n_);
-    damping_.multiply_add(-1.0, back_.data(), damped_.data());
-    const bool others = contacts_.revise_impacts(problem_, solution_, {damped_after_.data(), n});
+    C.multiply_add(-1.0, back_.data(), damped_.data());
+    const bool others = contacts_.revise_impacts(problem_, solution_, {linear_.data(), n});
     return others || !damped_.isZero(0.0);
 }
 

@@ -124,8 +124,7 @@ private:
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
     Vector until_impact_;                        // the way of struck velocities until then
     Vector bounced_;                             // v⁺ of bounces alone, where more comes after them; else empty
-    SparseMatrix damping_;                       // C at θ
-    Vector damped_, damped_after_;               // −C x and −C (v⁺ − ṽ) of impacts; empty without
+    Vector damped_;                              // −C x of impacts; empty without
     Vector result_, back_, linear_;
     std::vector<double> constraint_;
     std::vector<double> last_a_, last_b_;

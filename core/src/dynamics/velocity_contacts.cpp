@@ -320,7 +320,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
-    goes_on_ = false;
+    held_through_bounces_ = false;
     contacts_.clear();
     compliances_.clear();
     kept_.begin_walk();
@@ -636,10 +636,11 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
     ended_.assign(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_), lambda.end());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
-        if (!contact.along_normal && contact.struck < h_)
-            ended_[contact.row] = (ended_[contact.row] - contact.known[0]) / rest_after(contact.struck);
-        else if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0])
+        if (!contact.along_normal && contact.struck < h_) {
+            ended_[contact.row] = (ended_[contact.row] - contact.known[0]) * h_ / rest_after(contact.struck, h_);
+        } else if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0]) {
             std::fill_n(ended_.begin() + static_cast<std::ptrdiff_t>(contact.row), rows_.blocks()[k].cone.rows, 0.0);
+        }
     }
     kept_.keep(rows_.blocks(), rows_.contacts(), ended_);
     const std::size_t first_contact = contacts_.size() - rows_.contacts().size();

@@ -218,14 +218,15 @@ private:
     [[nodiscard]] double speed_at_begin(std::size_t row, std::size_t before) const;
     [[nodiscard]] double speed_at_end(const Problem& problem, std::size_t row, std::size_t before,
                                       const double* v) const;
-    /// The share of the step after that time.
-    [[nodiscard]] double rest_after(double time) const { return std::max(1.0 - time / h_, 1e-9); }
     /// Whether the block is the friction of a joint, or a motor or servo with a limit.
     [[nodiscard]] bool is_between_bounds(std::size_t block) const;
     /// The speed at the beginning of the step of a force between bounds that may turn round; 0 of all else.
     [[nodiscard]] double sliding_speed(std::size_t block) const;
     /// Whether a force between bounds needs more than a faint impulse to stop its row from that speed.
     [[nodiscard]] bool slides(const Problem& problem, std::size_t block, double speed) const;
+    /// A force between bounds that an impact strikes acts until then as before it: Contact::last. What follows is that
+    /// of the rest of the step, or while something leaves an impact, the same force.
+    void hold_until_struck(Problem& problem, std::size_t block, double last_h, double sliding, bool leaves);
     /// Gives a force between bounds those of the rest of the step.
     void give_rest_of_step(Problem& problem, std::size_t block) const;
     /// Of a force between bounds, what a solver may leave.
@@ -283,7 +284,7 @@ private:
     const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on
     std::size_t first_row_ = 0;             // in the problem
     std::vector<double> friction_reach_;
-    bool goes_on_ = false;  // friction or forces between bounds, through what bounces
+    bool held_through_bounces_ = false;  // friction or forces between bounds, until go_on_after_bounces()
     bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;
 };
 

@@ -123,13 +123,25 @@ void VelocityContacts::add_known_impulses(std::vector<double>& lambda) const {
             if (contact.known[i] != 0.0) lambda[first_row_ + contact.row + i] += contact.known[i];
 }
 
+void VelocityContacts::hold_until_struck(Problem& problem, std::size_t block, double last_h, double sliding,
+                                         bool leaves) {
+    Contact& contact = contacts_[block];
+    Cone& cone = problem.cones[bilateral_cones_ + block];
+    const double impulse =
+        slides(problem, block, sliding) ? (sliding > 0.0 ? cone.lo : cone.hi)[0] : contact.last[0] * h_ / last_h;
+    contact.last[0] = last_h / h_ * std::clamp(impulse, cone.lo[0], cone.hi[0]);
+    if (!leaves) return give_rest_of_step(problem, block);
+    cone.lo[0] = cone.hi[0] = (h_ - contact.struck) / last_h * contact.last[0];
+    held_through_bounces_ = true;
+}
+
 void VelocityContacts::give_rest_of_step(Problem& problem, std::size_t block) const {
     const Contact& contact = contacts_[block];
     const Cone& own = rows_.blocks()[block].cone;
     Cone& cone = problem.cones[bilateral_cones_ + block];
-    const double rest = rest_after(contact.struck);
-    cone.lo[0] = rest * h_ * own.lo[0];
-    cone.hi[0] = rest * h_ * own.hi[0];
+    const double rest = rest_after(contact.struck, h_);
+    cone.lo[0] = rest * own.lo[0];
+    cone.hi[0] = rest * own.hi[0];
     if (!contact.servo) return;
     problem.E.value[static_cast<std::size_t>(problem.E.row_start[first_row_ + contact.row])] =
         contact.servo->compliance(contact.struck);
@@ -137,8 +149,8 @@ void VelocityContacts::give_rest_of_step(Problem& problem, std::size_t block) co
 
 // What bounced may come back as fast as it left, by which its gap is closed again.
 bool VelocityContacts::go_on_after_bounces(Problem& problem, const Solution& solution) {
-    if (!goes_on_) return false;
-    goes_on_ = false;
+    if (!held_through_bounces_) return false;
+    held_through_bounces_ = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         if (is_between_bounds(k) && contact.goes_on != 0.0) give_rest_of_step(problem, k);

@@ -258,7 +258,7 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
         for (std::size_t i = 1; i < rows; ++i) contact.known[i] += contact.goes_on * contact.last[i];
         const double pressed = contact.goes_on * contact.last[0];
         problem.cones[bilateral_cones_ + k].parameters[0] *= impulse[0] > pressed ? 1.0 - pressed / impulse[0] : 0.0;
-        contact.rubs_on = goes_on_ = any = true;
+        contact.rubs_on = held_through_bounces_ = any = true;
     }
     return any;
 }
@@ -295,7 +295,7 @@ void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<co
             contact, [&](std::size_t column) { struck_[column] = std::min(struck_[column], contact.impact->meets); });
     }
     if (struck_.empty()) return;
-    const bool bounces = std::any_of(contacts_.begin(), contacts_.end(), [](const Contact& contact) {
+    const bool leaves = std::any_of(contacts_.begin(), contacts_.end(), [](const Contact& contact) {
         return contact.impact && contact.impact->end_speed > 0.0;
     });
     for (bool passed_on = true; passed_on;) {
@@ -321,17 +321,11 @@ void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<co
         if (!(contact.struck < h_)) continue;
         if (!contact.pushed && !between_bounds) {
             const double then = std::max(gap - contact.approach * contact.struck, 0.0);
-            contact.normal = std::max(then / (rest_after(contact.struck) * h_), -contact.approach);
+            contact.normal = std::max(then / rest_after(contact.struck, h_), -contact.approach);
             continue;
         }
         if (between_bounds) {
-            Cone& cone = problem.cones[bilateral_cones_ + k];
-            const double force =
-                slides(problem, k, sliding) ? (sliding > 0.0 ? cone.lo : cone.hi)[0] / h_ : contact.last[0] / last_h;
-            contact.last[0] = last_h * std::clamp(force, cone.lo[0] / h_, cone.hi[0] / h_);
-            if (bounces) cone.lo[0] = cone.hi[0] = (h_ - contact.struck) / last_h * contact.last[0];
-            if (!bounces) give_rest_of_step(problem, k);
-            goes_on_ = goes_on_ || bounces;
+            hold_until_struck(problem, k, last_h, sliding, leaves);
         } else if (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)) {
             continue;
         }
