@@ -373,7 +373,7 @@ private:
                 for (double& bound : *bounds) bound *= h;
             ++cone;
             const ContactPoint* contact = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
-            const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows});
+            const bool pushed = kept_.start(block, contact, {lambda.data() + m_ + row, rows}).pushed;
             for (std::int32_t i = 0; i < block.cone.rows; ++i) {
                 const double gap = rows_.rows()[row + i].gap, rate = rows_.rows()[row + i].rate;
                 const double resolution = contact && i == 0 ? gap_resolution(m_ + row, h) : resolution_.least();

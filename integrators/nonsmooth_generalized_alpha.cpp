@@ -188,7 +188,7 @@ private:
         }
         contacts_.add_steady_impulse(problem_, solution_.lambda, load.data());
         load /= h;
-        contacts_.finish(solution_.lambda, report);
+        contacts_.finish(problem_, solution_, report);
         if (report.active_blocks > 0)
             for (std::size_t i = 0; i < report.multipliers.size(); ++i)
                 report.multipliers[i] += solution_.lambda[i] / h;

@@ -41,7 +41,7 @@ TEST(KeptImpulses, AContactThatTurnsKeepsItsImpulseInSpace) {
     const ContactPoint turned = contact_with(after);
     std::array<double, 3> start{};
     kept.begin_walk();
-    EXPECT_TRUE(kept.start(blocks[0], &turned, start));
+    EXPECT_TRUE(kept.start(blocks[0], &turned, start).pushed);
     EXPECT_LT((in_space(after, start) - in_space(before, rows)).norm(), 1e-14);
 }
 
@@ -51,7 +51,7 @@ TEST(KeptImpulses, BlocksAreFoundByTheirKeysInAnyOrder) {
     const std::vector<ContactPoint> contacts = {contact_with(Vector3d::UnitZ())};
     const std::vector<double> lambda = {9.0, 0.0, 5.0, 1.0, 2.0};
     KeptImpulses kept;
-    kept.keep(blocks, contacts, lambda);
+    kept.keep(blocks, contacts, lambda, std::vector<char>{0, 0, 1});
     std::vector<double> memory;
     kept.append_to(memory);
     KeptImpulses loaded;
@@ -59,17 +59,19 @@ TEST(KeptImpulses, BlocksAreFoundByTheirKeysInAnyOrder) {
     for (KeptImpulses* one : {&kept, &loaded}) {
         one->begin_walk();
         double value = -1.0;
-        EXPECT_TRUE(one->start(blocks[0], nullptr, {&value, 1}));
+        const KeptImpulses::Start first = one->start(blocks[0], nullptr, {&value, 1});
+        EXPECT_TRUE(first.pushed && !first.jolted);
         EXPECT_EQ(value, 9.0);
-        EXPECT_FALSE(one->start(blocks[1], nullptr, {&value, 1}));  // a key before the last one asked for
+        EXPECT_FALSE(one->start(blocks[1], nullptr, {&value, 1}).pushed);  // a key before the last one asked for
         EXPECT_EQ(value, 0.0);
         std::array<double, 3> three{};
-        EXPECT_TRUE(one->start(blocks[2], contacts.data(), three));
+        const KeptImpulses::Start contact = one->start(blocks[2], contacts.data(), three);
+        EXPECT_TRUE(contact.pushed && contact.jolted);
         EXPECT_NEAR(three[1], 1.0, 1e-15);
         // Unknown, or known with other rows: nothing.
-        EXPECT_FALSE(one->start(contact_block(9), contacts.data(), three));
+        EXPECT_FALSE(one->start(contact_block(9), contacts.data(), three).pushed);
         EXPECT_EQ(three, (std::array<double, 3>{}));
-        EXPECT_FALSE(one->start(contact_block(6), contacts.data(), three));
+        EXPECT_FALSE(one->start(contact_block(6), contacts.data(), three).pushed);
     }
     memory.pop_back();
     EXPECT_THROW(loaded.load(memory), InputError);

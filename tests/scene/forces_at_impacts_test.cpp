@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -127,6 +128,68 @@ TEST(ForcesAtImpacts, FrictionHasNoPartInABounce) {
                 "b");
             EXPECT_NEAR(place[0], way, 5e-3 * way);
         }
+}
+
+// Balls in a row on a floor, the first of which rolls towards the others. Between impacts of two, which exchange their
+// speeds u with restitution, floor friction accelerates what slides, u − ω r ≠ 0, until it rolls.
+struct Row {
+    static constexpr double r = 0.03, e = 0.9, mu = 0.3, g = 9.81;
+    static constexpr int balls = 4;
+    double speed, gap;
+
+    [[nodiscard]] double end() const { return 0.8 + gap / speed; }
+    [[nodiscard]] std::array<double, balls> places_at_end() const {
+        const int steps = 400000;
+        const double h = end() / steps, force = mu * g;
+        std::array<double, balls> x{}, u{}, turn{};
+        for (std::size_t i = 0; i < balls; ++i) x[i] = static_cast<double>(i) * (2.0 * r + gap);
+        u[0] = turn[0] = speed;
+        for (int k = 0; k < steps; ++k) {
+            for (std::size_t i = 0; i < balls; ++i) {
+                const double slip = u[i] - turn[i], slides = std::min(std::abs(slip) / (3.5 * force), h);
+                const double pull = std::copysign(force, -slip);
+                x[i] += u[i] * h + pull * slides * (h - 0.5 * slides);
+                u[i] += pull * slides;
+                turn[i] -= 2.5 * pull * slides;
+            }
+            for (std::size_t i = 0; i + 1 < balls; ++i) {
+                const double closing = u[i] - u[i + 1];
+                if (x[i + 1] - x[i] > 2.0 * r || closing <= 0.0) continue;
+                u[i] -= 0.5 * (1.0 + e) * closing;
+                u[i + 1] += 0.5 * (1.0 + e) * closing;
+            }
+        }
+        return x;
+    }
+    [[nodiscard]] std::string scene(double h) const {
+        std::string text = fmt::format(
+            "step: {:.17g}\nend: {:.17g}\nmaterials: {{f: {{friction: {}}}, b: {{friction: 0, restitution: {}}}}}\n"
+            "material_pairs: [{{first: f, second: b, friction: {}, restitution: 0}}]\nbodies:\n"
+            "- {{name: floor, fixed: true, shapes: [{{plane: {{}}, material: f}}]}}\n",
+            h, end(), mu, e, mu);
+        for (int i = 0; i < balls; ++i)
+            text += fmt::format(
+                "- {{name: b{}, mass: 1, position: [{:.17g}, 0, {}], velocity: [{}, 0, 0], angular_velocity: [0, "
+                "{:.17g}, 0], shapes: [{{sphere: {{radius: {}}}, material: b}}]}}\n",
+                i, i * (2.0 * r + gap), r, i == 0 ? speed : 0.0, i == 0 ? speed / r : 0.0, r);
+        return text;
+    }
+};
+
+// In steps of 1/60 s several of them meet within one, or at its end: what a contact pressed with in a part of a step
+// that is cut between impacts tells what it presses with in the next part.
+TEST(ForcesAtImpacts, SlowBallsInARowSlideThroughSeveralImpactsOfAStep) {
+    for (const Row& row : {Row{0.1, 0.0137}, Row{0.1, 0.001}, Row{0.3, 0.002}, Row{1.0, 0.01}}) {
+        const std::array<double, Row::balls> at_end = row.places_at_end();
+        for (const double h : {1.0 / 60.0, 0.0073, 0.001, 0.0002}) {
+            SCOPED_TRACE(fmt::format("{} m/s, gaps of {} m, step {}", row.speed, row.gap, h));
+            Running run(parse_scene(row.scene(h), "test.yaml"));
+            run.finish();
+            for (int i = 0; i < Row::balls; ++i)
+                EXPECT_NEAR(run.pose(fmt::format("b{}", i)).position[0], at_end[static_cast<std::size_t>(i)],
+                            h > 0.01 ? 5e-4 : 2e-5);
+        }
+    }
 }
 
 // v = v₀ − (c/m) x until a wall, and so again after it.

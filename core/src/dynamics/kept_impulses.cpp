@@ -14,7 +14,8 @@ void KeptImpulses::clear() {
     next_ = 0;
 }
 
-bool KeptImpulses::start(const UnilateralRows::Block& block, const ContactPoint* contact, std::span<double> lambda) {
+KeptImpulses::Start KeptImpulses::start(const UnilateralRows::Block& block, const ContactPoint* contact,
+                                        std::span<double> lambda) {
     const auto before = [](const Entry& entry, std::uint64_t key) { return entry.key < key; };
     if (next_ == entries_.size() || entries_[next_].key > block.key)
         next_ = static_cast<std::size_t>(std::lower_bound(entries_.begin(), entries_.end(), block.key, before) -
@@ -23,7 +24,7 @@ bool KeptImpulses::start(const UnilateralRows::Block& block, const ContactPoint*
     const auto rows = static_cast<std::int32_t>(lambda.size());
     if (next_ == entries_.size() || entries_[next_].key != block.key || entries_[next_].rows != rows) {
         std::fill(lambda.begin(), lambda.end(), 0.0);
-        return false;
+        return {};
     }
     const double* impulse = impulses_.data() + entries_[next_].first;
     if (contact && rows == 3) {
@@ -33,11 +34,11 @@ bool KeptImpulses::start(const UnilateralRows::Block& block, const ContactPoint*
     } else {
         std::copy_n(impulse, rows, lambda.data());
     }
-    return lambda[0] > 0.0;
+    return {.pushed = lambda[0] > 0.0, .jolted = entries_[next_].jolted};
 }
 
 void KeptImpulses::keep(std::span<const UnilateralRows::Block> blocks, std::span<const ContactPoint> contacts,
-                        std::span<const double> lambda) {
+                        std::span<const double> lambda, std::span<const char> jolted) {
     impulses_.assign(lambda.begin(), lambda.end());
     entries_.clear();
     const std::size_t first_contact = blocks.size() - contacts.size();
@@ -48,7 +49,7 @@ void KeptImpulses::keep(std::span<const UnilateralRows::Block> blocks, std::span
             Eigen::Map<Eigen::Vector3d> impulse(impulses_.data() + row);
             impulse = (contact_frame(Eigen::Vector3d(contacts[k - first_contact].normal.data())) * impulse).eval();
         }
-        entries_.push_back({blocks[k].key, row, rows});
+        entries_.push_back({blocks[k].key, row, rows, !jolted.empty() && jolted[k] != 0});
         row += rows;
     }
     sort();
@@ -70,9 +71,9 @@ void KeptImpulses::drop_zeros() {
 }
 
 void KeptImpulses::append_to(std::vector<double>& memory) const {
-    for (const auto& [key, first, rows] : entries_) {
+    for (const auto& [key, first, rows, jolted] : entries_) {
         memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),
-                                     static_cast<double>(rows)});
+                                     jolted ? 1.0 : 0.0, static_cast<double>(rows)});
         memory.insert(memory.end(), impulses_.begin() + first, impulses_.begin() + first + rows);
     }
 }
@@ -80,14 +81,17 @@ void KeptImpulses::append_to(std::vector<double>& memory) const {
 void KeptImpulses::load(std::span<const double> memory) {
     clear();
     while (!memory.empty()) {
-        const auto rows = memory.size() < 3 ? -1.0 : memory[2];
-        if (!(rows >= 0.0) || static_cast<double>(memory.size() - 3) < rows)
+        constexpr std::size_t head = 4;
+        const auto rows = memory.size() < head ? -1.0 : memory[3];
+        if (!(rows >= 0.0) || static_cast<double>(memory.size() - head) < rows)
             throw InputError("the impulses kept from step to step end within a block");
         const auto key = (static_cast<std::uint64_t>(memory[0]) << 32U) | static_cast<std::uint64_t>(memory[1]);
         const auto count = static_cast<std::size_t>(rows);
-        entries_.push_back({key, static_cast<std::int32_t>(impulses_.size()), static_cast<std::int32_t>(count)});
-        impulses_.insert(impulses_.end(), memory.begin() + 3, memory.begin() + 3 + static_cast<std::ptrdiff_t>(count));
-        memory = memory.subspan(3 + count);
+        entries_.push_back(
+            {key, static_cast<std::int32_t>(impulses_.size()), static_cast<std::int32_t>(count), memory[2] != 0.0});
+        memory = memory.subspan(head);
+        impulses_.insert(impulses_.end(), memory.begin(), memory.begin() + static_cast<std::ptrdiff_t>(count));
+        memory = memory.subspan(count);
     }
     sort();
 }

@@ -5,13 +5,6 @@
 
 namespace delassus {
 
-namespace {
-
-/// Of a step: what a shorter one before says of accelerations is what its solve left.
-constexpr double short_share = 1e-3;
-
-}  // namespace
-
 // A step of the trapezoidal rule errs in positions by h³ q‴/12, and one of θ > ½ by (θ − ½) h² q̈ more (Hairer, Nørsett,
 // Wanner, Solving Ordinary Differential Equations I, sec. III.2). With the mean accelerations a of the step and a₋ of
 // the one before, of size h₋, besides free spins, q‴ is 2 (a − a₋)/(h + h₋):

@@ -14,6 +14,8 @@ namespace delassus {
 
 /// Of the change of a velocity by impacts, beyond which it says no acceleration.
 inline constexpr double mostly = 0.5;
+/// Of a step: over a shorter one before it, what changed is what its solve left, and says nothing of forces.
+inline constexpr double short_share = 1e-3;
 
 class PositionError {
 public:

@@ -184,7 +184,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     if (settings_.linearly_implicit && !contacts_.follows_impacts()) remember_change(result_, h);
     multipliers_.assign(solution_.lambda.begin(), solution_.lambda.begin() + m_);
     for (double& lambda : multipliers_) lambda /= h;
-    contacts_.finish(solution_.lambda, report);
+    contacts_.finish(problem_, solution_, report);
     result_ -= free_;
     if (position_error_.note({h, last_h_, result_, struck_, timed_, contacts_.all_bounce()}, report))
         contacts_.add_error(problem_, solution_, last_h_, report.error);
@@ -532,13 +532,13 @@ void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
     Solution solution = solution_;
     ++report.newton_iterations;
     if (report.take(solver.solve(std::move(problem), solution, request_)))
-        contacts_.time_turns(problem_, solution.x, 0.0, {});
+        contacts_.time_turns(problem_, solution.x, 0.0);
 }
 
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
-    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, changes_[0], last_h_, struck_);
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, changes_[0], last_h_);
     timed_ = true;
 }
 
@@ -589,7 +589,7 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
     };
     if (contacts_.any()) {
         time_meetings(begin, h, solver, report);
-        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_, struck_);
+        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_);
     }
     linearize_at_guess();
     if (!found()) return;

@@ -342,8 +342,10 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.row = row;
         contact.along_normal = block.along_normal();
         const ContactPoint* point = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
-        contact.pushed = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
-        if ((contact.pushed && contact.along_normal) || is_between_bounds(k))
+        const auto [pushed, jolted] = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
+        contact.pushed = pushed;
+        contact.jolted = jolted;
+        if ((pushed && contact.along_normal) || is_between_bounds(k))
             std::copy_n(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_ + row), std::min<std::size_t>(size, 3),
                         contact.last.begin());
         const Before* before = find_before(block.key);
@@ -604,7 +606,9 @@ bool VelocityContacts::landed(const Solution& solution) const {
 // A contact that closed is one that pushes and did not in the step before (`once`: and whose impulse does not come from
 // forces, since its rows leave gaps and speeds of O(h²) that are no impacts); it closes after g/|u⁻|, or with at least
 // g/h where it was slower at first. Gaps are reported as they were at the beginning of the step.
-void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& report) {
+void VelocityContacts::finish(const Problem& problem, const Solution& solution, StepReport& report) {
+    const std::vector<double>& lambda = solution.lambda;
+    find_jolted(problem, solution);
     report.unilateral_blocks = static_cast<std::int32_t>(contacts_.size());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
@@ -636,13 +640,13 @@ void VelocityContacts::finish(const std::vector<double>& lambda, StepReport& rep
     ended_.assign(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_), lambda.end());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
-        if (!contact.along_normal && contact.struck < h_) {
+        if (!contact.along_normal && contact.struck <= h_) {
             ended_[contact.row] = (ended_[contact.row] - contact.known[0]) * h_ / rest_after(contact.struck, h_);
         } else if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0]) {
             std::fill_n(ended_.begin() + static_cast<std::ptrdiff_t>(contact.row), rows_.blocks()[k].cone.rows, 0.0);
         }
     }
-    kept_.keep(rows_.blocks(), rows_.contacts(), ended_);
+    kept_.keep(rows_.blocks(), rows_.contacts(), ended_, jolted_);
     const std::size_t first_contact = contacts_.size() - rows_.contacts().size();
     for (std::size_t k = 0; k < rows_.contacts().size(); ++k) {
         // Of a contact that nobody knew at the beginning the gap follows from its speed: it was no deeper than the

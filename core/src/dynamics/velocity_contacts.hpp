@@ -66,9 +66,9 @@ public:
     void take_out_open(Problem& problem) const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
     /// the velocities at the end of the step without impacts, n. last_changes: accelerations of the step before, n or
-    /// empty. last_h, last_struck: as of time_turns().
+    /// empty. last_h: as of time_turns().
     void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> last_changes,
-                       double last_h, std::span<const double> last_struck);
+                       double last_h);
     /// Whether impacts lead to other speeds than in the first answer: since friction is to go on through them, or
     /// other forces change by `changes` from then on, n, N or N m, or empty. Then the problem is to be solved again.
     [[nodiscard]] bool revise_impacts(Problem& problem, const Solution& solution, std::span<const double> changes);
@@ -83,10 +83,8 @@ public:
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
     void let_slide_on(Problem& problem) const;
     /// What turns round within the step gets the bounds of that time. sliding: the velocities at the end of the step if
-    /// it slid on, n; last_h: the size of the step before; last_struck: the share of impacts in what it
-    /// changed each velocity by, n or empty.
-    void time_turns(Problem& problem, std::span<const double> sliding, double last_h,
-                    std::span<const double> last_struck);
+    /// it slid on, n; last_h: the size of the step before, or 0.
+    void time_turns(Problem& problem, std::span<const double> sliding, double last_h);
     /// problem.a += Dᵀ of what contacts did until an impact or until their friction turned round.
     void add_known_impulses(Problem& problem) const;
     /// lambda of the whole problem += the same.
@@ -102,8 +100,9 @@ public:
     void drop_negligible(const Problem& problem, Solution& solution);
     /// Whether a contact that closed in this step is left overlapping by more than it was.
     [[nodiscard]] bool landed(const Solution& solution) const;
-    /// What acted, into the report, and kept for the next step; hands the contacts to the report.
-    void finish(const std::vector<double>& lambda, StepReport& report);
+    /// What acted, into the report, and kept for the next step; hands the contacts to the report. solution: of the
+    /// whole problem.
+    void finish(const Problem& problem, const Solution& solution, StepReport& report);
 
     /// What impacts do to a velocity.
     struct OnVelocity {
@@ -196,6 +195,7 @@ private:
         double row_error = 0.0;             ///< of its rows then, as a share of their size
         double struck = HUGE_VAL;           ///< when an impact first strikes one of its bodies, if it has none itself
         std::array<double, 3> last{};       ///< its impulse in the step before, where it pushed
+        bool jolted = false;                ///< that is not of forces alone
         double goes_on = 0.0;               ///< after that impact, if all went on: of `last`
         bool rubs_on = false;               ///< its friction goes on through the impact
         std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
@@ -244,9 +244,9 @@ private:
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
-    void find_struck(Problem& problem, double last_h, std::span<const double> last_struck);
-    /// Whether impacts had more than a faint share in one of the velocities of a contact's normal row.
-    [[nodiscard]] bool was_struck(const Problem& problem, const Contact& contact, std::span<const double> shares) const;
+    void find_struck(Problem& problem, double last_h);
+    /// jolted_ ← which contacts got their impulse from more than forces.
+    void find_jolted(const Problem& problem, const Solution& solution);
     /// friction_reach_ ← by what the friction of all contacts can change each velocity, as large as it was in the step
     /// before.
     void find_friction_reach(const Problem& problem);
@@ -279,6 +279,8 @@ private:
     std::vector<std::size_t> found_;  // velocities
     std::vector<double> ended_;       // of the rows at the end of the step: what acts on
     std::vector<double> struck_;      // of each velocity, when an impact first changes it; empty where there is none
+    std::vector<double> jolts_;       // by what jolted contacts change each velocity, by the diagonal of H
+    std::vector<char> jolted_;        // of each block
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on

@@ -13,8 +13,8 @@
 // bounds h [F₋, F₊]: these stay.
 //
 // Friction in a contact that turns round against its sliding velocity u_t⁻ likewise (`once`, which knows ũ): until τ it
-// is −μ (τ/h) P_n u_t⁻/|u_t⁻|, with the P_n of the step before, unless an impact has changed that, a known impulse;
-// what is left has the cone of μ (1 − τ/h).
+// is −μ (τ/h) P_n u_t⁻/|u_t⁻|, with the P_n of the step before, if that is of forces, a known impulse; what is left has
+// the cone of μ (1 − τ/h).
 #include <algorithm>
 #include <cmath>
 
@@ -30,7 +30,7 @@ bool VelocityContacts::is_between_bounds(std::size_t block) const {
 
 double VelocityContacts::sliding_speed(std::size_t block) const {
     const Contact& contact = contacts_[block];
-    if (!is_between_bounds(block) || contact.servo || !contact.was_there || contact.struck < h_) return 0.0;
+    if (!is_between_bounds(block) || contact.servo || !contact.was_there || contact.struck <= h_) return 0.0;
     return speed_at_begin(contact.row, contact.before);
 }
 
@@ -67,8 +67,7 @@ void VelocityContacts::let_slide_on(Problem& problem) const {
     }
 }
 
-void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding, double last_h,
-                                  std::span<const double> last_struck) {
+void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding, double last_h) {
     const auto slides_back = [&](std::size_t row, double change, double both) {
         return change > both * coupling(problem.D, diagonal_, first_row_ + row, first_row_ + row);
     };
@@ -87,8 +86,8 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
             continue;
         }
-        const bool stays =
-            contact.pushed && contact.was_there && !contact.impact && !(contact.known[0] > 0.0) && last_h > 0.0;
+        const bool stays = contact.pushed && !contact.jolted && contact.was_there && !contact.impact &&
+                           !(contact.known[0] > 0.0) && last_h > 0.0;
         if (cone.kind != ConeKind::Friction || !stays) continue;
         const auto axes = static_cast<std::size_t>(cone.rows) - 1;
         std::array<double, 2> before{};
@@ -98,7 +97,7 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             squares += before[i] * before[i];
             along += before[i] * end_speed(1 + i);
         }
-        if (!(along < 0.0) || was_struck(problem, contact, last_struck)) continue;
+        if (!(along < 0.0)) continue;
         const double size = std::sqrt(squares), force = cone.parameters[0] * contact.last[0] * h_ / last_h;
         if (!slides_back(contact.row + 1, size - along / size, 2.0 * force)) continue;
         const double share = squares / (squares - along);  // τ/h

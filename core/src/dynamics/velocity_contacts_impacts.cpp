@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "dynamics/position_error.hpp"
 #include "dynamics/row_entries.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "support/frames.hpp"
@@ -152,8 +153,7 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // those of the beginning and of D̄ are θ h apart. The row of the meeting, which stays, meets at the same time from
 // another gap.
 void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth,
-                                     std::span<const double> last_changes, double last_h,
-                                     std::span<const double> last_struck) {
+                                     std::span<const double> last_changes, double last_h) {
     smooth_ = smooth.data();
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
@@ -215,7 +215,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             contact.recovery = 0.0;
         }
     }
-    find_struck(problem, last_h, last_struck);
+    find_struck(problem, last_h);
 }
 
 double VelocityContacts::smooth_acceleration(const Problem& problem, std::size_t row) const {
@@ -266,10 +266,10 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
 // An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ), but no less
 // than u⁻: where the contact opens at first, its work P (u⁻ + u⁺)/2 would gain energy.
 //
-// One that pushed goes on as it did until τ, whether the impact opens it or not: the share τ/h of the impulse of the
-// step before is known, unless an impact was in that, or the step was of quite another size, as one for an impact is. A
-// block that rocks from one edge to the other stands on the first one until then; with P = 0 there, as u⁺ > 0 asks for,
-// the second would carry it for the whole step, which takes h g b/k² of its rotation at each impact.
+// One that pushed goes on as it did until τ, whether the impact opens it or not: with the impulse P₋ of the step
+// before, of size h₋, the impulse τ P₋/h₋ is known, unless impacts had a part in P₋ (find_jolted()). A block that rocks
+// from one edge to the other stands on the first one until then; with P = 0 there, as u⁺ > 0 asks for, the second would
+// carry it for the whole step, which takes h g b/k² of its rotation at each impact.
 //
 // A force between bounds acts until τ as its speed u⁻ says, or where that is 0, as in the step before. From then on it
 // has the rest of the step: its bounds are those of h − τ.
@@ -281,8 +281,7 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
 // solve does both: what the impact and what forces press with afterwards add up.
 //
 // Joints pass what strikes one of their bodies on to the others.
-void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<const double> last_struck) {
-    constexpr double like = 2.0;
+void VelocityContacts::find_struck(Problem& problem, double last_h) {
     const auto& D = problem.D;
     struck_.clear();
     const auto for_each_column = [&](const Contact& contact, const auto& act) {
@@ -318,7 +317,7 @@ void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<co
         const double sliding = sliding_speed(k);
         for_each_column(contact,
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
-        if (!(contact.struck < h_)) continue;
+        if (!(contact.struck <= h_)) continue;
         if (!contact.pushed && !between_bounds) {
             const double then = std::max(gap - contact.approach * contact.struck, 0.0);
             contact.normal = std::max(then / rest_after(contact.struck, h_), -contact.approach);
@@ -326,7 +325,7 @@ void VelocityContacts::find_struck(Problem& problem, double last_h, std::span<co
         }
         if (between_bounds) {
             hold_until_struck(problem, k, last_h, sliding, leaves);
-        } else if (last_h >= like * h_ || h_ >= like * last_h || was_struck(problem, contact, last_struck)) {
+        } else if (contact.jolted || last_h < short_share * h_) {
             continue;
         }
         for (std::size_t i = 0; i < contact.known.size(); ++i)
@@ -507,14 +506,42 @@ double VelocityContacts::speed_at_end(const Problem& problem, std::size_t row, s
            (1.0 - theta_) / theta_ * change;
 }
 
-bool VelocityContacts::was_struck(const Problem& problem, const Contact& contact,
-                                  std::span<const double> shares) const {
-    constexpr double faint = 0.05;
-    bool found = false;
-    for_each_entry(problem.D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) {
-        found = found || (!shares.empty() && shares[column] > faint);
-    });
-    return found;
+// Of the impulse of a contact, less is of forces than it says if it changes the speed of its row, as where it strikes
+// or corrects a gap, or if other such impulses press on it, which with D_n diag(H)⁻¹ Σ Dᵀ P would close it. Joints of
+// struck bodies pass on what they hold.
+void VelocityContacts::find_jolted(const Problem& problem, const Solution& solution) {
+    constexpr double faint = 0.05;  // of what the impulse of the contact changes
+    const auto& D = problem.D;
+    jolted_.assign(contacts_.size(), 0);
+    jolts_.assign(static_cast<std::size_t>(D.columns), 0.0);
+    const auto add = [&](std::size_t first, std::size_t rows) {
+        for_each_entry(D, first, rows, [&](std::size_t row, std::size_t column, double value) {
+            jolts_[column] += value * solution.lambda[row] / diagonal_[column];
+        });
+    };
+    if (!struck_.empty())
+        for (std::size_t row = 0; row < first_row_; ++row) {
+            bool struck = false;
+            for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double) {
+                struck = struck || std::isfinite(struck_[column]);
+            });
+            if (struck) add(row, 1);
+        }
+    for (bool any = true; any;) {
+        any = false;
+        for (std::size_t k = 0; k < contacts_.size(); ++k) {
+            const Contact& contact = contacts_[k];
+            const std::size_t first = first_row_ + contact.row;
+            if (!contact.along_normal || jolted_[k] != 0 || !(solution.lambda[first] > 0.0)) continue;
+            double jolt = 0.0;
+            for_each_entry(D, first, 1,
+                           [&](std::size_t, std::size_t column, double value) { jolt += value * jolts_[column]; });
+            jolt = std::max(std::abs(jolt), std::abs(contact.end_speed + contact.approach));
+            if (!contact.impact && !(jolt > faint * contact.change)) continue;
+            jolted_[k] = any = true;
+            add(first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
+        }
+    }
 }
 
 }  // namespace delassus
