@@ -130,22 +130,24 @@ public:
         const Team& team = team_of(problem, order);
         const std::vector<RankedSolver>& ranked = team.ranked;
         const std::vector<Member>& members = team.members;
-        // At rest, and where nothing is known of the step, an answer far within the tolerance leaves the next steps
-        // nothing to do, if they change little. Newton's method gets there from any answer with an iteration or two.
+        // Where the start meets the tolerance, as at rest, an answer far within it leaves the next steps nothing to do.
+        // Newton's method gets there with an iteration or two.
         constexpr double at_rest = 1e-6, sharper = 1e-3;
-        const bool sharpens = step && settings.tolerance <= at_rest && std::ranges::any_of(members, &Member::local);
-        const double sharp = sharpens ? sharper * settings.tolerance : settings.tolerance;
-        if (at_start && runner.worst() <= sharp) return runner.error();
-        bool answered = at_start;  // within the tolerance, and to be sharpened
+        const bool sharpens = at_start && settings.tolerance <= at_rest &&
+                              runner.worst() > sharper * settings.tolerance &&
+                              std::ranges::any_of(members, &Member::local);
+        if (at_start && !sharpens) return runner.error();
         Solution start = solution;
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
         std::map<const Solver*, std::size_t> users;  // the member that used it last
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
             const RankedSolver& own = ranked[turn.member];
-            report.near_goal = turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work);
-            if (report.near_goal) return {TurnEnd::Done, runner.worst()};
-            if (answered && !members[turn.member].local) {
+            if (turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
+                report.near_goal = !(runner.worst() <= settings.tolerance);
+                return {TurnEnd::Done, runner.worst()};
+            }
+            if (sharpens && !members[turn.member].local) {
                 left[turn.member] = solution;
                 return {TurnEnd::Exhausted, runner.worst()};
             }
@@ -159,7 +161,7 @@ public:
                         .resume = turn.start == turn.member && users.contains(solver) && users[solver] == turn.member};
             users[solver] = turn.member;
             // What Newton's method gains with its last iteration costs nothing.
-            if (step && (members[turn.member].local || sharpens)) stage.tighter = sharper;
+            if (step && members[turn.member].local) stage.tighter = sharper;
             Solution& iterate = left[turn.member];
             iterate = turn.start ? left[*turn.start] : start;
             TurnResult result = runner.run(*solver, stage, iterate, turn.start || has_start);
@@ -168,15 +170,10 @@ public:
                 has_start = true;
                 result.end = TurnEnd::Retired;
             }
-            if (answered) result.end = TurnEnd::Done;
-            const bool done = result.end == TurnEnd::Done && report.status == Status::Solved;
-            if (done && !answered && result.error > sharp) {
-                answered = true;
-                if (!members[turn.member].local) result.end = TurnEnd::Exhausted;
-            }
+            if (sharpens) result.end = TurnEnd::Done;
             return result;
         });
-        if (answered) report.status = Status::Solved;
+        if (sharpens) report.status = Status::Solved;
         if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
         report.message = fmt::format("{}: {}{}", order.name, runner.sentence(),
                                      end == RoundsEnd::Stale ? "; no solver got nearer in three rounds" : "");
