@@ -363,6 +363,7 @@ private:
             touch(end_ - now_.t, solver, report);
             return;
         }
+        contact_.add_error_of_last(now_, next, errors_);
         contact_.restart();
         pushed_.clear();
         report.newton_iterations += taken.step.newton_iterations;

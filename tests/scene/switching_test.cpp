@@ -264,6 +264,32 @@ TEST_F(Touching, NothingPassesThroughAThinPlate) {
         }
 }
 
+// A falling weight turns a lever. A ball rolls along it, over its end, and flies: until then the lever pushes, and no
+// longer, though flights have no estimate that would show it.
+TEST_F(Touching, ALeverPushesABallNoFurtherThanItsEnd) {
+    const auto thrown = [](double step) {
+        auto run = run_of(fmt::format(
+            "step: {}\nend: 0.8\n{}bodies:\n"
+            "- {{name: lever, mass: 2, inertia: {{xx: 0.0019, yy: 0.167, zz: 0.168}}, position: [0, 0, 0.3], shapes: "
+            "[{{box: {{size: [1, 0.1, 0.04]}}, material: m}}]}}\n"
+            "- {{name: weight, mass: 15, inertia: {{xx: 0.056, yy: 0.056, zz: 0.056}}, position: [-0.4, 0, 0.395]}}\n"
+            "- {{name: ball, mass: 0.3, position: [0.4, 0, 0.36], shapes: [{{sphere: {{radius: 0.04}}, material: "
+            "m}}]}}\n"
+            "joints:\n"
+            "- {{name: h, kind: revolute, second: lever, point: [-0.15, 0, 0.3], axis: [0, 1, 0], lower: -0.9, upper: "
+            "0.9}}\n"
+            "- {{name: w, kind: fixed, first: lever, second: weight, point: [-0.4, 0, 0.32]}}\n",
+            step, material(0.6, 0.0)));
+        run.finish();
+        return run.pose("ball").position;
+    };
+    const Vector3 right = thrown(0.0002);
+    for (const double step : {0.005, 0.0025, 0.002}) {
+        const Vector3 ball = thrown(step);
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(ball[i], right[i], 2e-3) << step;
+    }
+}
+
 // ---- Robustness ----
 
 // Links that lie in the ground by their radius rise at the recovery speed, and nothing flies off.

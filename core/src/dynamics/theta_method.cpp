@@ -197,6 +197,19 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     report.multipliers = multipliers_;
 }
 
+// What pushed until the end, and lets go of everything there, was let go of within the step: h² |a − a₋|/12, as of two
+// steps of one size (PositionError).
+void ThetaMethod::add_error_of_last(const State& end, const State& next, std::vector<double>& error) {
+    const std::vector<double>& last = position_error_.acceleration();
+    const double h = next.t - end.t;
+    if (last.empty() || !(h > 0.0)) return;
+    find_spins(end, h);
+    for (std::size_t i = 0; i < last.size(); ++i) {
+        const double acceleration = (next.v[i] - free_[static_cast<Eigen::Index>(i)]) / h;
+        error[i] += last_h_ * last_h_ * std::abs(acceleration - last[i]) / 12.0;
+    }
+}
+
 /// to.q ← q ∘ exp(part h v_θ) for the velocities v⁺ = `last` at the end; to.v and to.t are those of θ.
 void ThetaMethod::move(const State& begin, double h, const Vector& last, double part, State& to) {
     const Eigen::Map<const Vector> v(begin.v.data(), n_);

@@ -46,6 +46,9 @@ public:
     void restart() override;
     void follow_impacts(bool follow) override { contacts_.follow_impacts(follow); }
     void forces_jumped() override;
+    /// error += what the last step errs by in positions, n, as far as it shows in what another method made of its end:
+    /// it went on to `next` with no contacts.
+    void add_error_of_last(const State& end, const State& next, std::vector<double>& error);
     [[nodiscard]] StepMemory memory() const override;
     void set_memory(StepMemory&& memory) override;
     [[nodiscard]] std::vector<double> save() const override;

@@ -17,9 +17,12 @@ namespace {
 
 // Work is counted in velocities and rows of problems that were solved, and a tenth of them for each iteration of their
 // solver. A box that lands takes some 2000, a hundredth of a second. Each fixed step adds what may be spent on those
-// that err, up to what some landings take.
+// that err, up to what some landings take. While all of that is there, steps are divided until they err by the
+// accuracy; with the share s of it, by 1/s² times as much: as an error of e costs √e, what a step costs is in
+// proportion to what there is. So errors are much alike, and what is left is enough for the largest, however many small
+// ones there are.
 constexpr double work_of_a_step = 300.0, most_saved_work = 3e4, iterations_of_a_solve = 10.0;
-// Nothing is begun that cannot be ended: as a rule a step that errs by e over the accuracy takes √e substeps of three
+// Nothing is begun that cannot be ended: as a rule a step that errs by e times too much takes √e substeps of three
 // solves, twice as many with the trials that are thrown away, and to locate an impact takes so many solves.
 constexpr double solves_of_a_substep = 6.0, solves_of_an_impact = 120.0;
 
@@ -51,12 +54,8 @@ Stepping::Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timeste
     if (settings_.divided)
         control_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.divided, settings_.advice);
     if (control_ || !timestepper_->estimates_error()) settings_.judged.reset();
-    if (settings_.judged && settings_.refines) {
-        refined_ = std::make_unique<AdaptiveStepping>(system, *timestepper_, *settings_.judged);
-        refined_anew_ = refined_->save();
-        timestepper_->choose_steps(HUGE_VAL);
-        work_ = most_saved_work;
-    }
+    settings_.refines = settings_.refines && settings_.judged;
+    work_ = most_saved_work;
 }
 Stepping::~Stepping() = default;
 
@@ -208,7 +207,7 @@ void Stepping::step_fixed(State& state, StepSolver& solver, AdaptiveStepReport& 
         try {
             step_whole(state, solver, report, watch);
             taken = true;
-            if (refined_) refine(state, solver, report, watch);
+            if (settings_.refines) refine(state, solver, report, watch);
         } catch (const StepTooLong& failure) {
             try {
                 step_in_substeps(state, solver, report, watch, failure);
@@ -269,15 +268,16 @@ double Stepping::error_of(const StepReport& report, double h) const {
 }
 
 void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
-    work_ = std::min(work_ + work_of_a_step, most_saved_work);
-    if (!(report.error > 1.0)) return;
-    const double solves = std::min(solves_of_a_substep * std::sqrt(report.error), solves_of_an_impact);
+    work_ = std::clamp(work_ + work_of_a_step, work_of_a_step, most_saved_work);
+    const double looser = std::pow(most_saved_work / work_, 2);
+    if (!(report.error > looser)) return;
+    const double solves = std::min(solves_of_a_substep * std::sqrt(report.error / looser), solves_of_an_impact);
     const double usual = work_of(report.step, solver.effort().iterations) * solves;
     if (usual > work_) return;
     const State whole = state;
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
-    const ChosenSteps chosen(*timestepper_, allowed());
+    const ChosenSteps chosen(*timestepper_, looser * allowed());
     const double end = last_.state.t + report.h;
     if (older_.whole) {
         state = older_.state;
@@ -286,7 +286,7 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
         go_back(state);
     }
     try {
-        take_refined(state, end, solver, report, watch);
+        take_refined(looser, state, end, solver, report, watch);
     } catch (const StepFailure&) {
         work_ -= usual;
         state = whole;
@@ -297,12 +297,16 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
 }
 
 // What is left when the work is used up is one step.
-void Stepping::take_refined(State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
+void Stepping::take_refined(double looser, State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
                             StepWatch* watch) {
-    refined_->load(refined_anew_);
+    StepControl control = *settings_.judged;
+    control.absolute *= looser;
+    control.slow *= looser;
+    AdaptiveStepping refined(system_, *timestepper_, control);
     report.error = 0.0;
     const std::int64_t before = solver.effort().iterations;
-    step_within_error(*refined_, state, end, solver, report, work_);
+    step_within_error(refined, state, end, solver, report, work_);
+    report.error *= looser;
     if (!report.step.solved) throw StepFailure("solves of the substeps missed their tolerance");
     report.refined = true;
     work_ -= work_of(report.step, solver.effort().iterations - before);
@@ -381,7 +385,7 @@ std::vector<double> Stepping::multipliers(const State& state, StepSolver& solver
 SteppingMemory Stepping::save() const {
     SteppingMemory memory{.method = timestepper_->save(), .control = {}, .ahead = {}};
     if (control_) memory.control = control_->save();
-    if (refined_) {
+    if (settings_.refines) {
         memory.control = {work_};
         if (last_.whole) {
             memory.control.push_back(last_.state.t);
@@ -396,7 +400,7 @@ SteppingMemory Stepping::save() const {
 void Stepping::load(const SteppingMemory& memory, const State& state) {
     timestepper_->load(memory.method);
     if (control_) control_->load(memory.control);
-    if (refined_) {
+    if (settings_.refines) {
         const auto& control = memory.control;
         const std::size_t of_state = 2 + state.q.size() + state.v.size();
         if (control.size() != 1 && control.size() < of_state)
@@ -442,7 +446,7 @@ void Stepping::describe(const AdaptiveStepReport& taken, const SolverEffort& eff
 
 void Stepping::keep_control_of(const Stepping& other) {
     if (control_ && other.control_) control_->load(other.control_->save());
-    if (refined_ && other.refined_) work_ = other.work_;
+    if (settings_.refines && other.settings_.refines) work_ = other.work_;
 }
 
 }  // namespace delassus

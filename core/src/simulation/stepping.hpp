@@ -108,7 +108,8 @@ private:
     /// What a step of size h errs by, over what is allowed; NaN where it is not known.
     [[nodiscard]] double error_of(const StepReport& report, double h) const;
     void refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
-    void take_refined(State& state, double end, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    void take_refined(double looser, State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
+                      StepWatch* watch);
     static void judge(const State& state, const AdaptiveStepReport& report, StepWatch& watch);
     void step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
     void show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
@@ -120,9 +121,7 @@ private:
     std::unique_ptr<Timestepper> timestepper_;
     std::unique_ptr<ImpactCuts> cuts_;           // or empty
     std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the substeps of fixed ones; or empty
-    std::unique_ptr<AdaptiveStepping> refined_;  // of the substeps of those that err by too much; or empty
-    std::vector<double> refined_anew_;           // its memory before any
-    double work_ = 0.0;                          // that may be spent on them now
+    double work_ = 0.0;                          // that may be spent now on fixed steps that err by too much
     std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
     /// Where a step began.
     struct Beginning {
