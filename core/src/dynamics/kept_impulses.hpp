@@ -13,7 +13,7 @@ namespace delassus {
 
 /// What acted in each unilateral block of the last step, found again by the block's key: the start of the next solve.
 /// The impulse of a contact is kept as a vector in space, since the tangents of its rows may turn. A jolted block got
-/// part of it from impacts: over the size of the step it is no force.
+/// part of its impulse from impacts or corrections of gaps: over the size of the step it is no force.
 class DELASSUS_API KeptImpulses {
 public:
     void clear();

@@ -321,6 +321,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     coulomb_ = coulomb;
     settled_ = true;
     held_through_bounces_ = false;
+    struck_.clear();
     contacts_.clear();
     compliances_.clear();
     kept_.begin_walk();

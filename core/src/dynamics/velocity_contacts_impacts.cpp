@@ -283,7 +283,6 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
 // Joints pass what strikes one of their bodies on to the others.
 void VelocityContacts::find_struck(Problem& problem, double last_h) {
     const auto& D = problem.D;
-    struck_.clear();
     const auto for_each_column = [&](const Contact& contact, const auto& act) {
         for_each_entry(D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) { act(column); });
     };
