@@ -12,11 +12,6 @@ using sdk::SparseRows;
 
 namespace {
 
-std::unique_ptr<Cholesky> new_factor() {
-    return std::make_unique<Cholesky>(Cholesky::Kind::Definite, delassus_cholmod::Ordering::Automatic,
-                                      delassus_cholmod::Method::Automatic);
-}
-
 /// matrix with all of its diagonal in the pattern.
 SparseColumns with_diagonal(const SparseColumns& matrix) {
     SparseColumns identity(matrix.rows(), matrix.cols());
@@ -67,7 +62,6 @@ void Resolvent::load_matrices(const sdk::ProblemView& problem, const RowScaling&
 
 // The dual form is taken where even a dense factor of N is no larger than that of the primal matrix.
 void Resolvent::choose_form(const sdk::ProblemView& problem, const RowScaling& scaling) {
-    factor_ = new_factor();
     compliance_factor_.reset();
     form_ = problem.n == 0 ? Form::Dual : scaling.definite() ? wanted_ : Form::Primal;
     if (form_ != Form::Automatic) return;
@@ -78,8 +72,8 @@ void Resolvent::choose_form(const sdk::ProblemView& problem, const RowScaling& s
     // H + ρDᵀD has H's pattern and more: where the factor of H, whose analysis outlives changes of D, is large enough,
     // nothing else is analysed.
     if (of_N > static_cast<double>(scaling.N().inverse().factor_entries())) {
-        factor_->analyze(SparseColumns(H_ + SparseColumns(D_.transpose() * D_)));
-        if (of_N > factor_->entries()) return;
+        factor_.analyze(SparseColumns(H_ + SparseColumns(D_.transpose() * D_)));
+        if (of_N > factor_.entries()) return;
     }
     form_ = Form::Dual;
 }
@@ -88,13 +82,13 @@ void Resolvent::set_penalty(double penalty) {
     if (penalty == penalty_) return;
     const SparseColumns matrix = primal() ? primal_matrix(penalty) : dual_matrix(penalty);
     if (pattern_is_new_) {
-        factor_->analyze(matrix);
+        factor_.analyze(matrix);
         pattern_is_new_ = false;
         ++analyses_;
     }
     ++factorizations_;
     penalty_ = 0.0;
-    if (!factor_->factorize(matrix))
+    if (!factor_.factorize(matrix))
         throw sdk::NumericalFailure(
             primal() ? "the Cholesky factorisation of H + ρDᵀD failed: H is singular in a direction "
                        "that no row of D holds, or the values span too many decades"
@@ -107,7 +101,8 @@ SparseColumns Resolvent::primal_matrix(double penalty) {
         SparseColumns inverse_of_V = E_;
         add_to_diagonal(inverse_of_V, 1.0 / penalty);
         if (pattern_is_new_) {
-            compliance_factor_ = new_factor();
+            compliance_factor_ = std::make_unique<Cholesky>(
+                Cholesky::Kind::Definite, delassus_cholmod::Ordering::Automatic, delassus_cholmod::Method::Automatic);
             compliance_factor_->analyze(inverse_of_V);
         }
         if (!compliance_factor_->factorize(inverse_of_V))
@@ -159,14 +154,14 @@ void Resolvent::apply(const sdk::Vector& w, sdk::Vector& mu, sdk::Vector& u) {
         padded_.head(a_.size()) = a_;
         rows_.transpose_multiply_add(work_.data(), padded_.data());
         x_ = padded_.head(a_.size());
-        factor_->solve(x_);
+        factor_.solve(x_);
         padded_.head(a_.size()) = x_;
         work_.setZero();
         rows_.multiply_add(padded_.data(), work_.data());
         mu -= work_;
         apply_V(mu);
     } else {
-        factor_->solve(mu);
+        factor_.solve(mu);
     }
     u = (w - mu) / penalty_;
 }

@@ -6,6 +6,7 @@
 
 #include "cholesky.hpp"
 #include "delassus/sdk/block_rows.hpp"
+#include "factor.hpp"
 #include "row_scaling.hpp"
 
 namespace delassus::admm {
@@ -62,7 +63,8 @@ private:
     sdk::BlockRows rows_;         // D̂; primal only
     sdk::Vector x_, work_;
     sdk::Vector padded_;  // x with the padding of BlockRows
-    std::unique_ptr<delassus_cholmod::Cholesky> factor_, compliance_factor_;
+    Factor factor_;
+    std::unique_ptr<delassus_cholmod::Cholesky> compliance_factor_;
     std::int64_t analyses_ = 0, factorizations_ = 0;
 };
 
