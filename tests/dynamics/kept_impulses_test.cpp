@@ -60,13 +60,13 @@ TEST(KeptImpulses, BlocksAreFoundByTheirKeysInAnyOrder) {
         one->begin_walk();
         double value = -1.0;
         const KeptImpulses::Start first = one->start(blocks[0], nullptr, {&value, 1});
-        EXPECT_TRUE(first.pushed && !first.jolted);
+        EXPECT_TRUE(first.pushed && !first.impulsive);
         EXPECT_EQ(value, 9.0);
         EXPECT_FALSE(one->start(blocks[1], nullptr, {&value, 1}).pushed);  // a key before the last one asked for
         EXPECT_EQ(value, 0.0);
         std::array<double, 3> three{};
         const KeptImpulses::Start contact = one->start(blocks[2], contacts.data(), three);
-        EXPECT_TRUE(contact.pushed && contact.jolted);
+        EXPECT_TRUE(contact.pushed && contact.impulsive);
         EXPECT_NEAR(three[1], 1.0, 1e-15);
         // Unknown, or known with other rows: nothing.
         EXPECT_FALSE(one->start(contact_block(9), contacts.data(), three).pushed);

@@ -34,11 +34,11 @@ KeptImpulses::Start KeptImpulses::start(const UnilateralRows::Block& block, cons
     } else {
         std::copy_n(impulse, rows, lambda.data());
     }
-    return {.pushed = lambda[0] > 0.0, .jolted = entries_[next_].jolted};
+    return {.pushed = lambda[0] > 0.0, .impulsive = entries_[next_].impulsive};
 }
 
 void KeptImpulses::keep(std::span<const UnilateralRows::Block> blocks, std::span<const ContactPoint> contacts,
-                        std::span<const double> lambda, std::span<const char> jolted) {
+                        std::span<const double> lambda, std::span<const char> impulsive) {
     impulses_.assign(lambda.begin(), lambda.end());
     entries_.clear();
     const std::size_t first_contact = blocks.size() - contacts.size();
@@ -49,7 +49,7 @@ void KeptImpulses::keep(std::span<const UnilateralRows::Block> blocks, std::span
             Eigen::Map<Eigen::Vector3d> impulse(impulses_.data() + row);
             impulse = (contact_frame(Eigen::Vector3d(contacts[k - first_contact].normal.data())) * impulse).eval();
         }
-        entries_.push_back({blocks[k].key, row, rows, !jolted.empty() && jolted[k] != 0});
+        entries_.push_back({blocks[k].key, row, rows, !impulsive.empty() && impulsive[k] != 0});
         row += rows;
     }
     sort();
@@ -71,9 +71,9 @@ void KeptImpulses::drop_zeros() {
 }
 
 void KeptImpulses::append_to(std::vector<double>& memory) const {
-    for (const auto& [key, first, rows, jolted] : entries_) {
+    for (const auto& [key, first, rows, impulsive] : entries_) {
         memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),
-                                     jolted ? 1.0 : 0.0, static_cast<double>(rows)});
+                                     impulsive ? 1.0 : 0.0, static_cast<double>(rows)});
         memory.insert(memory.end(), impulses_.begin() + first, impulses_.begin() + first + rows);
     }
 }

@@ -12,8 +12,8 @@
 namespace delassus {
 
 /// What acted in each unilateral block of the last step, found again by the block's key: the start of the next solve.
-/// The impulse of a contact is kept as a vector in space, since the tangents of its rows may turn. A jolted block got
-/// part of its impulse from impacts or corrections of gaps: over the size of the step it is no force.
+/// The impulse of a contact is kept as a vector in space, since the tangents of its rows may turn. An impulsive block
+/// got part of its impulse from impacts or corrections of gaps: over the size of the step it is no force.
 class DELASSUS_API KeptImpulses {
 public:
     void clear();
@@ -23,18 +23,18 @@ public:
     void begin_walk() { next_ = 0; }
     struct Start {
         bool pushed = false;  ///< the first row of the block had a positive impulse
-        bool jolted = false;
+        bool impulsive = false;
     };
     /// lambda ← the block's impulse of the last step, in the block's rows; 0 where there was none. contact: the block's
     /// contact, or null.
     Start start(const UnilateralRows::Block& block, const ContactPoint* contact, std::span<double> lambda);
 
-    /// Keeps the impulses of these blocks. contacts: of the last blocks; lambda: of the blocks' rows; jolted: whether
-    /// each is, or empty: none.
+    /// Keeps the impulses of these blocks. contacts: of the last blocks; lambda: of the blocks' rows; impulsive:
+    /// whether each is, or empty: none.
     void keep(std::span<const UnilateralRows::Block> blocks, std::span<const ContactPoint> contacts,
-              std::span<const double> lambda, std::span<const char> jolted = {});
+              std::span<const double> lambda, std::span<const char> impulsive = {});
 
-    /// For checkpoints: of each block its key in two halves, which a double holds exactly, 1 if it is jolted, its
+    /// For checkpoints: of each block its key in two halves, which a double holds exactly, 1 if it is impulsive, its
     /// number of rows and its impulses.
     void append_to(std::vector<double>& memory) const;
     /// Forgets the blocks without an impulse: a start without one is the same as one that is not found.
@@ -46,7 +46,7 @@ private:
     struct Entry {
         std::uint64_t key;
         std::int32_t first, rows;  ///< in impulses_
-        bool jolted;
+        bool impulsive;
     };
     void sort();
 

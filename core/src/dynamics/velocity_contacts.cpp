@@ -343,9 +343,9 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.row = row;
         contact.along_normal = block.along_normal();
         const ContactPoint* point = k < first_contact ? nullptr : &rows_.contacts()[k - first_contact];
-        const auto [pushed, jolted] = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
+        const auto [pushed, impulsive] = kept_.start(block, point, {lambda.data() + first_row_ + row, size});
         contact.pushed = pushed;
-        contact.jolted = jolted;
+        contact.impulsive = impulsive;
         if ((pushed && contact.along_normal) || is_between_bounds(k))
             std::copy_n(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_ + row), std::min<std::size_t>(size, 3),
                         contact.last.begin());
@@ -609,7 +609,7 @@ bool VelocityContacts::landed(const Solution& solution) const {
 // g/h where it was slower at first. Gaps are reported as they were at the beginning of the step.
 void VelocityContacts::finish(const Problem& problem, const Solution& solution, StepReport& report) {
     const std::vector<double>& lambda = solution.lambda;
-    find_jolted(problem, solution);
+    find_impulsive(problem, solution);
     report.unilateral_blocks = static_cast<std::int32_t>(contacts_.size());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
@@ -647,7 +647,7 @@ void VelocityContacts::finish(const Problem& problem, const Solution& solution, 
             std::fill_n(ended_.begin() + static_cast<std::ptrdiff_t>(contact.row), rows_.blocks()[k].cone.rows, 0.0);
         }
     }
-    kept_.keep(rows_.blocks(), rows_.contacts(), ended_, jolted_);
+    kept_.keep(rows_.blocks(), rows_.contacts(), ended_, impulsive_);
     const std::size_t first_contact = contacts_.size() - rows_.contacts().size();
     for (std::size_t k = 0; k < rows_.contacts().size(); ++k) {
         // Of a contact that nobody knew at the beginning the gap follows from its speed: it was no deeper than the

@@ -195,7 +195,7 @@ private:
         double row_error = 0.0;             ///< of its rows then, as a share of their size
         double struck = HUGE_VAL;           ///< when an impact first strikes one of its bodies, if it has none itself
         std::array<double, 3> last{};       ///< its impulse in the step before, where it pushed
-        bool jolted = false;                ///< that is not of forces alone
+        bool impulsive = false;             ///< that is not of forces alone
         double goes_on = 0.0;               ///< after that impact, if all went on: of `last`
         bool rubs_on = false;               ///< its friction goes on through the impact
         std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
@@ -245,8 +245,8 @@ private:
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
     void find_struck(Problem& problem, double last_h);
-    /// jolted_ ← which contacts got their impulse from more than forces.
-    void find_jolted(const Problem& problem, const Solution& solution);
+    /// impulsive_ ← which contacts got their impulse from more than forces.
+    void find_impulsive(const Problem& problem, const Solution& solution);
     /// friction_reach_ ← by what the friction of all contacts can change each velocity, as large as it was in the step
     /// before.
     void find_friction_reach(const Problem& problem);
@@ -279,8 +279,8 @@ private:
     std::vector<std::size_t> found_;  // velocities
     std::vector<double> ended_;       // of the rows at the end of the step: what acts on
     std::vector<double> struck_;      // of each velocity, when an impact first changes it; empty where there is none
-    std::vector<double> jolts_;       // by what jolted contacts change each velocity, by the diagonal of H
-    std::vector<char> jolted_;        // of each block
+    std::vector<double> impulsive_changes_;  // by what impulsive contacts change each velocity, by the diagonal of H
+    std::vector<char> impulsive_;            // of each block
     KeptImpulses kept_;
     const double* begin_speeds_ = nullptr;  // of the step; until its end
     const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on

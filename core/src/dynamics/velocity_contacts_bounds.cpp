@@ -86,7 +86,7 @@ void VelocityContacts::time_turns(Problem& problem, std::span<const double> slid
             (before > 0.0 ? cone.hi : cone.lo)[0] -= share * (before > 0.0 ? 1.0 : -1.0) * (cone.hi[0] - cone.lo[0]);
             continue;
         }
-        const bool stays = contact.pushed && !contact.jolted && contact.was_there && !contact.impact &&
+        const bool stays = contact.pushed && !contact.impulsive && contact.was_there && !contact.impact &&
                            !(contact.known[0] > 0.0) && last_h > 0.0;
         if (cone.kind != ConeKind::Friction || !stays) continue;
         const auto axes = static_cast<std::size_t>(cone.rows) - 1;

@@ -267,9 +267,9 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
 // than u⁻: where the contact opens at first, its work P (u⁻ + u⁺)/2 would gain energy.
 //
 // One that pushed goes on as it did until τ, whether the impact opens it or not: with the impulse P₋ of the step
-// before, of size h₋, the impulse τ P₋/h₋ is known, unless impacts had a part in P₋ (find_jolted()). A block that rocks
-// from one edge to the other stands on the first one until then; with P = 0 there, as u⁺ > 0 asks for, the second would
-// carry it for the whole step, which takes h g b/k² of its rotation at each impact.
+// before, of size h₋, the impulse τ P₋/h₋ is known, unless impacts had a part in P₋ (find_impulsive()). A block that
+// rocks from one edge to the other stands on the first one until then; with P = 0 there, as u⁺ > 0 asks for, the second
+// would carry it for the whole step, which takes h g b/k² of its rotation at each impact.
 //
 // A force between bounds acts until τ as its speed u⁻ says, or where that is 0, as in the step before. From then on it
 // has the rest of the step: its bounds are those of h − τ.
@@ -324,7 +324,7 @@ void VelocityContacts::find_struck(Problem& problem, double last_h) {
         }
         if (between_bounds) {
             hold_until_struck(problem, k, last_h, sliding, leaves);
-        } else if (contact.jolted || last_h < short_share * h_) {
+        } else if (contact.impulsive || last_h < short_share * h_) {
             continue;
         }
         for (std::size_t i = 0; i < contact.known.size(); ++i)
@@ -508,14 +508,14 @@ double VelocityContacts::speed_at_end(const Problem& problem, std::size_t row, s
 // Of the impulse of a contact, less is of forces than it says if it changes the speed of its row, as where it strikes
 // or corrects a gap, or if other such impulses press on it, which with D_n diag(H)⁻¹ Σ Dᵀ P would close it. Joints of
 // struck bodies pass on what they hold.
-void VelocityContacts::find_jolted(const Problem& problem, const Solution& solution) {
+void VelocityContacts::find_impulsive(const Problem& problem, const Solution& solution) {
     constexpr double faint = 0.05;  // of what the impulse of the contact changes
     const auto& D = problem.D;
-    jolted_.assign(contacts_.size(), 0);
-    jolts_.assign(static_cast<std::size_t>(D.columns), 0.0);
+    impulsive_.assign(contacts_.size(), 0);
+    impulsive_changes_.assign(static_cast<std::size_t>(D.columns), 0.0);
     const auto add = [&](std::size_t first, std::size_t rows) {
         for_each_entry(D, first, rows, [&](std::size_t row, std::size_t column, double value) {
-            jolts_[column] += value * solution.lambda[row] / diagonal_[column];
+            impulsive_changes_[column] += value * solution.lambda[row] / diagonal_[column];
         });
     };
     if (!struck_.empty())
@@ -531,13 +531,14 @@ void VelocityContacts::find_jolted(const Problem& problem, const Solution& solut
         for (std::size_t k = 0; k < contacts_.size(); ++k) {
             const Contact& contact = contacts_[k];
             const std::size_t first = first_row_ + contact.row;
-            if (!contact.along_normal || jolted_[k] != 0 || !(solution.lambda[first] > 0.0)) continue;
-            double jolt = 0.0;
-            for_each_entry(D, first, 1,
-                           [&](std::size_t, std::size_t column, double value) { jolt += value * jolts_[column]; });
-            jolt = std::max(std::abs(jolt), std::abs(contact.end_speed + contact.approach));
-            if (!contact.impact && !(jolt > faint * contact.change)) continue;
-            jolted_[k] = any = true;
+            if (!contact.along_normal || impulsive_[k] != 0 || !(solution.lambda[first] > 0.0)) continue;
+            double pressed = 0.0;
+            for_each_entry(D, first, 1, [&](std::size_t, std::size_t column, double value) {
+                pressed += value * impulsive_changes_[column];
+            });
+            pressed = std::max(std::abs(pressed), std::abs(contact.end_speed + contact.approach));
+            if (!contact.impact && !(pressed > faint * contact.change)) continue;
+            impulsive_[k] = any = true;
             add(first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows));
         }
     }

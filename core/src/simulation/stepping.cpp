@@ -26,10 +26,10 @@ constexpr double work_of_a_step = 300.0, most_saved_work = 3e4, iterations_of_a_
 // solves, twice as many with the trials that are thrown away, and to locate an impact takes so many solves.
 constexpr double solves_of_a_substep = 6.0, solves_of_an_impact = 120.0;
 
-/// A method whose steps follow from a tolerance for a while.
+/// A method whose steps follow from a tolerance until its end: AdaptiveStepping says from which.
 class ChosenSteps {
 public:
-    ChosenSteps(Timestepper& stepper, double tolerance) : stepper_(stepper) { stepper.choose_steps(tolerance); }
+    explicit ChosenSteps(Timestepper& stepper) : stepper_(stepper) {}
     ~ChosenSteps() { stepper_.choose_steps(HUGE_VAL); }
     ChosenSteps(const ChosenSteps&) = delete;
     ChosenSteps& operator=(const ChosenSteps&) = delete;
@@ -277,7 +277,7 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     const State whole = state;
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
-    const ChosenSteps chosen(*timestepper_, looser * allowed());
+    const ChosenSteps chosen(*timestepper_);
     const double end = last_.state.t + report.h;
     if (older_.whole) {
         state = older_.state;
