@@ -150,7 +150,10 @@ private:
         while (now_.t < end_) {
             const double rest = end_ - now_.t;
             look(now_, rest);
-            if (impacts_ > most_impacts || touches(rest)) {
+            if (impacts_ <= most_impacts && meets(rest)) {
+                ++impacts_;
+                touch(std::min(impact_share * h_, rest), solver, report);
+            } else if (impacts_ > most_impacts || touches(rest)) {
                 touch(rest, solver, report);
             } else {
                 fly(solver, report);
@@ -293,6 +296,15 @@ private:
         return std::binary_search(keys.begin(), keys.end(), key);
     }
 
+    /// Whether a closed gap in rows_ closes faster than by weight: an impact, now.
+    [[nodiscard]] bool meets(double rest) const {
+        bool found = false;
+        for_each_gap([&](const UnilateralRows::Block& block, double gap) {
+            found = found || (std::abs(gap) <= resolution_ && block.speed < -std::max(fall_ * rest, resolution_ / rest));
+        });
+        return found;
+    }
+
     /// Whether something in rows_ acts for the rest of the step.
     [[nodiscard]] bool touches(double rest) const {
         const auto& blocks = rows_.blocks();
@@ -380,7 +392,8 @@ private:
         locate(next.t - now_.t, since, solver, report);
         ++impacts_;
         const double left = end_ - now_.t, impact = impact_share * h_;
-        touch(left <= least_rest * h_ ? left : impact, solver, report);
+        // One at the end of the step is the next one's.
+        if (left > 0.0) touch(left <= least_rest * h_ ? left : impact, solver, report);
     }
 
     void restart_flight() {

@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 #include "delassus/error.hpp"
 #include "delassus/generate.hpp"
+#include "delassus/timestepper.hpp"
 #include "support/small_problems.hpp"
 
 namespace delassus::step_solver_test {
@@ -213,6 +215,23 @@ TEST_F(StepSolverTest, SaysWhatItDidNotSolve) {
     EXPECT_NE(solver.effort().unsolved.find("iteration_limit"), std::string::npos) << solver.effort().unsolved;
     solver.reset_effort();
     EXPECT_TRUE(solver.effort().unsolved.empty());
+}
+
+// A trial may lead to where masses or constraints are no numbers: a failure of the step, which a shorter one may pass.
+TEST_F(StepSolverTest, WhatIsNotFiniteIsAFailureOfTheStep) {
+    StepSolver solver(registry, config("auto"));
+    Solution solution;
+    Problem good = circulating(3, 4.0), bad = good;
+    bad.H.value[1] = std::nan("");
+    for (int twice = 0; twice < 2; ++twice) {
+        try {
+            (void)solver.solve(bad, solution);
+            ADD_FAILURE() << "an entry is no number";
+        } catch (const StepFailure& error) {
+            EXPECT_NE(std::string(error.what()).find("H(0, 1)"), std::string::npos) << error.what();
+        }
+        EXPECT_TRUE(solver.solve(good, solution).solved);
+    }
 }
 
 }  // namespace

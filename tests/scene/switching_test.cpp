@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -377,6 +378,59 @@ TEST_F(Touching, ARunGoesOnWithTheSameBits) {
     EXPECT_GT(whole.simulation.totals().most_contacts, 0);
     EXPECT_EQ(resumed.simulation.save().state.q, whole.simulation.save().state.q);
     EXPECT_EQ(resumed.simulation.save().stepping.method, whole.simulation.save().stepping.method);
+}
+
+// ---- What joints hold against the ground ----
+
+// The roller lies on the ground, and joints hold it there: rounding of its gaps contradicts rounding of its joints. The
+// die next to it lands, so that positions are corrected. Turned by an odd angle, since axes along the world have none.
+TEST_F(Touching, WhatJointsHoldOnTheGroundStaysThere) {
+    const Eigen::Quaterniond turn = Eigen::Quaterniond(0.62, 0.31, -0.47, 0.55).normalized();
+    const auto turned = [&](double x, double y, double z) {
+        const Eigen::Vector3d at = turn * Eigen::Vector3d(x, y, z);
+        return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", at.x(), at.y(), at.z());
+    };
+    const auto orientation = [&](const Eigen::Quaterniond& of) {
+        const Eigen::Quaterniond q = turn * of;
+        return fmt::format("[{:.17g}, {:.17g}, {:.17g}, {:.17g}]", q.w(), q.x(), q.y(), q.z());
+    };
+    const Eigen::Quaterniond straight = Eigen::Quaterniond::Identity(),
+                             lying(Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitX()));
+    auto run = run_of(fmt::format(
+        "step: 0.01\nend: 0.3\ngravity: {}\nintegrator: switching\nmaterials: {{m: {{friction: 0.5}}}}\nbodies:\n"
+        "- {{name: ground, fixed: true, orientation: {}, shapes: [{{plane: {{}}, material: m}}]}}\n"
+        "- {{name: roller, mass: 50, inertia: {{xx: 0.27, yy: 0.14, zz: 0.2}}, position: {}, orientation: {}, shapes: "
+        "[{{capsule: {{radius: 0.1, length: 0.2}}, material: m}}]}}\n"
+        "- {{name: die, density: 7800, position: {}, orientation: {}, velocity: {}, angular_velocity: [-0.44, 0.4, "
+        "-0.05], shapes: [{{box: {{size: [0.1, 0.1, 0.1]}}, material: m}}]}}\n"
+        "joints:\n"
+        "- {{name: rail, kind: cylindrical, second: roller, point: {}, axis: {}}}\n"
+        "- {{name: stop, kind: planar, second: roller, point: {}, axis: {}}}\n",
+        turned(0, 0, -9.81), orientation(straight), turned(0.2, 0, 0.1), orientation(lying), turned(1.45, 0, 0.05),
+        orientation(straight), turned(2.2, -1.2, -3.8), turned(-0.3, 0, 0.1), turned(0, 1, 0),
+        turned(0.84, 0.37, -0.16), turned(-1, 0, 0)));
+    ASSERT_NO_THROW(run.finish());
+    const auto at = run.pose("roller").position;
+    EXPECT_LT((Eigen::Vector3d(at[0], at[1], at[2]) - turn * Eigen::Vector3d(0.2, 0, 0.1)).norm(), 1e-9);
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+}
+
+// A leaf on a pin below the ground begins to fall over while it stands on the ground, which stops it at once: in one
+// step, whose rows of the pin are not those of a motion that does not come about.
+TEST_F(Touching, WhatMeetsAtTheBeginningOfAStepIsStoppedThere) {
+    auto run =
+        run_of("step: 0.01\nend: 0.3\ncoordinates: maximal\nintegrator: switching\n" + material(0.1, 0.0) +
+               "bodies:\n" + ground +
+               "- {name: leaf, mass: 2, inertia: {xx: 0.0187, yy: 0.0151, zz: 0.0039}, position: [0.01, 0, 0.15], "
+               "orientation: "
+               "{axis: [0, 0, 1], angle: 147}, velocity: [-4, 0, 0], shapes: [{box: {size: [0.03, 0.15, 0.3]}, "
+               "material: m}]}\n"
+               "joints:\n- {name: pin, kind: revolute, second: leaf, point: [0.01, 0, -0.35], axis: [0, -1, 0]}\n");
+    run.finish();
+    EXPECT_EQ(run.simulation.totals().divided_steps, 0);
+    EXPECT_EQ(run.simulation.totals().unsolved_steps, 0);
+    EXPECT_NEAR(run.pose("leaf").position[0], 0.01, 1e-6);
+    EXPECT_NEAR(run.pose("leaf").position[2], 0.15, 1e-6);
 }
 
 }  // namespace

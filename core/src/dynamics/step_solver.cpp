@@ -19,6 +19,7 @@
 #include "dynamics/island_solver.hpp"
 #include "dynamics/islands.hpp"
 #include "dynamics/shared_steps.hpp"
+#include "problem/validate.hpp"
 #include "solver/auto_solver.hpp"
 
 namespace delassus {
@@ -292,13 +293,18 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
                                             std::span<const std::int32_t> columns,
                                             const std::shared_ptr<ThreadTeam>& threads, IslandResult& result) {
     KeptPart& kept = part(kind, number);
-    if (!kept.prepared) {
-        kept.prepared.emplace(std::move(problem), also_needs);
-        problem = {};
-        kept.prepared->use(threads ? threads->team() : sdk::Team());
-    } else {
-        kept.prepared->use(threads ? threads->team() : sdk::Team());
-        kept.prepared->renew(std::move(problem));
+    const sdk::Team team = threads ? threads->team() : sdk::Team();
+    try {
+        if (kept.prepared) {
+            kept.prepared->use(team);
+            kept.prepared->renew(std::move(problem));
+        } else {
+            kept.prepared.emplace(std::move(problem), also_needs);
+            kept.prepared->use(team);
+            problem = {};
+        }
+    } catch (const NotFinite& error) {  // a trial that went beyond what numbers hold, where a shorter step may not
+        throw StepFailure(fmt::format("forces or constraints are not finite: {}", error.what()));
     }
     const PreparedProblem& prepared = *kept.prepared;
     if (settings.cancelled && settings.cancelled()) throw StepInterrupted("the step was interrupted");

@@ -672,12 +672,13 @@ void ThetaMethod::judge_constraints(const State& begin, double h) {
             way += h * std::abs(D.value[static_cast<std::size_t>(e)]) *
                    std::max(std::abs(begin.v[column]), std::abs(end_.v[column]));
         }
-        if (off <= settings_.linearization_limit * way) continue;
+        const double allowed = settings_.linearization_limit * way;
+        if (off <= allowed) continue;
         throw StepTooLong(fmt::format(
-            "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, which is "
-            "{:.2g} of the way of what it holds, where linearization_limit is {:.2g}; take shorter steps, or a method "
+            "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, where "
+            "linearization_limit, {:.2g}, times the way of what it holds is {:.2g}; take shorter steps, or a method "
             "that iterates (euler_implicit, hht)",
-            settings_.name, begin.t, h, off, off / way, settings_.linearization_limit));
+            settings_.name, begin.t, h, off, settings_.linearization_limit, allowed));
     }
 }
 

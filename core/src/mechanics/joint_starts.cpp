@@ -9,19 +9,16 @@
 #include "mechanics/multibody_implementation.hpp"
 
 namespace delassus {
-namespace {
 
-bool starts(const JointCoordinate& coordinate) {
-    return coordinate.start || coordinate.start_rate;
+bool mechanics::has_start(const JointParameters& joint) {
+    return joint.slide.start || joint.slide.start_rate || joint.turn.start || joint.turn.start_rate;
 }
-
-}  // namespace
 
 State mechanics::with_joint_starts(const MultibodySystem& system, const State& drawn, const State& given,
                                    double share) {
     std::vector<std::int32_t> joints;
     for (std::int32_t k = 0; k < system.joint_count(); ++k)
-        if (starts(system.joint(k).slide) || starts(system.joint(k).turn)) joints.push_back(k);
+        if (has_start(system.joint(k))) joints.push_back(k);
     if (joints.empty()) return given;
     if (system.node_count() > 0)
         throw InputError(fmt::format(

@@ -95,12 +95,13 @@ void KinematicTree::choose_joints(const MultibodySystem& system) {
         for (const BodyIndex end : {joint.first, joint.second}) joints_of[place(end)].push_back(k);
     }
     link_of_.assign(bodies, 0);
-    // Joints that only trees take, with an armature or at a massless body, go before all others.
+    // Joints that only trees take, with an armature or at a massless body, go before all others; of equal ones those
+    // with a start, since trees place bodies by it.
     const auto massless = [&](BodyIndex body) { return body != world_body && system.body(body).massless; };
     const auto rank = [&](const JointParameters& joint) {
         const bool needed =
             joint.slide.armature > 0.0 || joint.turn.armature > 0.0 || massless(joint.first) || massless(joint.second);
-        return rows_saved(joint.kind) + (needed ? 6 : 0);
+        return 2 * (rows_saved(joint.kind) + (needed ? 6 : 0)) + (has_start(joint) ? 1 : 0);
     };
     using Candidate = std::tuple<int, std::int32_t>;  // rank, −joint: the largest is taken first
     std::priority_queue<Candidate> candidates;

@@ -167,6 +167,9 @@ private:
     std::vector<Composite> composite_;
 };
 
+/// Whether a joint has a `start` or a `start_rate`.
+[[nodiscard]] bool has_start(const JointParameters& joint);
+
 /// The given state with the joints of trees at this share of their `start`, and all rates as they are in `drawn` or as
 /// `start_rate` says; itself where no joint has any. Throws InputError for systems with nodes.
 [[nodiscard]] State with_joint_starts(const MultibodySystem& system, const State& drawn, const State& given,

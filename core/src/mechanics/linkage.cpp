@@ -485,6 +485,10 @@ Linkage::Residual Linkage::assemble_velocities(State& state, const std::vector<s
     return rate_residual(state, rows);
 }
 
+void Linkage::fit_velocities(State& state) const {
+    if (!is_rounding_of_rates(rate_residual(state, scleronomic_))) assemble_velocities(state, scleronomic_, true);
+}
+
 // ---- Rows that others imply ----
 //
 // Rows are redundant if they depend on others in every configuration that the mechanism can take. At a dead centre, or

@@ -71,6 +71,7 @@ public:
     /// `start_rate`.
     [[nodiscard]] const std::vector<std::size_t>& starts() const { return starts_; }
     [[nodiscard]] const std::vector<std::size_t>& start_rates() const { return start_rates_; }
+    [[nodiscard]] bool has_starts() const { return !(starts_.empty() && start_rates_.empty()); }
     /// In how many parts joints go to their starts, so that loops stay nearly closed on the way; 1 without loops.
     [[nodiscard]] int parts_of_starts() const;
     /// From now on starts() lead to this share of the starts.
@@ -84,6 +85,8 @@ public:
     /// state ← the nearest velocities, in the mass metric, at which the rates of these rows vanish. zeros_follow:
     /// those of mass centres and of turning that are 0 change before the others.
     Residual assemble_velocities(State& state, const std::vector<std::size_t>& rows, bool zeros_follow) const;
+    /// state ← such velocities for the joints, without motors and starts, as far as there are any.
+    void fit_velocities(State& state) const;
 
     /// Independent rows that imply the others, ascending, at a state at which the scleronomic rows hold. All rows if
     /// those of the linkage are independent in general, or too many to tell.

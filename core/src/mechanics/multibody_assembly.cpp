@@ -111,7 +111,12 @@ void MultibodySystem::Implementation::assemble(const Linkage& linkage, const Sta
                             state.t, linkage.owner_of(left.row), left.share));
     }
     // What follows a start of a loop is where it was asked to be.
-    if (at_start && linkage.has_loops() && !(linkage.starts().empty() && linkage.start_rates().empty())) return;
+    if (at_start && linkage.has_loops() && linkage.has_starts()) return;
+    note_changes(linkage, given, state, done);
+}
+
+void MultibodySystem::Implementation::note_changes(const Linkage& linkage, const State& given, const State& state,
+                                                   Assembly& done) {
     const auto moved = linkage.displacement(given, state), faster = linkage.velocity_change(given, state);
     const auto before = linkage.speed(given), after = linkage.speed(state);
     done.displacement = std::max(done.displacement, moved.linear);
@@ -149,8 +154,17 @@ const Assembly& MultibodySystem::assemble() {
         return *self.assembly;
     }
     auto linkages = Linkage::of(self.bodies, self.joints, self.initial_placements());
-    const State drawn = initial_state();
+    State drawn = initial_state();
     State given = drawn;
+    Assembly done;
+    // Starts keep the rates of the other joints: what was given of their bodies has to fit them.
+    if (std::any_of(linkages.begin(), linkages.end(), [](const Linkage& one) { return one.has_starts(); })) {
+        for (const auto& linkage : linkages) {
+            linkage.fit_velocities(drawn);
+            self.note_changes(linkage, given, drawn, done);
+        }
+        given = drawn;
+    }
     int parts = 1;
     for (const auto& linkage : linkages) parts = std::max(parts, linkage.parts_of_starts());
     for (int k = 1; k <= parts; ++k) {
@@ -162,7 +176,6 @@ const Assembly& MultibodySystem::assemble() {
     }
     self.choose_turns_of_motors(given);
     State state = given;
-    Assembly done;
     for (auto& linkage : linkages) {
         linkage.approach(state);
         const auto rows = linkage.independent_rows(state);

@@ -198,6 +198,8 @@ struct MultibodySystem::Implementation {
     /// `given`. at_start: joints are where they start, and as fast. Throws InputError.
     void assemble(const mechanics::Linkage& linkage, const State& given, State& state, Assembly& done,
                   bool at_start) const;
+    /// done ← with what differs between two states of a linkage.
+    static void note_changes(const mechanics::Linkage& linkage, const State& given, const State& state, Assembly& done);
     void choose_turns_of_motors(State& state) const;
 
     /// Visits the attachments: visit(first row of C, Attachment, placement of its body).

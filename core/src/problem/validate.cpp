@@ -45,11 +45,11 @@ public:
     }
 
 private:
-    template <class... Arguments>
+    template <class Exception = InputError, class... Arguments>
     [[noreturn]] void refuse(fmt::format_string<Arguments...> text, Arguments&&... arguments) const {
         const std::string sentence = fmt::format(text, std::forward<Arguments>(arguments)...);
-        if (problem_.name.empty()) throw InputError("The problem is not valid: " + sentence);
-        throw InputError(fmt::format("The problem \"{}\" is not valid: {}", problem_.name, sentence));
+        if (problem_.name.empty()) throw Exception("The problem is not valid: " + sentence);
+        throw Exception(fmt::format("The problem \"{}\" is not valid: {}", problem_.name, sentence));
     }
 
     void vector(std::span<const double> v, const char* name) const {
@@ -58,7 +58,7 @@ private:
         }
         if (all_finite(v)) return;
         for (std::size_t k = 0; k < v.size(); ++k) {
-            if (!std::isfinite(v[k])) refuse("{}[{}] is {}; every entry must be finite.", name, k, v[k]);
+            if (!std::isfinite(v[k])) refuse<NotFinite>("{}[{}] is {}; every entry must be finite.", name, k, v[k]);
         }
     }
 
@@ -117,7 +117,8 @@ private:
         for (std::int32_t row = 0; row < A.rows; ++row) {
             for (std::int32_t k = A.row_start[row]; k < A.row_start[row + 1]; ++k) {
                 if (!std::isfinite(A.value[k])) {
-                    refuse("{}({}, {}) is {}; every entry must be finite.", name, row, A.column[k], A.value[k]);
+                    refuse<NotFinite>("{}({}, {}) is {}; every entry must be finite.", name, row, A.column[k],
+                                      A.value[k]);
                 }
             }
         }

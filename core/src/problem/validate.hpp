@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "delassus/error.hpp"
 #include "delassus/problem.hpp"
 
 namespace delassus {
@@ -10,6 +11,12 @@ struct Known {
     bool places = false;  ///< where entries stand, and that the cones' rows are m
     bool H = false;       ///< the values of H
     bool rows = false;    ///< the values of D and b
+};
+
+/// An entry is infinite or no number.
+class DELASSUS_API NotFinite : public InputError {
+public:
+    using InputError::InputError;
 };
 
 /// As validate(), without checking the known parts.
