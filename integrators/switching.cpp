@@ -300,7 +300,8 @@ private:
     [[nodiscard]] bool meets(double rest) const {
         bool found = false;
         for_each_gap([&](const UnilateralRows::Block& block, double gap) {
-            found = found || (std::abs(gap) <= resolution_ && block.speed < -std::max(fall_ * rest, resolution_ / rest));
+            found =
+                found || (std::abs(gap) <= resolution_ && block.speed < -std::max(fall_ * rest, resolution_ / rest));
         });
         return found;
     }
