@@ -266,7 +266,7 @@ TEST(Tree, TellsItsJointsAndRefusesNodes) {
     const auto all = joints.joints();
     ASSERT_EQ(all.size(), 4U);
     EXPECT_EQ(all[0].joint, -1);
-    EXPECT_EQ(all[0].body, mechanism.bodies[0]);
+    EXPECT_EQ(all[0].body, mechanism.bodies[2]) << "the one that no joint has as its second";
     EXPECT_EQ(all[0].freedoms, 6);
     EXPECT_EQ(joints.n(), 6 + 3 + 3 + 1);
     EXPECT_EQ(joints.position_size(), 7 + 4 + 4 + 1);

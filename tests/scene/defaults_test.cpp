@@ -311,7 +311,7 @@ TEST(Defaults, ASpinningBodyPrecessesWithOrderFour) {
         const Vector3 omega = run.velocities("b")[1];
         return std::hypot(omega[0] - 0.7 * std::cos(angle), omega[1] - 0.7 * std::sin(angle));
     };
-    const double ratio = error(1.0 / 256) / error(1.0 / 512);
+    const double ratio = error(1.0 / 512) / error(1.0 / 1024);
     EXPECT_NEAR(std::log2(ratio), 4.0, 0.02);
     EXPECT_LT(error(0.1), 1e-7) << "of long steps too";
 }
@@ -328,7 +328,7 @@ TEST(Defaults, ATumblingBodyTurnsWithOrderFour) {
         const auto q = run.pose("b").orientation;
         return Eigen::Vector4d(q[0], q[1], q[2], q[3]);
     };
-    const Eigen::Vector4d coarse = end(512), middle = end(1024), fine = end(2048);
+    const Eigen::Vector4d coarse = end(1024), middle = end(2048), fine = end(4096);
     EXPECT_NEAR(std::log2((coarse - middle).norm() / (middle - fine).norm()), 4.0, 0.05);
 }
 

@@ -83,5 +83,22 @@ TEST(StartVelocities, DoNotDependOnTheOrderOfTheScene) {
         for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(other[i], expected[i], 1e-9) << i;
 }
 
+TEST(StartVelocities, OfWhatFloatsTheSecondBodyMovesByAStart) {
+    const std::string lower =
+                          "- {name: lower, mass: 50, inertia: {xx: 1, yy: 1.4, zz: 0.8}, position: [0.1, 0, 0.5]}\n",
+                      upper =
+                          "- {name: upper, mass: 50, inertia: {xx: 1.3, yy: 1.8, zz: 1.4}, position: [0, 0, 1.6]}\n";
+    for (const std::string& bodies : {lower + upper, upper + lower}) {
+        const Running run(
+            parse_scene("step: 0.005\nend: 0.05\nbodies:\n" + bodies +
+                            "joints:\n- {name: hinge, kind: revolute, first: upper, second: lower, point: "
+                            "[0.1, -0.5, 0.5], axis: [1, 0, 0], start_rate: 0.7}\n",
+                        "s"));
+        EXPECT_NEAR(run.velocities("lower")[1][0], 0.7, 1e-12);
+        EXPECT_NEAR(run.velocities("lower")[0][2], 0.35, 1e-12);
+        EXPECT_NEAR(run.velocities("upper")[1][0], 0.0, 1e-12);
+    }
+}
+
 }  // namespace
 }  // namespace delassus::start_velocities_test

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <queue>
 #include <tuple>
 
@@ -125,7 +126,20 @@ void KinematicTree::choose_joints(const MultibodySystem& system) {
     };
     reached(bodies);
     grow();
-    for (std::size_t body = 0; body < bodies; ++body) {
+    // A tree that floats begins with a body that no joint has as its second one: by a start the second one moves.
+    std::vector<char> second(bodies, 0);
+    for (std::int32_t k = 0; k < system.joint_count(); ++k)
+        if (const JointParameters& joint = system.joint(k); rows_saved(joint.kind) > 0 && joint.second != world_body)
+            second[static_cast<std::size_t>(joint.second)] = 1;
+    std::vector<std::size_t> roots(bodies);
+    std::iota(roots.begin(), roots.end(), std::size_t{0});
+    std::stable_sort(roots.begin(), roots.end(), [&](std::size_t one, std::size_t other) {
+        const auto turn = [&](std::size_t body) {
+            return std::pair(massless(static_cast<BodyIndex>(body)), second[body] != 0);
+        };
+        return turn(one) < turn(other);
+    });
+    for (const std::size_t body : roots) {
         if (!moves(static_cast<BodyIndex>(body)) || link_of_[body] > 0) continue;
         add_link(system, static_cast<BodyIndex>(body), 0, -1);
         reached(body);

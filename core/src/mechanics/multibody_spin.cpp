@@ -35,11 +35,11 @@ using mechanics::Vector3d;
 //
 // keeps energy and momentum as before, is symmetric in time, and of order 4 (as modified moments of inertia do it for
 // the discrete Moser-Veselov map: Hairer and Vilmart, J. Phys. A 39, 2006). Since no moment exceeds the sum of the two
-// others, |h² s| ≤ φ²/12. Steps that turn by more than largest_turn are made of several, which err by 2e-9 of the turn
+// others, |h² s| ≤ φ²/12. Steps that turn by more than largest_turn are made of several, which err by 1e-10 of the turn
 // at most.
 namespace {
 
-constexpr double largest_turn = 0.02, most_parts = 125000.0;
+constexpr double largest_turn = 0.01, most_parts = 250000.0;
 
 /// Steps of the free spin of a body with the inertia J, in the body frame.
 class FreeRotation {
