@@ -343,9 +343,8 @@ TEST(PlainMotion, ABallHitsTwoOneAfterTheOther) {
 
 // Contacts that carry what lies on them and bounce at once: the load acts over the whole step. With all of an impulse
 // at the time of the bounce, the stack gained three quarters of what it lost.
-TEST(PlainMotion, AStackThatBouncesGainsLittleEnergyAndSaysSo) {
+TEST(PlainMotion, AStackThatBouncesGainsNoEnergy) {
     constexpr std::array<double, 7> speeds = {0.5, 0.54, 0.58, 0.6, 0.62, 0.66, 0.7};
-    double sum = 0.0;
     for (const double speed : speeds) {
         auto run = run_of(fmt::format(
             "step: 0.016666666666666666\nend: 2.5\nmaterials: {{m: {{friction: 0.57, restitution: 0.8}}}}\nbodies:\n"
@@ -367,11 +366,30 @@ TEST(PlainMotion, AStackThatBouncesGainsLittleEnergyAndSaysSo) {
             least = std::min(least, energy);
         }
         EXPECT_LT(least, start - 0.3);
-        const double share = rise / (start - least);
-        sum += share;
-        EXPECT_TRUE(share < 0.02 || !run.simulation.warnings().empty()) << speed << ": " << share;
+        EXPECT_LT(rise, 1e-2 * (start - least)) << speed;
     }
-    EXPECT_LT(sum / speeds.size(), 0.05);
+}
+
+// Of the rim on which a cylinder stands, one half strikes the ground when it begins to spin. Newton's law with friction
+// made twice its energy of that (Kane and Levinson 1985): such impacts are inelastic.
+TEST(PlainMotion, ASpinningCylinderGainsNoEnergyWhereItStrikes) {
+    for (const double friction : {0.1, 0.5, 1.2})
+        for (const double restitution : {0.3, 0.7, 1.0})
+            for (const double step : {0.001, 1.0 / 60.0}) {
+                auto run = run_of(fmt::format(
+                    "step: {:.17g}\nend: 0.1\nmaterials: {{m: {{friction: {}, restitution: {}}}}}\nbodies:\n"
+                    "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                    "- {{name: tin, mass: 50, inertia: {{xx: 0.41, yy: 0.55, zz: 0.54}}, position: [0.9, 0, 0.2], "
+                    "orientation: {{axis: [0, 0, 1], angle: 218}}, angular_velocity: [2, -3.5, 1.1], shapes: "
+                    "[{{cylinder: {{radius: 0.2, length: 0.4}}, material: m}}]}}\n",
+                    step, friction, restitution));
+                const double start = 50.0 * 9.81 * 0.2 + 0.5 * (0.41 * 4.0 + 0.55 * 12.25 + 0.54 * 1.21);
+                while (!run.simulation.finished()) {
+                    run.simulation.step();
+                    ASSERT_LT(run.simulation.record().energy, start + 5e-2)
+                        << friction << ' ' << restitution << ' ' << step << ' ' << run.simulation.state().t;
+                }
+            }
 }
 
 // A plate that lands on an edge turns and meets the ground again within a step: it does not go in by more than its

@@ -587,8 +587,24 @@ bool ThetaMethod::go_on_after_bounces() {
 }
 
 // One problem. Two in the first step, which has no history to extrapolate from, and where contacts become persistent; a
-// few where a contact strikes with friction and the solver does not know Coulomb's law.
+// few where a contact strikes with friction and the solver does not know Coulomb's law. And one more without
+// restitution where bounces would gain energy.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    first_guess_ = guess_;
+    if (contacts_.any()) {
+        time_meetings(begin, h, solver, report);
+        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_);
+    }
+    solve_about_guess(begin, h, solver, report);
+    if (!guess_.allFinite() || !contacts_.any_bounce(solution_) || !contacts_gain(begin) || !contacts_.only_take())
+        return;
+    bounced_.resize(0);
+    damped_.resize(0);
+    guess_ = first_guess_;
+    solve_about_guess(begin, h, solver, report);
+}
+
+void ThetaMethod::solve_about_guess(const State& begin, double h, StepSolver& solver, StepReport& report) {
     const auto linearize_at_guess = [&] {
         linearize(begin, h);
         solved_from_ = guess_;
@@ -600,10 +616,6 @@ void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, S
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
         return guess_.allFinite();
     };
-    if (contacts_.any()) {
-        time_meetings(begin, h, solver, report);
-        contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_);
-    }
     linearize_at_guess();
     if (!found()) return;
     const bool persists = contacts_.make_persistent(solution_);

@@ -83,6 +83,7 @@ private:
     [[nodiscard]] bool revise_impacts(double h);
     [[nodiscard]] bool go_on_after_bounces();
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
+    void solve_about_guess(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_velocity_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
     void judge_constraints(const State& begin, double h);
@@ -124,6 +125,7 @@ private:
     bool timed_ = false;                         // whether contacts got the times of their meetings in this step
     Vector smooth_;                              // the velocities at the end without impacts
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
+    Vector first_guess_;                         // ṽ⁺ before the first problem
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem
     Vector until_impact_;                        // the way of struck velocities until then
     Vector bounced_;                             // v⁺ of bounces alone, where more comes after them; else empty

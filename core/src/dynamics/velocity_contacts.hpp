@@ -112,8 +112,9 @@ public:
     };
     /// Whether contacts struck in this step at times within it.
     [[nodiscard]] bool any_impact(const Solution& solution) const;
-    /// The same; on_velocities() then has what they do. solution: of the
-    /// whole problem.
+    /// Likewise with restitution.
+    [[nodiscard]] bool any_bounce(const Solution& solution) const;
+    /// As any_impact(); on_velocities() then has what they do. solution: of the whole problem.
     [[nodiscard]] bool find_impacts(const Problem& problem, const Solution& solution);
     [[nodiscard]] std::span<const OnVelocity> on_velocities() const { return on_velocities_; }  ///< n
     /// Of these impacts, whether all have restitution: then steps are cut between those that lead to one another.

@@ -342,6 +342,12 @@ bool VelocityContacts::any_impact(const Solution& solution) const {
                        [&](const Contact& contact) { return acts(contact, solution); });
 }
 
+bool VelocityContacts::any_bounce(const Solution& solution) const {
+    for (std::size_t k = 0; k < contacts_.size(); ++k)
+        if (rows_.blocks()[k].restitution > 0.0 && acts(contacts_[k], solution)) return true;
+    return false;
+}
+
 // An impact at τ changes the velocities by v⁺ − ṽ, with all that holds against it; what presses besides is in ṽ as
 // well. So positions, which the step moves by (1 − θ) v + θ v⁺, lack
 //
