@@ -33,7 +33,8 @@ namespace {
 // A block touches whose gap is closed and does not open by itself: its speed u is below half of what weight takes in
 // the rest r of the step, ½ g r, so that it would close again. A contact that pushed in the step before may be open by
 // what that step left: it touches still where g + u r ≤ ½ g r² and |u| ≤ g r. Rows that are no gaps (dry friction,
-// limited motors and servos) always act: with them every step is one of contact.
+// limited motors and servos) always act: with them every step is one of contact. A closed gap that closes by more than
+// g r is an impact, which gets a step of its own length before the rest.
 //
 // ---- When a gap closes ----
 //
@@ -393,7 +394,7 @@ private:
         locate(next.t - now_.t, since, solver, report);
         ++impacts_;
         const double left = end_ - now_.t, impact = impact_share * h_;
-        // One at the end of the step is the next one's.
+        // An impact at the very end is left to the next step.
         if (left > 0.0) touch(left <= least_rest * h_ ? left : impact, solver, report);
     }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delassus/error.hpp"
@@ -298,14 +299,18 @@ TEST(Defaults, AFreeBodyKeepsEnergyAndMomentum) {
     }
 }
 
+/// A free body without weight, for one second.
+Running spinning(double step, std::string_view body) {
+    return run_of(fmt::format(
+        "integrator: euler_implicit_linearized\ngravity: [0, 0, 0]\nstep: {:.17g}\nend: 1\nbodies:\n- {{name: b, mass: "
+        "1, {}}}\n",
+        step, body));
+}
+
 // A symmetric body precesses in its own frame with Ω = ω_z (J_z − J_x)/J_x; the rule is of order 4 down to short steps.
 TEST(Defaults, ASpinningBodyPrecessesWithOrderFour) {
     const auto error = [](double step) {
-        auto run =
-            run_of(fmt::format("integrator: euler_implicit_linearized\ngravity: [0, 0, 0]\nstep: {}\nend: "
-                               "1\nbodies:\n- {{name: b, mass: 1, inertia: {{xx: 2, yy: 2, zz: 3}}, "
-                               "angular_velocity: [0.7, 0, 5]}}\n",
-                               step));
+        auto run = spinning(step, "inertia: {xx: 2, yy: 2, zz: 3}, angular_velocity: [0.7, 0, 5]");
         run.finish();
         const double angle = 5.0 * (3.0 - 2.0) / 2.0;
         const Vector3 omega = run.velocities("b")[1];
@@ -319,11 +324,9 @@ TEST(Defaults, ASpinningBodyPrecessesWithOrderFour) {
 // Without symmetry there are elliptic functions; three steps show the order.
 TEST(Defaults, ATumblingBodyTurnsWithOrderFour) {
     const auto end = [](int steps) {
-        auto run =
-            run_of(fmt::format("integrator: euler_implicit_linearized\ngravity: [0, 0, 0]\nstep: {:.17g}\nend: "
-                               "1\nbodies:\n- {{name: b, mass: 1, inertia: {{xx: 1, yy: 2, zz: 2.7}}, "
-                               "orientation: {{axis: [1, 2, 3], angle: 77}}, angular_velocity: [4, 3, -5]}}\n",
-                               1.0 / steps));
+        auto run = spinning(1.0 / steps,
+                            "inertia: {xx: 1, yy: 2, zz: 2.7}, orientation: {axis: [1, 2, 3], angle: 77}, "
+                            "angular_velocity: [4, 3, -5]");
         run.finish();
         const auto q = run.pose("b").orientation;
         return Eigen::Vector4d(q[0], q[1], q[2], q[3]);

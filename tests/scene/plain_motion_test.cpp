@@ -371,7 +371,7 @@ TEST(PlainMotion, AStackThatBouncesGainsNoEnergy) {
 }
 
 // Of the rim on which a cylinder stands, one half strikes the ground when it begins to spin. Newton's law with friction
-// made twice its energy of that (Kane and Levinson 1985): such impacts are inelastic.
+// would make twice its energy of that (Kane and Levinson 1985): such impacts are inelastic.
 TEST(PlainMotion, ASpinningCylinderGainsNoEnergyWhereItStrikes) {
     for (const double friction : {0.1, 0.5, 1.2})
         for (const double restitution : {0.3, 0.7, 1.0})

@@ -590,8 +590,8 @@ bool ThetaMethod::go_on_after_bounces() {
 // few where a contact strikes with friction and the solver does not know Coulomb's law. And one more without
 // restitution where bounces would gain energy.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
-    first_guess_ = guess_;
     if (contacts_.any()) {
+        first_guess_ = guess_;
         time_meetings(begin, h, solver, report);
         contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_);
     }

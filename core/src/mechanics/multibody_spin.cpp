@@ -33,7 +33,7 @@ using mechanics::Vector3d;
 //
 //     J (ω⁺ − ω) = −τ w × J w,   A⁺ = A cay(τ w) exp(h³ d J ω⁺),   τ = h (1 + h² s)
 //
-// keeps energy and momentum as before, is symmetric in time, and of order 4 (as modified moments of inertia do it for
+// keeps energy and momentum as well, is symmetric in time, and of order 4 (as modified moments of inertia do it for
 // the discrete Moser-Veselov map: Hairer and Vilmart, J. Phys. A 39, 2006). Since no moment exceeds the sum of the two
 // others, |h² s| ≤ φ²/12. Steps that turn by more than largest_turn are made of several, which err by 1e-10 of the turn
 // at most.
