@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "delassus/timestepper.hpp"
+#include "dynamics/contact_gain.hpp"
 #include "dynamics/gap_resolution.hpp"
 #include "dynamics/kept_impulses.hpp"
 #include "dynamics/linear_problem.hpp"
@@ -53,7 +54,8 @@ namespace {
 // step, or where they close with the speed after it, by the iteration s ← μ |u_t⁺(s)|, until s moves by less than 10⁻⁴
 // of the speed of the approach. Contacts with e = 0 keep the associated law, under which a sliding one floats at the
 // height h μ |u_t|. Where steps are chosen by their error that height would jump with h: all contacts that pushed then
-// take s of the speed after the step, to 10⁻⁶ of the speed that they slide with.
+// take s of the speed after the step, to 10⁻⁶ of the speed that they slide with. Where bounces with friction gain
+// energy, the step is solved again with less restitution (dynamics/contact_gain.hpp).
 //
 // How far f(q⁺, v⁺, t⁺) is from the linear model is measured after the step (dynamics/linearization.hpp).
 class EulerImplicitLinearized : public Timestepper {
@@ -137,7 +139,7 @@ private:
         double scale = 0.0;
         for (const double momentum : problem_.a) scale = std::max(scale, std::abs(momentum));
         scale = solver.largest_on_all(scale);
-        note_left(solve(solver, request, report));
+        note_left(solve(state, h, solver, request, report));
         drop_negligible(scale);
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
         for (const FreeSpin* spin : untouched_)
@@ -174,10 +176,49 @@ private:
         resolution_.note(answer.left);
     }
 
-    // H and a are looked at once more where the linearisation is judged or contacts slide; else the problem changes
-    // hands.
-    StepAnswer solve(StepSolver& solver, const StepRequest& request, StepReport& report) {
-        const bool again = linearization_.wanted() || !sliding_.empty();
+    StepAnswer solve(const State& begin, double h, StepSolver& solver, const StepRequest& request, StepReport& report) {
+        const bool before = report.solved;
+        StepAnswer answer;
+        const auto solve_with = [&](double restitution) {
+            if (restitution < 1.0) take_restitution(restitution, h);
+            report.solved = before;
+            answer = settle(solver, request, report);
+            return contact_work(solver.largest_on_all(work_of_bounces(begin)), system_, begin, begin.v, solution_.x);
+        };
+        solve_without_gain(solve_with);
+        return answer;
+    }
+
+    /// Gives what bounces that share of its restitution.
+    void take_restitution(double share, double h) {
+        for (const Bounce& bounce : bounces_) {
+            const auto& row = rows_.rows()[bounce.row - static_cast<std::size_t>(m_)];
+            double& b = problem_.b[bounce.row];
+            b = row.rate + (share > 0.0 ? share * bounce.speed : std::max(row.gap, 0.0) / h);
+            for (Sliding& contact : sliding_)
+                if (contact.row == bounce.row) {
+                    contact.offset = b;
+                    contact.term = 0.0;
+                }
+        }
+    }
+
+    /// What they do in the step as it is solved.
+    [[nodiscard]] double work_of_bounces(const State& begin) {
+        if (bounces_.empty()) return 0.0;
+        for (std::int32_t i = 0; i < n_; ++i) delta_[i] = 0.5 * (begin.v[i] + solution_.x[i]);
+        double work = 0.0;
+        for (const Bounce& bounce : bounces_)
+            for (std::size_t row = bounce.row; row < bounce.row + bounce.rows; ++row)
+                work += solution_.lambda[row] * (problem_.D.row_times(static_cast<std::int32_t>(row), delta_.data()) +
+                                                 rows_.rows()[row - static_cast<std::size_t>(m_)].rate);
+        return work;
+    }
+
+    // H and a are looked at once more where the linearisation is judged, contacts slide or bounce; else the problem
+    // changes hands.
+    StepAnswer settle(StepSolver& solver, const StepRequest& request, StepReport& report) {
+        const bool again = !solver.on_all(!linearization_.wanted() && sliding_.empty() && bounces_.empty());
         StepAnswer answer;
         const auto once = [&] {
             ++report.newton_iterations;
@@ -234,6 +275,12 @@ private:
         double term;
     };
     static constexpr int most_iterations = 50;
+
+    /// A contact with friction that closes with restitution.
+    struct Bounce {
+        std::size_t row, rows;  ///< its first row in the problem, and how many
+        double speed;           ///< e u_n⁻ < 0
+    };
 
     // An interior point leaves impulses above 0 where nothing pushes. Below what the solver resolves beside the momenta
     // of the step they are none: whether a contact pushed decides what counts as an impact.
@@ -361,6 +408,7 @@ private:
         penetrating_column_.clear();
         penetrating_value_.clear();
         sliding_.clear();
+        bounces_.clear();
         std::int32_t row = 0;
         Cone* cone = problem_.cones.data() + blocks_.size();
         kept_.begin_walk();
@@ -399,10 +447,12 @@ private:
         double& b = problem_.b[m_ + row];
         const bool closes =
             block.restitution > 0.0 && block.speed < -restitution_speed_ && gap + h * block.speed <= 0.0;
-        if (closes) b = rate + block.restitution * block.speed;
-        const double friction = block.cone.parameters[0];
-        if (coulomb_ || friction == 0.0 || block.cone.rows != 3) return;
+        const double bounce = block.restitution * block.speed, friction = block.cone.parameters[0];
         const auto normal_row = static_cast<std::size_t>(m_) + static_cast<std::size_t>(row);
+        if (closes && friction > 0.0)
+            bounces_.push_back({normal_row, static_cast<std::size_t>(block.cone.rows), bounce});
+        if (closes) b = rate + bounce;
+        if (coulomb_ || friction == 0.0 || block.cone.rows != 3) return;
         if (closes) {
             sliding_.push_back({normal_row, friction, 1e-4 * -block.speed, b, 0.0});
         } else if (pushed && follows_sliding_) {
@@ -477,6 +527,7 @@ private:
     std::vector<Approach> approaches_;     // likewise
     std::vector<double> compliances_;      // likewise, entries of E
     std::vector<Sliding> sliding_;
+    std::vector<Bounce> bounces_;
     std::vector<FreeSpin> spins_, end_spins_;
     UntouchedSpins untouched_;
     std::vector<Penetrating> penetrating_;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "dynamics/contact_gain.hpp"
 #include "dynamics/implicit_method.hpp"
 #include "dynamics/position_projection.hpp"
 #include "dynamics/velocity_contacts.hpp"
@@ -101,10 +102,9 @@ private:
         shift_ = 0.5 * h * impulse_ - h * h * (c_.position_old * mean + c_.position_new * next);
         last = load;
         mean = next;
-        contacts_.collect(state, h, 0.5);
+        contacts_.collect(state, h, 0.5, 1.0);
         if (contacts_.any() || !impulse_.isZero(0.0)) {
-            assemble(h, solver.law() == Law::Coulomb);
-            solve(solver, report);
+            solve(state, h, solver, report);
             move(h, solver, report);
             require_finite(state, end_, h, name);
             projection_.project(state, end_, h, problem_.H, contacts_, solver, report, name);
@@ -140,8 +140,23 @@ private:
         contacts_.append_to(problem_, solution_.lambda, coulomb);
     }
 
+    void solve(const State& begin, double h, StepSolver& solver, StepReport& report) {
+        const bool coulomb = solver.law() == Law::Coulomb, before = report.solved;
+        const auto solve_with = [&](double restitution) {
+            report.solved = before;
+            contacts_.collect(begin, h, 0.5, restitution);
+            assemble(h, coulomb);
+            settle(solver, report);
+            mean_.resize(begin.v.size());
+            for (std::size_t i = 0; i < mean_.size(); ++i) mean_[i] = 0.5 * (begin.v[i] + solution_.x[i]);
+            return contact_work(contacts_.work(problem_, solution_, mean_), system_, end_, begin.v, solution_.x);
+        };
+        solve_without_gain(solve_with);
+        contacts_.drop_negligible(problem_, solution_);
+    }
+
     /// Until De Saxcé's terms have settled, and once more for the turns of the rows.
-    void solve(StepSolver& solver, StepReport& report) {
+    void settle(StepSolver& solver, StepReport& report) {
         const bool before = report.solved;
         const int least = contacts_.any() ? 2 : 1;
         for (int iteration = 0;; ++iteration) {
@@ -156,7 +171,6 @@ private:
             report.solved = before;
             if (!report.take(solver.solve(problem_, solution_, {.warm_start = true}))) break;
         }
-        contacts_.drop_negligible(problem_, solution_);
     }
 
     /// end_ ← with what impulses add.
@@ -210,7 +224,7 @@ private:
     Problem problem_;
     Solution solution_;
     State end_;
-    std::vector<double> delta_;
+    std::vector<double> delta_, mean_;
 };
 
 std::vector<OptionInfo> nonsmooth_options() {

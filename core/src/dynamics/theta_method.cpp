@@ -148,16 +148,8 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     require_step(system_, state, h, settings_.name);
     note_velocity_error(state, h);
     find_spins(state, h);
-    timed_ = false;
-    damped_.resize(0);
-    bounced_.resize(0);
     if (settings_.linearly_implicit) extrapolate(h);
-    assemble(state, h, solver.law() == Law::Coulomb);
-    if (settings_.linearly_implicit) {
-        solve_once(state, h, solver, report);
-    } else {
-        iterate(state, h, solver, report);
-    }
+    solve_step(state, h, solver, report);
     const double acting = bounced_.size() > 0 ? contacts_.share_of_rest(problem_, solution_) : 0.0;
     contacts_.add_known_impulses(solution_.lambda);
     contacts_.drop_negligible(problem_, solution_);
@@ -250,8 +242,12 @@ void ThetaMethod::find_spins(const State& begin, double h) {
 // vector, or velocity that is part of none, the one nearer to 0 is taken, or 0 where they oppose each other. In a
 // smooth motion either is off by O(h), and the guess by O(h²). Beside an impact the smooth one of the two is the
 // smaller. Where a stiff mode changes its sign from step to step, an extrapolation would double it: the guess then is
-// that velocities stay.
+// that velocities stay. A step that is much shorter than this one, a part between two impacts, tells nothing of
+// accelerations: whatever it changed would be taken as many times over. After it a history begins anew.
 void ThetaMethod::extrapolate(double h) {
+    constexpr double short_part = 0.01;
+    if (last_h_ < short_part * h)
+        for (auto& change : changes_) change.clear();
     if (changes_[0].empty()) return;
     const Eigen::Map<const Vector> last(changes_[0].data(), n_);
     const Eigen::Map<const Vector> before(changes_[1].empty() ? changes_[0].data() : changes_[1].data(), n_);
@@ -356,7 +352,6 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     solution_.lambda.assign(static_cast<std::size_t>(m_), 0.0);
     for (std::size_t i = 0; i < multipliers_.size(); ++i) solution_.lambda[i] = last_h_ * multipliers_[i];
     solution_.x.assign(guess_.begin(), guess_.end());
-    contacts_.collect(begin, h, theta_);
     contacts_.append_to(problem_, solution_.lambda, coulomb);
     untouched_.find(spins_, problem_.D, n_);
 }
@@ -433,21 +428,41 @@ void ThetaMethod::impulse_of_forces(const State& begin, double h, const Vector& 
                 spins_[k].impulse[i] - h * theta_spins_[k].torque[i];
 }
 
-/// Whether contacts did more work in the step than rounding and a law of order 2 explain.
-bool ThetaMethod::contacts_gain(const State& begin) {
-    constexpr double share = 1e-2;
-    if (!contacts_.any()) return false;
-    const Eigen::Map<const Vector> v(begin.v.data(), n_), last(solution_.x.data(), n_);
-    back_ = (1.0 - theta_) * v + theta_ * last;
-    const double gain = contacts_.work(problem_, solution_, {back_.data(), static_cast<std::size_t>(n_)});
-    if (!(gain > 0.0)) return false;
-    double kinetic = 0.0;
-    for (const std::vector<double>* velocities : std::array<const std::vector<double>*, 2>{&begin.v, &solution_.x}) {
-        linear_.setZero(n_);
-        system_.multiply_mass(at_theta_, 1.0, velocities->data(), linear_.data());
-        kinetic = std::max(kinetic, 0.5 * linear_.dot(Eigen::Map<const Vector>(velocities->data(), n_)));
-    }
-    return gain > share * kinetic;
+/// What contacts do in the step as it is solved. A linearly implicit step moves contacts that overlap apart; of such
+/// work, where nothing bounces, nothing is said.
+ContactWork ThetaMethod::work_of_contacts(const State& begin) {
+    if (!contacts_.any() || !guess_.allFinite()) return {};
+    if (settings_.linearly_implicit && !contacts_.any_bounce(solution_)) return {};
+    back_ = (1.0 - theta_) * Eigen::Map<const Vector>(begin.v.data(), n_) +
+            theta_ * Eigen::Map<const Vector>(solution_.x.data(), n_);
+    const double work = contacts_.work(problem_, solution_, {back_.data(), static_cast<std::size_t>(n_)});
+    return contact_work(work, system_, at_theta_, begin.v, solution_.x);
+}
+
+/// The step's velocities and impulses, about the guess of find_spins() and extrapolate().
+void ThetaMethod::solve_step(const State& begin, double h, StepSolver& solver, StepReport& report) {
+    const bool before = report.solved;
+    first_guess_ = guess_;
+    bool only_takes = false;
+    const auto solve_with = [&](double restitution) {
+        guess_ = first_guess_;
+        timed_ = false;
+        damped_.resize(0);
+        bounced_.resize(0);
+        report.solved = before;
+        contacts_.collect(begin, h, theta_, restitution);
+        assemble(begin, h, solver.law() == Law::Coulomb);
+        if (only_takes) contacts_.only_take();
+        if (settings_.linearly_implicit) {
+            solve_once(begin, h, solver, report);
+        } else {
+            iterate(begin, h, solver, report);
+        }
+        return work_of_contacts(begin);
+    };
+    if (!solve_without_gain(solve_with).gains()) return;
+    only_takes = true;
+    solve_with(0.0);
 }
 
 void ThetaMethod::set_b_of_contacts(int iteration, const StepReport& report) {
@@ -486,7 +501,6 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
     if (contacts_.any() && contacts_.may_strike()) time_meetings(begin, h, solver, report);
     scale();
     const bool before = report.solved;
-    bool taking = false;
     int revised = 0;  // the iteration that solves the problem which the answers before have changed
     for (int iteration = 0;; ++iteration) {
         linearize(begin, h);
@@ -504,24 +518,12 @@ void ThetaMethod::iterate(const State& begin, double h, StepSolver& solver, Step
         solved_from_ = guess_;
         solved_force_ = force_;
         guess_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
-        if (iteration == 0 && !taking && solved && contacts_.any_turns_round(problem_, solution_)) {
+        if (iteration == 0 && solved && contacts_.any_turns_round(problem_, solution_)) {
             time_turns(solver, report);
             revised = 1;
         }
         if (iteration == 0 && timed_ && revise_impacts(h)) revised = 1;
         if (iteration == revised && go_on_after_bounces()) ++revised;
-        const bool complete = iteration >= revised;
-        if (guess_.allFinite() && !taking && complete && contacts_gain(begin) && contacts_.only_take()) {
-            taking = true;  // from the start, which is not where energy came from
-            revised = 0;
-            damped_.resize(0);
-            bounced_.resize(0);
-            guess_ = free_;
-            solution_.x.assign(guess_.begin(), guess_.end());
-            std::fill(solution_.lambda.begin(), solution_.lambda.end(), 0.0);
-            iteration = -1;
-            continue;
-        }
         if (!guess_.allFinite() || !solved) return;
     }
 }
@@ -587,24 +589,12 @@ bool ThetaMethod::go_on_after_bounces() {
 }
 
 // One problem. Two in the first step, which has no history to extrapolate from, and where contacts become persistent; a
-// few where a contact strikes with friction and the solver does not know Coulomb's law. And one more without
-// restitution where bounces would gain energy.
+// few where a contact strikes with friction and the solver does not know Coulomb's law.
 void ThetaMethod::solve_once(const State& begin, double h, StepSolver& solver, StepReport& report) {
     if (contacts_.any()) {
-        first_guess_ = guess_;
         time_meetings(begin, h, solver, report);
         contacts_.time_turns(problem_, {guess_.data(), static_cast<std::size_t>(n_)}, last_h_);
     }
-    solve_about_guess(begin, h, solver, report);
-    if (!guess_.allFinite() || !contacts_.any_bounce(solution_) || !contacts_gain(begin) || !contacts_.only_take())
-        return;
-    bounced_.resize(0);
-    damped_.resize(0);
-    guess_ = first_guess_;
-    solve_about_guess(begin, h, solver, report);
-}
-
-void ThetaMethod::solve_about_guess(const State& begin, double h, StepSolver& solver, StepReport& report) {
     const auto linearize_at_guess = [&] {
         linearize(begin, h);
         solved_from_ = guess_;

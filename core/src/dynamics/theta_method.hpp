@@ -10,6 +10,7 @@
 
 #include "delassus/export.hpp"
 #include "delassus/timestepper.hpp"
+#include "dynamics/contact_gain.hpp"
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/position_error.hpp"
@@ -73,7 +74,8 @@ private:
     void impulse_of_forces(const State& begin, double h, const Vector& last);
     void set_b_of_contacts(int iteration, const StepReport& report);
     [[nodiscard]] double lost_by_stiff_forces(const State& begin, double h, const Vector& last);
-    [[nodiscard]] bool contacts_gain(const State& begin);
+    [[nodiscard]] ContactWork work_of_contacts(const State& begin);
+    void solve_step(const State& begin, double h, StepSolver& solver, StepReport& report);
     void scale();
     [[nodiscard]] bool unchanged() const;
     void iterate(const State& begin, double h, StepSolver& solver, StepReport& report);
@@ -83,7 +85,6 @@ private:
     [[nodiscard]] bool revise_impacts(double h);
     [[nodiscard]] bool go_on_after_bounces();
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
-    void solve_about_guess(const State& begin, double h, StepSolver& solver, StepReport& report);
     void note_velocity_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
     void judge_constraints(const State& begin, double h);

@@ -79,11 +79,9 @@ namespace delassus {
 // ---- Energy ----
 //
 // What contacts do in a step is P·u_θ; at an impact within it, P times the mean of its speeds before and after. For θ =
-// ½ a contact that bounces has P_n (u⁻ + u⁺)/2 ≤ 0, and so have all without friction. With friction Newton's law may
-// ask for an impulse that gains energy (Kane and Levinson 1985, Dynamics, section 5.8), without a bound where a
-// mechanism is nearly jammed between contacts; and rows that turn far in a step are not those of its end. A step whose
-// contacts gain more than a hundredth of the kinetic energy is solved again without restitution and with D̄ for both
-// sides: then u⁺ = 0 where P_n > 0.
+// ½ a contact that bounces has P_n (u⁻ + u⁺)/2 ≤ 0, and so have all without friction. With friction bounces may gain
+// energy (contact_gain.hpp), and rows that turn far in a step are not those of its end. Such a step is solved again
+// with less restitution, and if it gains with none, with D̄ for both sides: then u⁺ = 0 where P_n > 0.
 //
 // ---- Friction ----
 //
@@ -155,7 +153,8 @@ VelocityContacts::VelocityContacts(DynamicalSystem& system, VelocityContactSetti
       bilateral_cones_(system.constraint_blocks().size()),
       axes_(system) {}
 
-void VelocityContacts::collect(const State& begin, double h, double theta) {
+void VelocityContacts::collect(const State& begin, double h, double theta, double restitution) {
+    restitution_ = restitution;
     h_ = h;
     theta_ = theta;
     before_.clear();
@@ -296,16 +295,16 @@ bool VelocityContacts::nearly_equal(std::size_t row, std::size_t before, std::in
 }
 
 void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const {
+    const double e = restitution_ * block.restitution;
     const double gap = contact.resolved_gap();
     // What does not push yet closes by the row in the middle of the step, of order 2 along a path that curves.
     const double speed = settings_.once || contact.pushed ? -contact.approach : middle_speed;
     const double drift = (1.0 - theta_) * h_ * speed;
     contact.normal = 0.0;
-    if (!settings_.once && block.restitution > 0.0 && speed < -settings_.restitution_speed) {
+    if (!settings_.once && e > 0.0 && speed < -settings_.restitution_speed) {
         const bool closes = gap + h_ * speed <= 0.0;
         contact.strikes = closes && !contact.pushed;
-        contact.normal =
-            closes ? block.restitution * std::min(speed, 0.0) : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
+        contact.normal = closes ? e * std::min(speed, 0.0) : std::max(gap + drift, 0.0) / (theta_ * h_) - speed;
         if (closes) contact.turns = contact.turns && contact.pushed;
     } else if (settings_.once && (gap <= 0.0 || contact.pushed) && !contact.left) {
         const double wanted = gap + std::clamp(drift, -std::abs(gap), std::abs(gap));
@@ -320,7 +319,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
-    held_through_bounces_ = false;
+    held_through_bounces_ = takes_only_ = false;
     struck_.clear();
     contacts_.clear();
     compliances_.clear();
@@ -538,21 +537,14 @@ double VelocityContacts::work(const Problem& problem, const Solution& solution, 
     return sum;
 }
 
-bool VelocityContacts::only_take() {
-    bool changed = false;
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        Contact& contact = contacts_[k];
+void VelocityContacts::only_take() {
+    takes_only_ = true;
+    for (Contact& contact : contacts_) {
         if (!contact.along_normal) continue;
-        changed = changed || contact.turns || rows_.blocks()[k].restitution > 0.0;
         contact.turns = contact.strikes = false;
-        contact.impact.reset();
-        contact.known = {};
-        contact.moved = contact.wanted = 0.0;
-        contact.sliding = -1.0;
         const double gap = contact.resolved_gap();
         contact.normal = gap > 0.0 ? std::max(gap - (1.0 - theta_) * h_ * contact.approach, 0.0) / (theta_ * h_) : 0.0;
     }
-    return changed;
 }
 
 void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vector<double>& lambda,

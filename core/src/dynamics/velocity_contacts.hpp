@@ -51,8 +51,9 @@ public:
     }
 
     /// Collects the rows of a step of size h from `begin`: their gaps there, D at begin.q ∘ exp(θ h v); θ in (0, 1].
+    /// restitution: the share of each contact's coefficient that this solve of the step takes, in [0, 1].
     /// Throws StepFailure if a body would go through another one before the contacts at that place are known.
-    void collect(const State& begin, double h, double theta);
+    void collect(const State& begin, double h, double theta, double restitution);
     /// Whether there are any.
     [[nodiscard]] bool any() const { return !rows_.blocks().empty(); }
 
@@ -112,7 +113,7 @@ public:
     };
     /// Whether contacts struck in this step at times within it.
     [[nodiscard]] bool any_impact(const Solution& solution) const;
-    /// Likewise with restitution.
+    /// Likewise of materials with restitution.
     [[nodiscard]] bool any_bounce(const Solution& solution) const;
     /// As any_impact(); on_velocities() then has what they do. solution: of the whole problem.
     [[nodiscard]] bool find_impacts(const Problem& problem, const Solution& solution);
@@ -133,9 +134,9 @@ public:
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.
     /// solution: of the whole problem.
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
-    /// For the rest of the step nothing bounces, and rows stay as they are in the middle of it: such contacts take
-    /// energy only. Whether that changes anything.
-    bool only_take();
+    /// After append_to(), of contacts without restitution: none strikes at its time, and rows stay as they are in the
+    /// middle of the step. Such contacts take energy only.
+    void only_take();
 
     /// error += what the step errs by in positions, n, because contacts and stops that push until its end let go within
     /// it, as their forces in this step and in the one before, of size last_h, show, and because rows of impacts are
@@ -213,6 +214,9 @@ private:
         [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 
+    [[nodiscard]] double restitution_of(std::size_t block) const {
+        return restitution_ * rows_.blocks()[block].restitution;
+    }
     [[nodiscard]] bool acts(const Contact& contact, const Solution& solution) const;
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     /// Of rows in rows_ and before_, with the rates of these times, m/s or rad/s.
@@ -262,7 +266,7 @@ private:
     GapResolution resolution_;
     std::size_t bilateral_cones_;
     TurningAxes axes_;
-    double h_ = 0.0, theta_ = 0.5;
+    double h_ = 0.0, theta_ = 0.5, restitution_ = 1.0;
     UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken
     UnilateralRows servos_;            // those of a step of size θ h, if there are any
     std::vector<double> compliances_;  // entries of E; of each block
@@ -288,6 +292,7 @@ private:
     std::size_t first_row_ = 0;             // in the problem
     std::vector<double> friction_reach_;
     bool held_through_bounces_ = false;  // friction or forces between bounds, until go_on_after_bounces()
+    bool takes_only_ = false;
     bool coulomb_ = false, settled_ = true, follows_ = false, all_bounce_ = false;
 };
 

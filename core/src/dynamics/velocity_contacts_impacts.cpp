@@ -14,10 +14,11 @@
 namespace delassus {
 
 bool VelocityContacts::may_strike() const {
+    if (takes_only_) return false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const bool closes = contact.along_normal && !contact.pushed && contact.approach > 0.0;
-        if (closes || rows_.blocks()[k].restitution > 0.0) return true;
+        if (closes || restitution_of(k) > 0.0) return true;
     }
     return false;
 }
@@ -42,7 +43,7 @@ void VelocityContacts::take_out_open(Problem& problem) const {
         const Contact& contact = contacts_[k];
         // What the turn of its rows leaves of the speed of one that pushes does not open it; one that bounced may be
         // open.
-        const bool keeps = !contact.along_normal || (contact.pushed && rows_.blocks()[k].restitution == 0.0) ||
+        const bool keeps = !contact.along_normal || (contact.pushed && restitution_of(k) == 0.0) ||
                            contact.pushes_on((1.0 - theta_) * h_ * contact.approach);
         if (keeps) problem.cones[cone++] = problem.cones[bilateral_cones_ + k];
         for (std::int32_t i = 0; i < rows_.blocks()[k].cone.rows; ++i, ++row) {
@@ -155,11 +156,12 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth,
                                      std::span<const double> last_changes, double last_h) {
     smooth_ = smooth.data();
+    if (takes_only_) return;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
         Contact& contact = contacts_[k];
         double gap = contact.resolved_gap();
-        const bool bounces = block.restitution > 0.0;
+        const bool bounces = restitution_of(k) > 0.0;
         if (!contact.along_normal || (!bounces && contact.pushed)) continue;
         const UnilateralRows::Row& later = rows_.rows()[contact.row];
         const UnilateralRows::Row& earlier =
@@ -184,7 +186,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
             contact.before_impact = {from, begin, acceleration() + turning};
-            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, block.restitution);
+            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, restitution_of(k));
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
@@ -240,8 +242,8 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
                 change += value * changes[column] / diagonal_[column];
             });
         if (!(-change * (h_ - contact.impact->meets) > faint * contact.impact->closing)) continue;
-        contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change,
-                                       rows_.blocks()[k].restitution);
+        contact.impact =
+            impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change, restitution_of(k));
         contact.normal = -contact.impact->end_speed;
         any = true;
     }
@@ -361,7 +363,7 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
     if (!any_impact(solution)) return false;
     all_bounce_ = true;
     for (std::size_t k = 0; k < contacts_.size(); ++k)
-        all_bounce_ = all_bounce_ && (!acts(contacts_[k], solution) || rows_.blocks()[k].restitution > 0.0);
+        all_bounce_ = all_bounce_ && (!acts(contacts_[k], solution) || restitution_of(k) > 0.0);
     const auto& D = problem.D;
     const auto n = static_cast<std::size_t>(D.columns);
     on_velocities_.assign(n, {});
@@ -464,10 +466,10 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
         const std::size_t row = first_row_ + contact.row;
         const double gap = contact.resolved_gap(), struck = first_strike(contact);
         const double closing = contact.impact ? contact.impact->closing : contact.change - contact.end_speed;
-        if (contact.pushed || !(struck < h_) || rows_.blocks()[k].restitution == 0.0 || !(solution.lambda[row] > 0.0) ||
+        if (contact.pushed || !(struck < h_) || restitution_of(k) == 0.0 || !(solution.lambda[row] > 0.0) ||
             !(closing > 0.0))
             continue;
-        const double e = rows_.blocks()[k].restitution, mobility = contact.change / solution.lambda[row];
+        const double e = restitution_of(k), mobility = contact.change / solution.lambda[row];
         if (0.5 * e * e * closing * closing <= faint * mobility * kinetic() || is_loaded(row)) continue;
         const double meets =
             contact.impact ? contact.impact->meets : struck + std::max(gap - contact.approach * struck, 0.0) / closing;
