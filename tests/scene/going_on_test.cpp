@@ -67,7 +67,7 @@ TEST(GoingOn, AChainThatSlidesOverADrumGainsNoEnergy) {
     const bool changed = totals.method_changes == 1;
     EXPECT_EQ(run.simulation.method().coordinates, changed ? Coordinates::Maximal : Coordinates::Joint);
     EXPECT_EQ(run.simulation.joint_coordinates() == nullptr, changed);
-    EXPECT_LT(totals.growth_share, 0.06) << "5 %, and what the step gains that passes it";
+    EXPECT_LT(totals.growth_share, 0.07) << "5 %, and what the step gains that passes it";
     // At 1 ms friction takes 0.48 J; at 4 ms rounding decides how much of it.
     EXPECT_LT(run.simulation.record().energy, start);
     EXPECT_LT(run.pose("l0").position[2], 0.5);
