@@ -137,6 +137,29 @@ TEST(Accuracy, ABoxStaysOnItsLift) {
     EXPECT_EQ(run.simulation.totals().impacts, 0);
 }
 
+// A ball that rolls on a turntable goes round with 2/7 of its rate (Weltner, Am. J. Phys. 55, 1987). Held by friction,
+// it slides at no time, though rows of one time have it slide with the speeds of another.
+TEST(Accuracy, ABallRollsRoundOnATurntable) {
+    const double turn = 3.0, radius = 0.1, end = 2.0, rate = 2.0 / 7.0 * turn, x0 = 1.0, v0 = 0.5;
+    const double centre = x0 - v0 / rate,
+                 right[] = {centre + (x0 - centre) * std::cos(rate * end), (x0 - centre) * std::sin(rate * end)};
+    for (const double accuracy : {1e-3, 1e-4, 1e-5}) {
+        auto run = Running(parse_scene(
+            fmt::format(
+                "accuracy: {}\nstep: {:.17g}\nend: {}\nmaterials: {{m: {{friction: 1}}}}\nbodies:\n"
+                "- {{name: disc, position: [0, 0, -0.1], motion: {{rotation: {{axis: [0, 0, 1], angle: {{linear: "
+                "{{rate: {}}}}}}}}}, shapes: [{{cylinder: {{radius: 5, length: 0.2}}, material: m}}]}}\n"
+                "- {{name: ball, position: [{}, 0, {}], density: 1000, velocity: [0, {}, 0], angular_velocity: [{}, 0, "
+                "0], shapes: [{{sphere: {{radius: {}}}, material: m}}]}}\n",
+                accuracy, 1.0 / 60.0, end, turn, x0, radius, v0, (turn * x0 - v0) / radius, radius),
+            "test.yaml"));
+        run.finish();
+        const auto& at = run.pose("ball").position;
+        EXPECT_LT(std::hypot(at[0] - right[0], at[1] - right[1]), accuracy * end) << accuracy;
+        EXPECT_LT(run.simulation.totals().newton_iterations, 20000) << accuracy;
+    }
+}
+
 // A box slides without friction, flat against a wall, and comes back: all corners bounce at once, by rounding or not.
 TEST(Accuracy, ABoxComesBackFlatFromAWall) {
     const double e = 0.586, v = 4.62, d = 0.83, end = 0.39, after = end - d / v;

@@ -94,6 +94,8 @@ private:
     [[nodiscard]] double impact_in(const Trial& trial, double h);
     /// Contacts at the ends of a trial of size h: which closes next, and by which it errs.
     void look_at_contacts(const State& begin, Trial& trial, double h, StepSolver& solver);
+    /// held_ ← what dry friction holds all through a trial.
+    void find_held(const Trial& trial);
     /// By which a trial errs where sliding turns round in it.
     void note_turns(const State& begin, Trial& trial, double h, StepSolver& solver);
     /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
@@ -139,7 +141,8 @@ private:
     std::vector<double> way_;
     AdaptiveStepReport report_;
     UnilateralRows begin_rows_, rows_;
-    std::vector<std::uint64_t> pushed_;
+    std::vector<std::uint64_t> pushed_;  ///< keys, ascending
+    std::vector<std::uint64_t> held_;    ///< likewise
 };
 
 }  // namespace delassus

@@ -93,7 +93,7 @@ bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const 
 
 void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                                 double envelope) {
-    constexpr double touching = 1e-6, meeting = 1e-3, same_cosine = 0.99999;
+    constexpr double touching = 1e-6, meeting = 1e-6, same_cosine = 1.0 - 1e-9;
     const auto nearest = nearest_of(found_);
     const double reach = a.solid->reach > 0.0 && b.solid->reach > 0.0 ? std::min(a.solid->reach, b.solid->reach)
                                                                       : std::max(a.solid->reach, b.solid->reach);

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
+#include "dynamics/row_entries.hpp"
 #include "dynamics/substeps.hpp"
 
 namespace delassus {
@@ -63,7 +65,7 @@ constexpr double least_of_ways = 1e-3;
 constexpr double rounding_of_positions = 1e-13;
 /// Of the longest step: whose error may be made at an edge.
 constexpr double share_of_event = 0.01;
-/// Of the longest step: rates over it are those of an instant, and their rounding is small.
+/// Of the longest step: what is near for so long is there.
 constexpr double moment_of_step = 1e-5;
 /// Of sizes: what gaps are resolved to, by which positions of two ways to take a step may differ where bodies touch.
 constexpr double rounding_of_gaps = 1e-9;
@@ -75,7 +77,7 @@ template <class Act>
 void for_each_normal(const UnilateralRows& rows, const std::vector<double>& v, Act act) {
     std::size_t row = 0;
     for (const auto& block : rows.blocks()) {
-        if (block.along_normal()) act(block, rows.rows()[row].gap, rows.speed(row, v.data()));
+        if (block.along_normal()) act(block, rows.rows()[row].gap, speed_now(rows, row, v.data()));
         row += static_cast<std::size_t>(block.cone.rows);
     }
 }
@@ -261,7 +263,9 @@ void AdaptiveStepping::count(const StepReport& report) {
 // the friction has its new direction over all of the step. If that is the first half, the whole and both halves do the
 // same, and their difference is 0. The end is off by (a₋ − a₊) u₋/|a₋|, at most by the speed before, and at most by
 // that after where the turn is in the second half. Or friction stops the sliding at the end of a step, and it goes back
-// in the next one: what stops is followed for half a step more.
+// in the next one: what stops is followed for half a step more. These speeds are taken by the rows of the beginning,
+// which other times have not: what rolls seems to slide, at O(h). So what is held is left out: at rest by the rows of
+// each end, and by less than friction can do in both halves.
 
 double AdaptiveStepping::impact_step() const {
     constexpr double patience = 8.0;
@@ -309,8 +313,43 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     });
 }
 
+// rows_ are those of trial.end.
+void AdaptiveStepping::find_held(const Trial& trial) {
+    constexpr double below = 0.999;
+    const auto sorted = [](const std::vector<BlockReaction>& reactions) {
+        std::vector<const BlockReaction*> result;
+        for (const BlockReaction& reaction : reactions) result.push_back(&reaction);
+        std::sort(result.begin(), result.end(),
+                  [](const auto* one, const auto* other) { return one->key < other->key; });
+        return result;
+    };
+    const std::array halves{sorted(trial.first.reactions), sorted(trial.second.reactions)};
+    held_.clear();
+    for_each_sliding(rows_, [&](const UnilateralRows::Block& block, std::size_t first, std::size_t rows) {
+        double square = 0.0;
+        for (std::size_t row = first; row < first + rows; ++row)
+            square += std::pow(speed_now(rows_, row, trial.end.v.data()), 2);
+        if (!(square <= trial.slow * trial.slow) || rows > 3) return;
+        for (const auto& half : halves) {
+            const auto found = std::lower_bound(half.begin(), half.end(), block.key,
+                                                [](const auto* one, std::uint64_t key) { return one->key < key; });
+            if (found == half.end() || (*found)->key != block.key) return;
+            const auto& force = (*found)->force;
+            if (block.along_normal()) {
+                if (!(std::hypot(force[1], force[2]) <= below * block.cone.parameters[0] * force[0])) return;
+            } else {
+                for (std::size_t i = 0; i < rows; ++i)
+                    if (!(force[i] >= below * block.cone.lo[i] && force[i] <= below * block.cone.hi[i])) return;
+            }
+        }
+        held_.push_back(block.key);
+    });
+    std::sort(held_.begin(), held_.end());
+}
+
 void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, StepSolver& solver) {
     constexpr double at_rest = 1e-3;
+    find_held(trial);
     std::vector<double> after;
     const auto go_on = [&] {
         State state = trial.end;
@@ -325,8 +364,9 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
         if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) return;
         double bb = 0.0, bm = 0.0, be = 0.0, mm = 0.0, me = 0.0, ee = 0.0;  // of begin, middle and end
         for (std::size_t row = first; row < first + rows; ++row) {
-            const double b = begin_rows_.speed(row, begin.v.data()), m = begin_rows_.speed(row, trial.middle.data()),
-                         e = begin_rows_.speed(row, trial.end.v.data());
+            const double b = speed_now(begin_rows_, row, begin.v.data()),
+                         m = speed_now(begin_rows_, row, trial.middle.data()),
+                         e = speed_now(begin_rows_, row, trial.end.v.data());
             bb += b * b;
             bm += b * m;
             be += b * e;
@@ -334,13 +374,14 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
             me += m * e;
             ee += e * e;
         }
+        if (bb <= trial.slow * trial.slow && std::binary_search(held_.begin(), held_.end(), block.key)) return;
         double speed = std::max({bm < 0.0 ? std::sqrt(bb) : 0.0, turned(me, mm, ee), turned(be, bb, ee)});
         if (std::sqrt(mm) > trial.slow && std::sqrt(ee) < at_rest * std::sqrt(mm)) {
             if (after.empty()) go_on();
             double ma = 0.0, aa = 0.0;
             for (std::size_t row = first; row < first + rows; ++row) {
-                const double a = begin_rows_.speed(row, after.data());
-                ma += a * begin_rows_.speed(row, trial.middle.data());
+                const double a = speed_now(begin_rows_, row, after.data());
+                ma += a * speed_now(begin_rows_, row, trial.middle.data());
                 aa += a * a;
             }
             speed = std::max(speed, turned(ma, mm, aa));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Walks over the entries of some rows of a sparse matrix (internal).
+// Walks over the entries of some rows of a sparse matrix, and speeds of unilateral rows (internal).
 #pragma once
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "delassus/dynamical_system.hpp"
 #include "delassus/problem.hpp"
 
 namespace delassus {
@@ -30,6 +31,11 @@ inline double coupling(const SparseMatrix& D, const std::vector<double>& diagona
             sum += value * D.value[static_cast<std::size_t>(found - D.column.begin())] / diagonal[column];
     });
     return sum;
+}
+
+/// The speed of a row at velocities v, n, with the rates that prescribed motions have at the state of the rows itself.
+inline double speed_now(const UnilateralRows& rows, std::size_t row, const double* v) {
+    return rows.speed(row, v) - rows.rows()[row].rate + rows.rows()[row].rate_now;
 }
 
 }  // namespace delassus

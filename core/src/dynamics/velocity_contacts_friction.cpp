@@ -61,8 +61,7 @@ void VelocityContacts::set_friction_direction(Problem& problem, const Contact& c
     double begin_squares = 0.0, change = 0.0, middle_squares = 0.0, reach = 0.0;
     for (std::size_t i = 1; i < rows; ++i) {
         const auto row = static_cast<std::int32_t>(first + i);
-        const auto& then = before_.rows()[contact.before + i];
-        const double begin = before_.speed(contact.before + i, begin_speeds_) - then.rate + then.rate_now;
+        const double begin = speed_now(before_, contact.before + i, begin_speeds_);
         end[i] = problem.D.row_times(row, guess.data()) + problem.b[first + i];
         middle[i] = (1.0 - theta_) * problem.D.row_times(row, begin_speeds_) +
                     theta_ * problem.D.row_times(row, in_middle_.data()) + rows_.rows()[contact.row + i].rate_now;
