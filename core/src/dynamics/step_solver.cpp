@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <functional>
 #include <optional>
@@ -427,10 +428,12 @@ void StepSolver::forget_misses() {
 void StepSolver::require_usable() const {
     const SolverEffort& effort = implementation_->effort;
     if (effort.worst_miss > 100.0)
-        throw StepTooLong(
-            fmt::format("no forces of contacts and joints were found that fit: the best answer misses the tolerance by "
-                        "{:.2g} times, and such an answer is not used ({})",
-                        effort.worst_miss, effort.unsolved.substr(0, effort.unsolved.find(": "))));
+        throw StepTooLong(fmt::format(
+            "no forces of contacts and joints were found that fit: the best answer {}, and such an answer is not used "
+            "({})",
+            std::isfinite(effort.worst_miss) ? fmt::format("misses the tolerance by {:.2g} times", effort.worst_miss)
+                                             : "needs forces without bound",
+            effort.unsolved.substr(0, effort.unsolved.find(": "))));
 }
 
 std::vector<std::string> StepSolver::loaded() const {

@@ -131,23 +131,28 @@ public:
         const std::vector<RankedSolver>& ranked = team.ranked;
         const std::vector<Member>& members = team.members;
         // Where the start meets the tolerance, as at rest, an answer far within it leaves the next steps nothing to do.
-        // Newton's method gets there with an iteration or two.
-        constexpr double at_rest = 1e-6, sharper = 1e-3;
+        // Newton's method gets there with an iteration or two; where it does not, as with many rows of which some
+        // repeat others, those that follow it have one turn each.
+        constexpr double at_rest = 1e-6, sharper = 1e-3, well_within = 0.1;
         const bool sharpens = at_start && settings.tolerance <= at_rest &&
-                              runner.worst() > sharper * settings.tolerance &&
+                              runner.worst() > well_within * settings.tolerance &&
                               std::ranges::any_of(members, &Member::local);
         if (at_start && !sharpens) return runner.error();
         Solution start = solution;
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
         std::map<const Solver*, std::size_t> users;  // the member that used it last
+        bool sharpened = false;                      // by Newton's method, or not enough
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
             const RankedSolver& own = ranked[turn.member];
-            if (turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
+            if (!sharpens && turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
                 report.near_goal = !(runner.worst() <= settings.tolerance);
                 return {TurnEnd::Done, runner.worst()};
             }
-            if (sharpens && !members[turn.member].local) {
+            if (sharpens && (turn.round > 0 || (sharpened && runner.worst() <= well_within * settings.tolerance)))
+                return {TurnEnd::Done, runner.worst()};
+            sharpened = sharpened || members[turn.member].local;
+            if (sharpens && !sharpened) {
                 left[turn.member] = solution;
                 return {TurnEnd::Exhausted, runner.worst()};
             }
@@ -161,7 +166,7 @@ public:
                         .resume = turn.start == turn.member && users.contains(solver) && users[solver] == turn.member};
             users[solver] = turn.member;
             // What Newton's method gains with its last iteration costs nothing.
-            if (step && members[turn.member].local) stage.tighter = sharper;
+            if (step && (members[turn.member].local || sharpens)) stage.tighter = sharper;
             Solution& iterate = left[turn.member];
             iterate = turn.start ? left[*turn.start] : start;
             TurnResult result = runner.run(*solver, stage, iterate, turn.start || has_start);
@@ -170,7 +175,6 @@ public:
                 has_start = true;
                 result.end = TurnEnd::Retired;
             }
-            if (sharpens) result.end = TurnEnd::Done;
             return result;
         });
         if (sharpens) report.status = Status::Solved;
