@@ -183,7 +183,8 @@ private:
             if (restitution < 1.0) take_restitution(restitution, h);
             report.solved = before;
             answer = settle(solver, request, report);
-            return contact_work(solver.largest_on_all(work_of_bounces(begin)), system_, begin, begin.v, solution_.x);
+            const double work = solver.largest_on_all(work_of_bounces(begin));
+            return contact_work(work, system_, begin, begin.v, solution_.x, problem_);
         };
         solve_without_gain(solve_with);
         return answer;

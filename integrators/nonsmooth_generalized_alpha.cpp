@@ -149,7 +149,8 @@ private:
             settle(solver, report);
             mean_.resize(begin.v.size());
             for (std::size_t i = 0; i < mean_.size(); ++i) mean_[i] = 0.5 * (begin.v[i] + solution_.x[i]);
-            return contact_work(contacts_.work(problem_, solution_, mean_), system_, end_, begin.v, solution_.x);
+            return contact_work(contacts_.work(problem_, solution_, mean_), system_, end_, begin.v, solution_.x,
+                                problem_);
         };
         solve_without_gain(solve_with);
         contacts_.drop_negligible(problem_, solution_);

@@ -433,5 +433,22 @@ TEST_F(Touching, WhatMeetsAtTheBeginningOfAStepIsStoppedThere) {
     EXPECT_NEAR(run.pose("leaf").position[2], 0.15, 1e-6);
 }
 
+// What a solver leaves of speeds at rest is no gain of energy, for which a step would be solved again.
+TEST_F(Touching, WhatRestsIsSolvedOnceAStep) {
+    for (const char* method : {"switching", "moreau_jean"})
+        for (const char* solver : {"admm", "pgs", "ssn"}) {
+            auto run = run_of(fmt::format("step: 0.01\nend: 1\nintegrator: {}\nsolver: {{name: {}, tolerance: "
+                                          "1e-8}}\n",
+                                          method, solver) +
+                              material(0.5, 0.0) + "bodies:\n" + ground +
+                              "- {name: low, density: 700, position: [0, 0, 0.1], shapes: [{box: {size: [0.4, 0.3, "
+                              "0.2]}, material: m}]}\n"
+                              "- {name: high, density: 1300, position: [0.03, 0.02, 0.25], orientation: {axis: [0, 0, "
+                              "1], angle: 17}, shapes: [{box: {size: [0.2, 0.3, 0.1]}, material: m}]}\n");
+            run.finish();
+            EXPECT_LE(run.simulation.totals().newton_iterations, 110) << method << ' ' << solver;
+        }
+}
+
 }  // namespace
 }  // namespace delassus::tests::switching_test

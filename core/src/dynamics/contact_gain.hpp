@@ -5,22 +5,26 @@
 #include <vector>
 
 #include "delassus/dynamical_system.hpp"
+#include "delassus/problem.hpp"
 
 namespace delassus {
 
 /// What the contacts of a step do to its energy.
 struct ContactWork {
     double work = 0.0;     ///< theirs, J
-    double kinetic = 0.0;  ///< the larger one of the kinetic energies at its two ends, J
+    double kinetic = 0.0;  ///< the larger one of the kinetic energies at its two ends, J; not 0 at rest
 
     /// More than rounding and the error of a step explain.
     [[nodiscard]] bool gains() const { return work > 0.01 * kinetic; }
     [[nodiscard]] bool takes() const { return work < -0.01 * kinetic; }
 };
 
-/// begin, end: velocities, n; the masses are those of the state `at`.
+/// begin, end: velocities, n; the masses are those of the state `at`. problem: of the step; a ten-thousandth of the
+/// energy that forces alone lead to, by its a, is the least that counts as kinetic: at rest work is what the solver
+/// leaves.
 [[nodiscard]] ContactWork contact_work(double work, const DynamicalSystem& system, const State& at,
-                                       const std::vector<double>& begin, const std::vector<double>& end);
+                                       const std::vector<double>& begin, const std::vector<double>& end,
+                                       const Problem& problem);
 
 // Newton's law of impact with friction may ask for an impulse that gains energy (Kane and Levinson 1985, Dynamics,
 // section 5.8), without a bound where a mechanism is nearly jammed between contacts. Without restitution u⁺ = 0 where a
