@@ -140,11 +140,12 @@ private:
         contacts_.append_to(problem_, solution_.lambda, coulomb);
     }
 
+    /// With as much restitution as gains no energy; contacts_ begins with all of it.
     void solve(const State& begin, double h, StepSolver& solver, StepReport& report) {
         const bool coulomb = solver.law() == Law::Coulomb, before = report.solved;
         const auto solve_with = [&](double restitution) {
             report.solved = before;
-            contacts_.collect(begin, h, 0.5, restitution);
+            if (restitution < 1.0) contacts_.collect(begin, h, 0.5, restitution);
             assemble(h, coulomb);
             settle(solver, report);
             mean_.resize(begin.v.size());
