@@ -286,6 +286,18 @@ TEST(Defaults, AWallOfAThousandContactsAtRestCostsNothing) {
     EXPECT_NEAR(run.pose("b9_4").position[2], 0.95, 1e-8);
 }
 
+TEST(Defaults, AHouseOfCardsAtRestCostsNothing) {
+    for (const char* integrator : {"euler_implicit_linearized", "linearly_implicit_trapezoidal"}) {
+        SceneOverrides overrides;
+        overrides.integrator = integrator;
+        overrides.end = 2.0;
+        Running run(read_scene(std::string(tests::places::source) + "/examples/scenes/card_house.yaml", overrides));
+        int busy = 0;
+        while (!run.simulation.finished()) busy += run.simulation.step().solver_iterations > 0 ? 1 : 0;
+        EXPECT_LE(busy, 20) << integrator;
+    }
+}
+
 // ---- Spin ----
 
 /// Energy and momentum in space of a free body with the moments (1, 2, 3) kg m².

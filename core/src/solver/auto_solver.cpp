@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -131,12 +132,16 @@ public:
         const std::vector<RankedSolver>& ranked = team.ranked;
         const std::vector<Member>& members = team.members;
         // Where the start meets the tolerance, as at rest, an answer far within it leaves the next steps nothing to do.
-        // Newton's method gets there with an iteration or two; where it does not, as with many rows of which some
-        // repeat others, those that follow it have one turn each.
+        // Newton's method gets there with an iteration or two. Where it does not, as with many rows of which some
+        // repeat others, those that follow it have one turn each; and where the order has it iterate a few times only,
+        // since each is dear, a start well within the tolerance is left alone.
         constexpr double at_rest = 1e-6, sharper = 1e-3, well_within = 0.1;
-        const bool sharpens = at_start && settings.tolerance <= at_rest &&
-                              runner.worst() > well_within * settings.tolerance &&
-                              std::ranges::any_of(members, &Member::local);
+        constexpr std::int64_t enough = 10;
+        double left_alone = HUGE_VAL;  // of the tolerance
+        for (const Member& member : members)
+            if (member.local) left_alone = std::min(left_alone, member.iterations >= enough ? sharper : well_within);
+        const bool sharpens =
+            at_start && settings.tolerance <= at_rest && runner.worst() > left_alone * settings.tolerance;
         if (at_start && !sharpens) return runner.error();
         Solution start = solution;
         bool has_start = settings.warm_start;
