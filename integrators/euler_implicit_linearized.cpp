@@ -65,6 +65,7 @@ public:
           recovery_speed_(values[0].real < 0.0 ? system.recovery_speed() : values[0].real),
           restitution_speed_(values[1].real),
           resolution_(system),
+          energy_(system),
           exact_(values[2].text == "exact" && !system.has_unilateral()),
           constraint_stiffness_(values[3].text == "definite"),
           linearization_(system, values[4].real),
@@ -184,7 +185,7 @@ private:
             report.solved = before;
             answer = settle(solver, request, report);
             const double work = solver.largest_on_all(work_of_bounces(begin));
-            return contact_work(work, system_, begin, begin.v, solution_.x, problem_);
+            return energy_.with(work, begin, begin.v, solution_.x, problem_);
         };
         solve_without_gain(solve_with);
         return answer;
@@ -510,6 +511,7 @@ private:
     DynamicalSystem& system_;
     double recovery_speed_, restitution_speed_;
     GapResolution resolution_;
+    EnergyOfStep energy_;
     bool exact_;
     bool constraint_stiffness_;
     Linearization linearization_;

@@ -40,6 +40,7 @@ public:
           c_(coefficients),
           smooth_(system, coefficients, std::move(settings)),
           contacts_(system, contacts),
+          energy_(system),
           projection_(system),
           cones_(free_cones(system)),
           n_(system.n()),
@@ -150,8 +151,7 @@ private:
             settle(solver, report);
             mean_.resize(begin.v.size());
             for (std::size_t i = 0; i < mean_.size(); ++i) mean_[i] = 0.5 * (begin.v[i] + solution_.x[i]);
-            return contact_work(contacts_.work(problem_, solution_, mean_), system_, end_, begin.v, solution_.x,
-                                problem_);
+            return energy_.with(contacts_.work(problem_, solution_, mean_), end_, begin.v, solution_.x, problem_);
         };
         solve_without_gain(solve_with);
         contacts_.drop_negligible(problem_, solution_);
@@ -214,6 +214,7 @@ private:
     ImplicitCoefficients c_;
     ImplicitMethod smooth_;
     VelocityContacts contacts_;
+    EnergyOfStep energy_;
     PositionProjection projection_;
     std::vector<Cone> cones_;
     std::int32_t n_, m_;

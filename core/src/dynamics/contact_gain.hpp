@@ -19,12 +19,24 @@ struct ContactWork {
     [[nodiscard]] bool takes() const { return work < -0.01 * kinetic; }
 };
 
-/// begin, end: velocities, n; the masses are those of the state `at`. problem: of the step; a ten-thousandth of the
-/// energy that forces alone lead to, by its a, is the least that counts as kinetic: at rest work is what the solver
-/// leaves.
-[[nodiscard]] ContactWork contact_work(double work, const DynamicalSystem& system, const State& at,
-                                       const std::vector<double>& begin, const std::vector<double>& end,
-                                       const Problem& problem);
+/// Sees it beside kinetic energies; keeps its memory.
+class EnergyOfStep {
+public:
+    /// system outlives it.
+    explicit EnergyOfStep(const DynamicalSystem& system) : system_(system) {}
+
+    /// begin, end: velocities, n; the masses are those of the state `at`. problem: of the step; a ten-thousandth of the
+    /// energy that forces alone lead to, by its a, is the least that counts as kinetic: at rest work is what the solver
+    /// leaves.
+    [[nodiscard]] ContactWork with(double work, const State& at, const std::vector<double>& begin,
+                                   const std::vector<double>& end, const Problem& problem);
+
+private:
+    [[nodiscard]] double kinetic(const State& at, const std::vector<double>& velocities);
+
+    const DynamicalSystem& system_;
+    std::vector<double> momentum_, diagonal_;
+};
 
 // Newton's law of impact with friction may ask for an impulse that gains energy (Kane and Levinson 1985, Dynamics,
 // section 5.8), without a bound where a mechanism is nearly jammed between contacts. Without restitution u⁺ = 0 where a

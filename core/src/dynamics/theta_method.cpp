@@ -58,6 +58,7 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
       theta_(settings_.theta),
       resolved_rate_(rate_of_faint_error),
       contacts_(system, settings_.contacts),
+      energy_(system),
       linearization_(system, settings_.linearization_limit),
       projection_(system),
       cones_(free_cones(system)),
@@ -436,7 +437,7 @@ ContactWork ThetaMethod::work_of_contacts(const State& begin) {
     back_ = (1.0 - theta_) * Eigen::Map<const Vector>(begin.v.data(), n_) +
             theta_ * Eigen::Map<const Vector>(solution_.x.data(), n_);
     const double work = contacts_.work(problem_, solution_, {back_.data(), static_cast<std::size_t>(n_)});
-    return contact_work(work, system_, at_theta_, begin.v, solution_.x, problem_);
+    return energy_.with(work, at_theta_, begin.v, solution_.x, problem_);
 }
 
 /// The step's velocities and impulses, about the guess of find_spins() and extrapolate().

@@ -98,6 +98,7 @@ private:
     double theta_;
     double resolved_rate_;  ///< h ω beyond which a force is stiff
     VelocityContacts contacts_;
+    EnergyOfStep energy_;
     Linearization linearization_;
     PositionProjection projection_;
     std::vector<Cone> cones_;
