@@ -185,7 +185,9 @@ private:
             report.solved = before;
             answer = settle(solver, request, report);
             const double work = solver.largest_on_all(work_of_bounces(begin));
-            return energy_.with(work, begin, begin.v, solution_.x, problem_);
+            ContactWork of_all = energy_.with(work, begin, begin.v, solution_.x, problem_);
+            of_all.kinetic = solver.largest_on_all(of_all.kinetic);  // all processes decide alike
+            return of_all;
         };
         solve_without_gain(solve_with);
         return answer;

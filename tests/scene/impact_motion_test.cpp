@@ -69,8 +69,7 @@ TEST(ImpactMotion, BallsPartAlongTheLineOfTheirCentresAtTheMeeting) {
                     "- {{name: first, mass: {}, position: [0, {}, 0], velocity: [{}, 0, 0], shapes: [{{sphere: "
                     "{{radius: {}}}, material: m}}]}}\n"
                     "- {{name: second, mass: {}, position: [{:.17g}, 0, 0], shapes: [{{sphere: {{radius: {}}}, "
-                    "material: "
-                    "m}}]}}\n",
+                    "material: m}}]}}\n",
                     step, end, e, first, aside, speed, radius, second, way + ahead, radius));
                 run.finish();
                 const auto& at = run.pose("second").position;

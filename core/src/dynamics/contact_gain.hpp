@@ -32,8 +32,6 @@ public:
                                    const std::vector<double>& end, const Problem& problem);
 
 private:
-    [[nodiscard]] double kinetic(const State& at, const std::vector<double>& velocities);
-
     const DynamicalSystem& system_;
     std::vector<double> momentum_, diagonal_;
 };

@@ -147,19 +147,20 @@ public:
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
         std::map<const Solver*, std::size_t> users;  // the member that used it last
-        bool sharpened = false;                      // by Newton's method, or not enough
+        bool had_newton = false;                     // a turn, of those that sharpen
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
             const RankedSolver& own = ranked[turn.member];
-            if (!sharpens && turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
+            if (sharpens) {
+                if (turn.round > 0 || (had_newton && runner.worst() <= well_within * settings.tolerance))
+                    return {TurnEnd::Done, runner.worst()};
+                had_newton = had_newton || members[turn.member].local;
+                if (!had_newton) {
+                    left[turn.member] = solution;
+                    return {TurnEnd::Exhausted, runner.worst()};
+                }
+            } else if (turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
                 report.near_goal = !(runner.worst() <= settings.tolerance);
                 return {TurnEnd::Done, runner.worst()};
-            }
-            if (sharpens && (turn.round > 0 || (sharpened && runner.worst() <= well_within * settings.tolerance)))
-                return {TurnEnd::Done, runner.worst()};
-            sharpened = sharpened || members[turn.member].local;
-            if (sharpens && !sharpened) {
-                left[turn.member] = solution;
-                return {TurnEnd::Exhausted, runner.worst()};
             }
             const Prepared* solvable = runner.problem_of(own.law);
             Solver* solver = solvable ? usable(own, *solvable) : nullptr;
