@@ -93,6 +93,7 @@ public:
     StepMemory memory() const override {
         StepMemory memory;
         memory.numbers = {last_h_};
+        memory.numbers.insert(memory.numbers.end(), velocity_error_.sizes().begin(), velocity_error_.sizes().end());
         for (auto& values : velocity_error_.save()) memory.of_columns.push_back(std::move(values));
         memory.of_columns.push_back(resolution_.left());
         memory.of_columns.push_back(left_);
@@ -103,7 +104,8 @@ public:
     void set_memory(StepMemory&& memory) override {
         restart();
         last_h_ = memory.numbers.at(0);
-        velocity_error_.load(std::span(memory.of_columns).first(velocity_error_.kept()));
+        velocity_error_.load(std::span(memory.of_columns).first(velocity_error_.kept()),
+                             std::span(memory.numbers).subspan(1));
         resolution_.load(std::move(memory.of_columns.at(velocity_error_.kept())));
         left_ = std::move(memory.of_columns.at(velocity_error_.kept() + 1));
         multipliers_ = std::move(memory.of_rows.at(0));
@@ -132,7 +134,7 @@ private:
         assemble_unilateral(state, h);
 
         const StepRequest request{.warm_start = true,
-                                  .method_error = note_velocity_error(state),
+                                  .method_error = note_velocity_error(state, h),
                                   .error_of_solves = velocity_error_.of_solver()};
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
@@ -166,10 +168,9 @@ private:
     }
 
     // Of steps of chosen sizes nothing is said: there the solver must not disturb the estimate of their error.
-    std::span<const double> note_velocity_error(const State& state) {
-        if (follows_sliding_) return {};
-        velocity_error_.note(state.v, left_);
-        return velocity_error_.known();
+    std::span<const double> note_velocity_error(const State& state, double h) {
+        velocity_error_.note(state.v, left_, last_h_, h);
+        return follows_sliding_ ? std::span<const double>() : velocity_error_.known();
     }
 
     void note_left(const StepAnswer& answer) {

@@ -225,6 +225,22 @@ TEST(PlainMotion, UnbalancedBallsKeepTheirEnergy) {
     EXPECT_NEAR(run.simulation.record().energy, start, 1e-3 * moves);
 }
 
+// Without friction a ball lets go of a fixed one at two thirds of the height at which it began, with the energy of that
+// (v² = 2/3 g R cos θ₀), and keeps its speed along the ground from there on. Its gap is rounding all the way down.
+TEST(PlainMotion, ABallThatSlidesOffAnotherOneLetsGoInTime) {
+    const double g = 9.81, R = 1.1, start = 10.0 * std::numbers::pi / 180.0;
+    const double left = 2.0 / 3.0 * std::cos(start), along = std::sqrt(g * R * left) * left;
+    for (const double step : {1.0 / 60.0, 0.0071, 0.002}) {
+        SCOPED_TRACE(step);
+        auto run = run_of(fmt::format(
+            "step: {:.17g}\nend: 1.2\nbodies:\n- {{name: fixed, fixed: true, shapes: [{{sphere: {{radius: 1}}}}]}}\n"
+            "- {{name: ball, mass: 0.7, position: [{:.17g}, 0, {:.17g}], shapes: [{{sphere: {{radius: 0.1}}}}]}}\n",
+            step, R * std::sin(start), R * std::cos(start)));
+        run.finish();
+        EXPECT_NEAR(run.velocities("ball")[0][0], along, 1e-3 * along);
+    }
+}
+
 // Free fall and Newton's law are parabolas, which steps that end at no impact follow to rounding: between bounces too.
 TEST(PlainMotion, ABallBouncesByItsRestitution) {
     struct Case {

@@ -59,6 +59,7 @@ struct Shape {
 struct BodyDisplacement {
     Vector3 translation{};  ///< of the origin of its pose, m
     Vector3 rotation{};     ///< rotation vector about that origin, rad
+    Vector3 fall{};         ///< what its weight adds to the translation over the step, m
 };
 
 /// Finds contacts among a fixed set of shapes that move with their bodies.

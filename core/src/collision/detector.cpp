@@ -211,12 +211,13 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
     for (std::size_t i = 0; i < placed_.size(); ++i) {
         const std::int32_t body = setup_.shapes[i].body;
         if (body < 0) continue;
-        const auto& [translation, rotation] = displacements[static_cast<std::size_t>(body)];
+        const auto& [translation, rotation, fall] = displacements[static_cast<std::size_t>(body)];
         if (!is_measurable(vector(translation)) || !is_measurable(vector(rotation)))
             throw InputError(
                 fmt::format("The motion of body {} in a step is not finite or beyond 1e50 m.", setup_.name_of(body)));
         Sweep& sweep = sweeps_[i];
         sweep.rotation = vector(rotation);
+        sweep.fall = vector(fall);
         sweep.straight = sweep.translation = vector(translation);
         const double angle = sweep.rotation.norm();
         sweep.turned = angle * placed_[i].solid->reach;

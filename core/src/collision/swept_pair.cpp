@@ -91,9 +91,12 @@ bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const 
     });
 }
 
+// What strikes has the rows of the meeting. What touches all along, but for a gap of rounding, or comes down slowly,
+// has those of the beginning, which turn with its motion: at the meeting it is faster than it was mostly by its weight
+// and by the turn of the normal.
 void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                                 double envelope) {
-    constexpr double touching = 1e-6, meeting = 1e-6, same_cosine = 1.0 - 1e-9;
+    constexpr double touching = 1e-6, meeting = 1e-6, same_cosine = 1.0 - 1e-9, mostly = 0.5;
     const auto nearest = nearest_of(found_);
     const double reach = a.solid->reach > 0.0 && b.solid->reach > 0.0 ? std::min(a.solid->reach, b.solid->reach)
                                                                       : std::max(a.solid->reach, b.solid->reach);
@@ -101,12 +104,14 @@ void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& 
     if (std::none_of(found_.begin(), found_.end(),
                      [&](const ContactPoint& contact) { return closing(a, b, of_a, of_b, contact) > contact.gap; }))
         return;
-    const double gap = std::min(nearest->gap, envelope);
-    const Vector3d normal = vector(nearest->normal);
-    const bool at_begin = !nearest->on_the_way;
+    const ContactPoint at_begin = *nearest;
     begin_.swap(found_);
-    advance_to(meeting * gap, by, a, b, of_a, of_b, envelope);
-    if (at_begin && !found_.empty() && vector(nearest_of(found_)->normal).dot(normal) >= same_cosine)
+    advance_to(meeting * std::min(at_begin.gap, envelope), by, a, b, of_a, of_b, envelope);
+    if (at_begin.on_the_way || found_.empty()) return;
+    const ContactPoint& met = *nearest_of(found_);
+    const Vector3d normal = vector(at_begin.normal);
+    const double begun = closing(a, b, of_a, of_b, at_begin) - normal.dot(of_a.fall - of_b.fall);
+    if (normal.dot(vector(met.normal)) >= same_cosine || begun <= mostly * closing(a, b, of_a, of_b, met))
         found_.swap(begin_);
 }
 

@@ -37,6 +37,7 @@ struct Sweep {
     Vector3d straight = Vector3d::Zero();     ///< translation of the body's origin, m
     Vector3d arm = Vector3d::Zero();          ///< from there to the shape's origin, m
     Vector3d rotation = Vector3d::Zero();     ///< rotation vector, rad
+    Vector3d fall = Vector3d::Zero();         ///< the part of the translation that its weight adds, m
     Vector3d translation = Vector3d::Zero();  ///< of the shape's origin over the whole step, m
     /// How far a point of it gets at most from where the shape would be without rotation along the chord, m.
     double turned = 0.0;

@@ -110,6 +110,7 @@ void ThetaMethod::forces_jumped() {
 StepMemory ThetaMethod::memory() const {
     StepMemory memory;
     memory.numbers = {last_h_, longest_h_};
+    memory.numbers.insert(memory.numbers.end(), velocity_error_.sizes().begin(), velocity_error_.sizes().end());
     memory.of_columns.assign(changes_.begin(), changes_.end());
     for (auto& values : velocity_error_.save()) memory.of_columns.push_back(std::move(values));
     memory.of_columns.push_back(left_);
@@ -126,7 +127,8 @@ void ThetaMethod::set_memory(StepMemory&& memory) {
     last_h_ = memory.numbers.at(0);
     if (memory.numbers.at(1) > longest_h_) resolve_up_to(memory.numbers.at(1));
     for (std::size_t k = 0; k < changes_.size(); ++k) changes_[k] = std::move(memory.of_columns.at(k));
-    velocity_error_.load(std::span(memory.of_columns).subspan(changes_.size(), velocity_error_.kept()));
+    velocity_error_.load(std::span(memory.of_columns).subspan(changes_.size(), velocity_error_.kept()),
+                         std::span(memory.numbers).subspan(2));
     const auto rest = memory.of_columns.begin() + static_cast<std::ptrdiff_t>(changes_.size() + velocity_error_.kept());
     left_ = std::move(rest[0]);
     struck_ = std::move(rest[1]);
@@ -635,12 +637,11 @@ bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
     return report.take(answer);
 }
 
-// What the last steps of this size show. Where steps are chosen by their error, the solver must not disturb it.
+// Where steps are chosen by their error, the solver must not disturb it.
 void ThetaMethod::note_velocity_error(const State& begin, double h) {
     request_ = {.warm_start = true};
+    velocity_error_.note(begin.v, left_, last_h_, h);
     if (chooses_steps_) return;
-    if (h != last_h_) velocity_error_.forget();
-    velocity_error_.note(begin.v, left_);
     request_.method_error = velocity_error_.known();
     request_.error_of_solves = velocity_error_.of_solver();
 }

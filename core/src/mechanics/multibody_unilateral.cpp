@@ -138,17 +138,19 @@ void MultibodySystem::Implementation::place_shapes(const State& state) {
 void MultibodySystem::Implementation::predict_displacements(double h, const State& state) {
     displacements.resize(poses.size());
     const Vector3d fall = h * load_factor * vector(gravity);
-    const auto put = [&](BodyIndex body, const Vector3d& v) {
+    const auto put = [&](BodyIndex body, const Vector3d& added) {
         const auto& place = at[body];
-        displacements[static_cast<std::size_t>(body)] = {mechanics::array(h * v),
-                                                         mechanics::array(h * (place.A * place.omega))};
+        displacements[static_cast<std::size_t>(body)] = {mechanics::array(h * (place.v + added)),
+                                                         mechanics::array(h * (place.A * place.omega)),
+                                                         mechanics::array(h * added)};
     };
-    for (const auto& body : moving) put(body.body, at[body.body].v + fall);
-    for (const auto index : prescribed) put(index, at[index].v);
+    for (const auto& body : moving) put(body.body, fall);
+    for (const auto index : prescribed) put(index, Vector3d::Zero());
     for (std::size_t k = 0; k < nodes.size(); ++k)
         if (nodes[k].touches && nodes[k].moves()) {
             const auto node = node_at(static_cast<std::int32_t>(k), state.q.data(), state.v.data());
             displacements[bodies.size() + k].translation = mechanics::array(h * (node.v + fall));
+            displacements[bodies.size() + k].fall = mechanics::array(h * fall);
         }
 }
 

@@ -14,6 +14,15 @@ std::string quoted_name(const MultibodySystem& system, BodyIndex body) {
     return fmt::format("\"{}\"", body == world_body ? "world" : system.body(body).name);
 }
 
+/// Of this pair in a list that ascends.
+double depth_in(const std::vector<BodyOverlap>& list, const BodyOverlap& pair) {
+    const auto found =
+        std::lower_bound(list.begin(), list.end(), pair, [](const BodyOverlap& one, const BodyOverlap& other) {
+            return std::tie(one.a, one.b) < std::tie(other.a, other.b);
+        });
+    return found != list.end() && found->a == pair.a && found->b == pair.b ? found->depth : 0.0;
+}
+
 }  // namespace
 
 OverlapWatch::OverlapWatch(MultibodySystem& system, double accuracy, const State& start, double h)
@@ -39,20 +48,13 @@ double OverlapWatch::allowed(const BodyOverlap& pair) const {
     return std::min(accuracy_ * pair.extent, share_of_thickness * pair.thickness);
 }
 
-double OverlapWatch::depth_before(const BodyOverlap& pair) const {
-    const auto found =
-        std::lower_bound(before_.begin(), before_.end(), pair, [](const BodyOverlap& one, const BodyOverlap& other) {
-            return std::tie(one.a, one.b) < std::tie(other.a, other.b);
-        });
-    return found != before_.end() && found->a == pair.a && found->b == pair.b ? found->depth : 0.0;
-}
-
 void OverlapWatch::require_within(const State& state, double h, const sdk::Team& team) {
+    std::swap(now_, last_);
     system_.collect_overlaps(state, h, team, now_);
     const BodyOverlap* worst = nullptr;
     double beyond = 1.0, grown = 0.0;
     for (const BodyOverlap& pair : now_) {
-        const double more = pair.depth - depth_before(pair);
+        const double more = pair.depth - depth_in(before_, pair);
         if (more <= beyond * allowed(pair) || given_up_.contains({pair.a, pair.b})) continue;
         worst = &pair;
         beyond = more / allowed(pair);
@@ -63,7 +65,7 @@ void OverlapWatch::require_within(const State& state, double h, const sdk::Team&
         fmt::format("bodies {} and {} come to overlap by {:.2g} m in the step until t = {:.9g} s, {:.2g} "
                     "times what its accuracy allows",
                     quoted_name(system_, worst->a), quoted_name(system_, worst->b), grown, state.t, beyond),
-        worst->a, worst->b, grown);
+        worst->a, worst->b, grown, depth_in(last_, *worst) - depth_in(before_, *worst));
 }
 
 std::vector<BodyIndex> OverlapWatch::given_up() const {

@@ -16,16 +16,18 @@ namespace delassus {
 /// A step that leaves bodies deeper in one another than they were, by more than its accuracy allows.
 class DELASSUS_API StepTooDeep : public StepTooLong {
 public:
-    StepTooDeep(const std::string& sentence, BodyIndex a, BodyIndex b, double depth)
-        : StepTooLong(sentence), bodies_(a, b), depth_(depth) {}
+    StepTooDeep(const std::string& sentence, BodyIndex a, BodyIndex b, double depth, double last)
+        : StepTooLong(sentence), bodies_(a, b), depth_(depth), last_(last) {}
     /// The pair that is deepest beside what it may be, the lesser number first.
     [[nodiscard]] std::pair<BodyIndex, BodyIndex> bodies() const { return bodies_; }
     /// By what its overlap has grown, m.
     [[nodiscard]] double depth() const { return depth_; }
+    /// By what it had grown in the trial before; 0 in the first one.
+    [[nodiscard]] double last_depth() const { return last_; }
 
 private:
     std::pair<BodyIndex, BodyIndex> bodies_;
-    double depth_;
+    double depth_, last_;
 };
 
 /// A step has rows for the contacts that it knows. What bodies meet otherwise, as where they turn or land within it,
@@ -43,6 +45,7 @@ public:
     /// Notes the overlaps at the beginning of a step of size h, of the bodies.
     void begin(const State& state, double h, const sdk::Team& team = {}) {
         system_.collect_overlaps(state, h, team, before_);
+        now_ = before_;
     }
     /// Throws StepTooDeep if they have grown too much at the end of it. h: of the next step.
     void require_within(const State& state, double h, const sdk::Team& team = {});
@@ -55,13 +58,12 @@ public:
     void end();
 
 private:
-    [[nodiscard]] double depth_before(const BodyOverlap& pair) const;
     [[nodiscard]] double allowed(const BodyOverlap& pair) const;
 
     MultibodySystem& system_;
     double accuracy_;
     std::string at_start_;
-    std::vector<BodyOverlap> before_, now_;
+    std::vector<BodyOverlap> before_, now_, last_;  // of the step's begin, of the last trial and the one before
     std::set<std::pair<BodyIndex, BodyIndex>> given_up_;
 };
 

@@ -35,9 +35,8 @@ bool StepRetries::expect(const StepTooDeep& failure, std::span<const ContactPoin
 
 bool StepRetries::solve_closer(const StepTooDeep& failure) {
     constexpr double each = 0.1, least = 1e-3, better = 0.5;
-    if (looser_ && looser_->bodies() == failure.bodies() && failure.depth() > better * looser_->depth()) return false;
+    if (share_ < 1.0 && failure.depth() > better * failure.last_depth()) return false;
     if (share_ <= least) return false;
-    looser_ = failure;
     solver_.solve_to(share_ *= each);
     return true;
 }

@@ -40,7 +40,7 @@ private:
     MultibodySystem& system_;
     StepSolver& solver_;
     bool expects_;
-    std::optional<StepTooDeep> first_, looser_;  // the failures of the first trial, and before the solve became closer
+    std::optional<StepTooDeep> first_;  // the failure of the first trial
     std::set<std::pair<BodyIndex, BodyIndex>> expected_;
     double share_ = 1.0;
 };
