@@ -2,6 +2,7 @@
 // Steps whose size follows from a tolerance: any timestepper, with rejection, and with cuts where contacts close.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -54,9 +55,10 @@ public:
     AdaptiveStepping(DynamicalSystem& system, Timestepper& stepper, const StepControl& control,
                      std::string advice = "loosen the tolerance, or allow smaller steps by step: {smallest: …}");
 
-    /// Advances state by one step, not beyond end > state.t. Throws StepFailure if a step below `smallest` would be
-    /// needed, Unsupported as the stepper; then state is as before and the stepper's memory must be loaded again.
-    AdaptiveStepReport step(State& state, double end, StepSolver& solver);
+    /// Advances state by one step, not beyond end > state.t. Throws StepFailure if a step below `smallest` or trials of
+    /// more than so many solves would be needed, Unsupported as the stepper; then state is as before and the stepper's
+    /// memory must be loaded again.
+    AdaptiveStepReport step(State& state, double end, StepSolver& solver, double most_solves = HUGE_VAL);
 
     /// Bounds the steps from now on, > 0; below `smallest` it is that. Those longer than `common` may err by a tenth of
     /// the tolerance.

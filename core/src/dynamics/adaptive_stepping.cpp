@@ -452,7 +452,7 @@ AdaptiveStepReport AdaptiveStepping::take_impact(State& state, double h, double 
 // (PI control: Gustafsson, ACM TOMS 17, 1991; Hairer, Wanner, II, sec. IV.2). A trial with e > 1 is thrown away and
 // tried again with 0.9 h e^(−1/k).
 
-AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& solver) {
+AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& solver, double most_solves) {
     memory_ = stepper_.save();
     report_ = {};
     if (unilateral_) system_.collect_unilateral(state, moment(), begin_rows_);
@@ -460,6 +460,9 @@ AdaptiveStepReport AdaptiveStepping::step(State& state, double end, StepSolver& 
     double proposed = std::clamp(next_, control_.smallest, control_.largest);
     std::string failure = advice_;
     while (true) {
+        if (report_.step.newton_iterations > most_solves)
+            throw StepFailure(
+                fmt::format("the step at t = {:.9g} takes more than {:.0f} solves", state.t, most_solves));
         const bool smallest = proposed < control_.smallest;
         const auto fell_below = [&] {
             throw StepFailure(

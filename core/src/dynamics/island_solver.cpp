@@ -102,10 +102,11 @@ void IslandSolver::solve(const Prepared& problem, Solution& solution, const Isla
     result.solved = false;
     spent.worst_miss =
         std::max(spent.worst_miss, worst_of(report.error) / std::max(settings.tolerance, rounding_limit_of_steps));
-    if (spent.unsolved.empty())
-        spent.unsolved =
-            fmt::format("{} ended with {} at a natural error of {:.1e}{}{}", report.solver, name_of(report.status),
-                        report.error.natural, report.message.empty() ? "" : ": ", report.message);
+    if (!spent.unsolved.empty()) return;
+    spent.unsolved = fmt::format("{} ended with {}", report.solver, name_of(report.status));
+    if (std::isfinite(report.error.natural))
+        spent.unsolved += fmt::format(" at a natural error of {:.1e}", report.error.natural);
+    if (!report.message.empty()) spent.unsolved += ": " + report.message;
 }
 
 SolveReport IslandSolver::run(Solver& solver, const Prepared& problem, Solution& solution,

@@ -231,16 +231,20 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
                                  AdaptiveStepReport& report, double most_work) {
     report.step.clear();
     report.substeps = 0;
+    const double begin = state.t;
+    double error = 0.0;
     const std::int64_t before = solver.effort().iterations;
     const auto work = [&] { return work_of(report.step, solver.effort().iterations - before); };
     for (; state.t < end && work() <= most_work; ++report.substeps) {
         pass_jump(state);
-        AdaptiveStepReport part = control.step(state, cut(state.t, end), solver);
+        const double left = (most_work - work()) / (system_.n() + 3.0 * report.step.unilateral_blocks);
+        AdaptiveStepReport part = control.step(state, cut(state.t, end), solver, left);
         part.step.follow(report.step);
         std::swap(report.step, part.step);
         report.rejected += part.rejected;
-        report.error = std::max(report.error, part.error);
+        error += part.h * part.error;
     }
+    report.error = error / (state.t - begin);
 }
 
 // ---- Fixed steps that err ----
@@ -251,7 +255,8 @@ void Stepping::step_within_error(AdaptiveStepping& control, State& state, double
 //
 // Methods know what acts in the middle of a step. What happens after it shows in the next one, whose estimate may mean
 // either. So a step that errs is taken again together with the one before, where that was taken as a whole: the state
-// between them, which was shown already, is off by O(h²), and nothing of that remains.
+// between them, which was shown already, is off by O(h²), and nothing of that remains. Where that does not come to its
+// end with the work that there is, or errs by more, as where bodies chatter, the step stays as it was.
 
 double Stepping::work_of(const StepReport& report, std::int64_t iterations) const {
     const double solves = report.newton_iterations + static_cast<double>(iterations) / iterations_of_a_solve;
@@ -277,6 +282,7 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     const State whole = state;
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
+    bool better = false;
     const ChosenSteps chosen(*timestepper_);
     const double end = last_.state.t + report.h;
     if (older_.whole) {
@@ -287,38 +293,30 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     }
     try {
         take_refined(looser, state, end, solver, report, watch);
+        better = report.error < of_whole.error;
     } catch (const StepFailure&) {
         work_ -= usual;
-        state = whole;
-        report = std::move(of_whole);
-        timestepper_->load(after);
-        if (watch) judge(state, report, *watch);
     }
+    if (better) return;
+    state = whole;
+    report = std::move(of_whole);
+    timestepper_->load(after);
+    if (watch) judge(state, report, *watch);
 }
 
-// What is left when the work is used up is one step.
 void Stepping::take_refined(double looser, State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
                             StepWatch* watch) {
     StepControl control = *settings_.judged;
     control.absolute *= looser;
     control.slow *= looser;
     AdaptiveStepping refined(system_, *timestepper_, control);
-    report.error = 0.0;
     const std::int64_t before = solver.effort().iterations;
     step_within_error(refined, state, end, solver, report, work_);
     report.error *= looser;
     if (!report.step.solved) throw StepFailure("solves of the substeps missed their tolerance");
     report.refined = true;
     work_ -= work_of(report.step, solver.effort().iterations - before);
-    if (state.t < end) {
-        const double h = end - state.t;
-        take(state, h, solver, substep_);
-        if (const double error = error_of(substep_, h); error > report.error) report.error = error;
-        substep_.follow(report.step);
-        std::swap(report.step, substep_);
-        ++report.substeps;
-        state.t = end;
-    }
+    if (state.t < end) throw StepFailure("the substeps take more work than there is");
     if (watch) judge(state, report, *watch);
 }
 
