@@ -91,9 +91,9 @@ bool SweptPair::near(const Placed& a, const Placed& b, const Sweep& of_a, const 
     });
 }
 
-// What strikes has the rows of the meeting. What touches all along, but for a gap of rounding, or comes down slowly,
-// has those of the beginning, which turn with its motion: at the meeting it is faster than it was mostly by its weight
-// and by the turn of the normal.
+// What strikes has the rows of the meeting. What touches all along but for a gap of rounding, or comes down slowly, has
+// those of the beginning, which turn with its motion: most of its speed at the meeting comes from its weight and from
+// the turn of the normal until then.
 void SweptPair::keep_what_meets(NarrowPhase& by, const Placed& a, const Placed& b, const Sweep& of_a, const Sweep& of_b,
                                 double envelope) {
     constexpr double touching = 1e-6, meeting = 1e-6, same_cosine = 1.0 - 1e-9, mostly = 0.5;
