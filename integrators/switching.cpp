@@ -30,21 +30,22 @@ namespace {
 //
 // ---- What touches ----
 //
-// A block touches whose gap is closed and does not open by itself: its speed u is below half of what weight takes in
-// the rest r of the step, ½ g r, so that it would close again. A contact that pushed in the step before may be open by
-// what that step left: it touches still where g + u r ≤ ½ g r² and |u| ≤ g r. Rows that are no gaps (dry friction,
-// limited motors and servos) always act: with them every step is one of contact. A closed gap that closes by more than
-// g r is an impact, which gets a step of its own length before the rest.
+// A block touches whose gap g is closed and does not open by itself: its speed u is below half of what forces take in
+// the rest r of the step, ½ a r, so that it would close again. Here a is the acceleration with which forces alone, such
+// as springs, close it, but at least that of weight. A contact that pushed in the step before may be open by what that
+// step left: it touches still where g + u r ≤ ½ a r² and |u| ≤ a r. Rows that are no gaps (dry friction, limited motors
+// and servos) always act: with them every step is one of contact. A closed gap that closes by more than a r is an
+// impact, which gets a step of its own length before the rest.
 //
 // ---- When a gap closes ----
 //
-// At the end of each part of a flight gaps are looked at. One that is below 0, and was not where the part began, has
-// closed. With its speed a Newton step gives the time, and a step of the flight from the beginning of the part the
-// state there; a bracket keeps Newton's iteration safe where gaps have corners. It ends on the open side, with a gap
-// within its resolution. Parts are no longer than 1.02 times what the first gap needs to close at the speeds of their
-// beginning, and no coordinate goes further than half a unit (rad or m), as what is ahead is looked for along straight
-// lines: so shapes are not passed through. What closes and opens again within a part is not seen: at most a r²/8 deep
-// at the relative acceleration a.
+// At the end of each part of a flight gaps are looked at. One that is below 0, and below what it was where the part
+// began, has closed. With its speed a Newton step gives the time, and a step of the flight from the beginning of the
+// part the state there; a bracket keeps Newton's iteration safe where gaps have corners. It ends on the open side, with
+// a gap within its resolution. Parts are no longer than 1.02 times what the first gap needs to close at the speeds of
+// their beginning, and no coordinate goes further than half a unit (rad or m), as what is ahead is looked for along
+// straight lines: so shapes are not passed through. What closes and opens again within a part is not seen: at most a
+// r²/8 deep at the relative acceleration a.
 class Switching : public Timestepper {
 public:
     Switching(DynamicalSystem& system, const std::vector<OptionValue>& values)
@@ -282,42 +283,63 @@ private:
         if (!system_.has_unilateral()) return;
         rows_.measure_speeds_at(seen_.v.data());
         system_.collect_unilateral(seen_, h, rows_);
+        accelerations_known_ = false;
     }
 
     template <class Visit>
     void for_each_gap(Visit visit) const {
+        for_each_row_of_gap(
+            [&](const UnilateralRows::Block& block, std::size_t row) { visit(block, rows_.rows()[row].gap); });
+    }
+
+    template <class Visit>
+    void for_each_row_of_gap(Visit visit) const {
         std::size_t row = 0;
         for (const auto& block : rows_.blocks()) {
-            if (block.along_normal()) visit(block, rows_.rows()[row].gap);
+            if (block.along_normal()) visit(block, row);
             row += static_cast<std::size_t>(block.cone.rows);
         }
+    }
+
+    /// With which forces close a row of rows_, at least that of weight, m/s² or rad/s².
+    [[nodiscard]] double closing_acceleration(std::size_t row) {
+        if (!accelerations_known_) {
+            seen_accelerations_.resize(seen_.v.size());
+            if (!system_.accelerate(seen_, seen_accelerations_.data())) seen_accelerations_.clear();
+            accelerations_known_ = true;
+        }
+        if (seen_accelerations_.empty()) return fall_;
+        return std::max(fall_, rows_.rows()[row].rate - rows_.speed(row, seen_accelerations_.data()));
     }
 
     [[nodiscard]] static bool holds(const std::vector<std::uint64_t>& keys, std::uint64_t key) {
         return std::binary_search(keys.begin(), keys.end(), key);
     }
 
-    /// Whether a closed gap in rows_ closes faster than by weight: an impact, now.
-    [[nodiscard]] bool meets(double rest) const {
+    /// Whether a closed gap in rows_ closes faster than by forces: an impact, now.
+    [[nodiscard]] bool meets(double rest) {
         bool found = false;
-        for_each_gap([&](const UnilateralRows::Block& block, double gap) {
-            found =
-                found || (std::abs(gap) <= resolution_ && block.speed < -std::max(fall_ * rest, resolution_ / rest));
+        for_each_row_of_gap([&](const UnilateralRows::Block& block, std::size_t row) {
+            if (found || std::abs(rows_.rows()[row].gap) > resolution_ || !(block.speed < -resolution_ / rest)) return;
+            found = block.speed < -closing_acceleration(row) * rest;
         });
         return found;
     }
 
     /// Whether something in rows_ acts for the rest of the step.
-    [[nodiscard]] bool touches(double rest) const {
+    [[nodiscard]] bool touches(double rest) {
         const auto& blocks = rows_.blocks();
         if (std::any_of(blocks.begin(), blocks.end(), [](const auto& block) { return !block.along_normal(); }))
             return true;
         bool found = false;
-        for_each_gap([&](const UnilateralRows::Block& block, double gap) {
-            const double slow = fall_ * rest;
-            const bool stays = gap <= resolution_ && block.speed <= 0.5 * slow;
+        for_each_row_of_gap([&](const UnilateralRows::Block& block, std::size_t row) {
+            const double gap = rows_.rows()[row].gap;
+            const bool closed = gap <= resolution_;
+            if (found || !(closed || holds(pushed_, block.key))) return;
+            const double slow = closing_acceleration(row) * rest;
+            const bool stays = closed && block.speed <= 0.5 * slow;
             const bool returns = gap + block.speed * rest <= 0.5 * slow * rest && std::abs(block.speed) <= slow;
-            found = found || stays || (returns && holds(pushed_, block.key));
+            found = stays || (returns && holds(pushed_, block.key));
         });
         return found;
     }
@@ -331,14 +353,21 @@ private:
         return soonest;
     }
 
-    /// Whether one of rows_ has closed that is not among `deep_`. since: how long ago at the speeds there, the longest.
+    /// What is left of a gap until it has closed: of one that a flight begins with below 0, until it is deeper.
+    [[nodiscard]] double left_of(std::uint64_t key, double gap) const {
+        const auto deep = std::lower_bound(deep_.begin(), deep_.end(), std::pair(key, -HUGE_VAL));
+        return deep != deep_.end() && deep->first == key ? gap - deep->second : gap;
+    }
+
+    /// Whether one of rows_ has closed. since: how long ago at the speeds there, the longest.
     [[nodiscard]] bool has_closed(double& since) const {
         bool found = false;
         since = 0.0;
         for_each_gap([&](const UnilateralRows::Block& block, double gap) {
-            if (gap >= -resolution_ || holds(deep_, block.key)) return;
+            const double left = left_of(block.key, gap);
+            if (left >= -resolution_) return;
             found = true;
-            since = std::max(since, block.speed < 0.0 ? gap / block.speed : std::numeric_limits<double>::infinity());
+            since = std::max(since, block.speed < 0.0 ? left / block.speed : std::numeric_limits<double>::infinity());
         });
         return found;
     }
@@ -362,7 +391,7 @@ private:
         constexpr double beyond = 1.02, turn = 0.5, shortest = 1.0 / 64.0;
         deep_.clear();
         for_each_gap([&](const UnilateralRows::Block& block, double gap) {
-            if (gap < -resolution_) deep_.push_back(block.key);
+            if (gap < -resolution_) deep_.emplace_back(block.key, gap);
         });
         std::sort(deep_.begin(), deep_.end());
         double fastest = 0.0;
@@ -426,9 +455,10 @@ private:
             std::swap(now_, trial);
             double least = std::numeric_limits<double>::infinity(), soonest = least;
             for_each_gap([&](const UnilateralRows::Block& block, double gap) {
-                if (block.speed >= 0.0 || holds(deep_, block.key)) return;
-                least = std::min(least, gap);
-                soonest = std::min(soonest, gap / -block.speed);
+                if (block.speed >= 0.0) return;
+                const double left = left_of(block.key, gap);
+                least = std::min(least, left);
+                soonest = std::min(soonest, left / -block.speed);
             });
             if (least <= resolution_) break;
             guess = open + soonest;
@@ -457,7 +487,7 @@ private:
     double h_ = 0.0, end_ = 0.0;
     int impacts_ = 0;
     State now_;
-    std::vector<std::uint64_t> deep_;  // keys of gaps that are below 0 where a flight begins; ascending
+    std::vector<std::pair<std::uint64_t, double>> deep_;  // gaps that are below 0 where a flight begins, by their keys
     std::vector<Acted> acted_;
     std::vector<double> errors_;  // of steps of contact; flights err by less than they may
     bool errors_known_ = true;    // of all
@@ -468,7 +498,8 @@ private:
     UnilateralRows rows_;
     State seen_;
     double seen_h_ = 0.0;
-    bool seen_known_ = false;
+    bool seen_known_ = false, accelerations_known_ = false;
+    std::vector<double> seen_accelerations_;  // of forces alone; empty where the system does not know them
 };
 
 std::vector<OptionInfo> switching_options() {

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What touches and has joints, motors or springs: cars, pendulums that meet a stop, a bead on a rod, orbits."""
+"""What touches and has joints, motors or springs: cars, pendulums that meet a stop, a bead on a rod, orbits,
+cams."""
 import numpy as np
 
 from .scenes import (G, STEPS, Cases, Motion, about_x, about_y, box, capsule, constant_acceleration, cylinder, end_of,
@@ -188,3 +189,39 @@ def orbit_of_cylinder(scene):
 def fast_orbit(scene):
     """A fast ball goes round a smaller one, 10 rad/s (orbit says how)."""
     return orbit(scene, sphere(0.5), 0.5, stiffness=2000, speed=6.0)
+
+
+def cam(scene, gravity, rate):
+    """A ball on a hub, e beside its middle, lifts a flat follower that a spring presses on it: the lower face is at
+    R + e sin(ω t) as long as k (l₀ − l) + m g > m e ω²."""
+    e, R, half, m, stiffness, rest, top = 0.03, 0.1, 0.05, 0.5, 500.0, 1.5, 1.0
+    start = R + half
+    assert stiffness * (rest - top + start - e) + m * gravity > m * e * rate**2
+    scene.set_gravity(gravity)
+    scene.add_fixed("frame", [0, 0, top], box([0.1, 0.1, 0.02]))
+    scene.add_body("cam", [e, 0, 0], sphere(R), velocity=[0, 0, e * rate], angular_velocity=[0, -rate, 0], mass=2,
+                   inertia=inertia(0.02, 0.02, 0.02))
+    scene.add_body("follower", [0, 0, start], box([0.4, 0.2, 2 * half]), velocity=[0, 0, e * rate], mass=m,
+                   inertia=inertia(0.01, 0.01, 0.01))
+    scene.add_motor(scene.add_joint("revolute", "frame", "cam", [0, 0, 0], [0, -1, 0]), {"linear": {"rate": rate}})
+    scene.add_joint("prismatic", "frame", "follower", [0, 0, top], [0, 0, 1])
+    scene.add_spring("frame", "follower", stiffness, rest)
+    return Motion("follower", lambda t: [0, 0, start + e * np.sin(rate * t)], end=1.5)
+
+
+@CASES.add(allowed=1e-4)
+def cam_with_weight(scene):
+    """A cam lifts a follower with weight and a spring (cam says how)."""
+    return cam(scene, G, rate=12.0)
+
+
+@CASES.add(allowed=1e-4)
+def cam_without_weight(scene):
+    """A cam moves a follower that a spring alone presses on it (cam says how)."""
+    return cam(scene, 0.0, rate=12.0)
+
+
+@CASES.add(allowed=1e-4)
+def slow_cam_without_weight(scene):
+    """The same at 5 rad/s."""
+    return cam(scene, 0.0, rate=5.0)
