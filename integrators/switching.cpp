@@ -286,17 +286,12 @@ private:
         accelerations_known_ = false;
     }
 
+    /// visit(block, gap, the number of its first row)
     template <class Visit>
     void for_each_gap(Visit visit) const {
-        for_each_row_of_gap(
-            [&](const UnilateralRows::Block& block, std::size_t row) { visit(block, rows_.rows()[row].gap); });
-    }
-
-    template <class Visit>
-    void for_each_row_of_gap(Visit visit) const {
         std::size_t row = 0;
         for (const auto& block : rows_.blocks()) {
-            if (block.along_normal()) visit(block, row);
+            if (block.along_normal()) visit(block, rows_.rows()[row].gap, row);
             row += static_cast<std::size_t>(block.cone.rows);
         }
     }
@@ -319,8 +314,8 @@ private:
     /// Whether a closed gap in rows_ closes faster than by forces: an impact, now.
     [[nodiscard]] bool meets(double rest) {
         bool found = false;
-        for_each_row_of_gap([&](const UnilateralRows::Block& block, std::size_t row) {
-            if (found || std::abs(rows_.rows()[row].gap) > resolution_ || !(block.speed < -resolution_ / rest)) return;
+        for_each_gap([&](const UnilateralRows::Block& block, double gap, std::size_t row) {
+            if (found || std::abs(gap) > resolution_ || !(block.speed < -resolution_ / rest)) return;
             found = block.speed < -closing_acceleration(row) * rest;
         });
         return found;
@@ -332,8 +327,7 @@ private:
         if (std::any_of(blocks.begin(), blocks.end(), [](const auto& block) { return !block.along_normal(); }))
             return true;
         bool found = false;
-        for_each_row_of_gap([&](const UnilateralRows::Block& block, std::size_t row) {
-            const double gap = rows_.rows()[row].gap;
+        for_each_gap([&](const UnilateralRows::Block& block, double gap, std::size_t row) {
             const bool closed = gap <= resolution_;
             if (found || !(closed || holds(pushed_, block.key))) return;
             const double slow = closing_acceleration(row) * rest;
@@ -347,7 +341,7 @@ private:
     /// In what time the first gap in rows_ closes at the speeds there; infinity: none.
     [[nodiscard]] double time_to_closing() const {
         double soonest = std::numeric_limits<double>::infinity();
-        for_each_gap([&](const UnilateralRows::Block& block, double gap) {
+        for_each_gap([&](const UnilateralRows::Block& block, double gap, std::size_t) {
             if (gap > resolution_ && block.speed < 0.0) soonest = std::min(soonest, gap / -block.speed);
         });
         return soonest;
@@ -363,7 +357,7 @@ private:
     [[nodiscard]] bool has_closed(double& since) const {
         bool found = false;
         since = 0.0;
-        for_each_gap([&](const UnilateralRows::Block& block, double gap) {
+        for_each_gap([&](const UnilateralRows::Block& block, double gap, std::size_t) {
             const double left = left_of(block.key, gap);
             if (left >= -resolution_) return;
             found = true;
@@ -390,7 +384,7 @@ private:
     void fly(StepSolver& solver, StepReport& report) {
         constexpr double beyond = 1.02, turn = 0.5, shortest = 1.0 / 64.0;
         deep_.clear();
-        for_each_gap([&](const UnilateralRows::Block& block, double gap) {
+        for_each_gap([&](const UnilateralRows::Block& block, double gap, std::size_t) {
             if (gap < -resolution_) deep_.emplace_back(block.key, gap);
         });
         std::sort(deep_.begin(), deep_.end());
@@ -454,7 +448,7 @@ private:
             open = guess;
             std::swap(now_, trial);
             double least = std::numeric_limits<double>::infinity(), soonest = least;
-            for_each_gap([&](const UnilateralRows::Block& block, double gap) {
+            for_each_gap([&](const UnilateralRows::Block& block, double gap, std::size_t) {
                 if (block.speed >= 0.0) return;
                 const double left = left_of(block.key, gap);
                 least = std::min(least, left);

@@ -22,8 +22,8 @@
 //           they say how fast the bodies close, and the gap that this speed takes until t.
 // Points of a pair where it is, or near, may be closer than its bodies move towards them at first, as the bound has it,
 // while none touches yet; and what comes into the envelope on the way may pass. Then the shapes are advanced in the
-// same way, to a millionth of their gap or of the envelope: those that pass get no contact, and where the normal has
-// turned till then, or was not that of the beginning already, the contacts of that place count.
+// same way, to a millionth of their gap or of the envelope: those that pass get no contact, and those that strike where
+// the normal has turned till then, or was not that of the beginning already, have the contacts of that place.
 #pragma once
 
 #include <vector>

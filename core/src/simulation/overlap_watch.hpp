@@ -22,7 +22,7 @@ public:
     [[nodiscard]] std::pair<BodyIndex, BodyIndex> bodies() const { return bodies_; }
     /// By what its overlap has grown, m.
     [[nodiscard]] double depth() const { return depth_; }
-    /// By what it had grown in the trial before; 0 in the first one.
+    /// By what it had grown in the trial before; in the first one it says nothing.
     [[nodiscard]] double last_depth() const { return last_; }
 
 private:
@@ -45,7 +45,7 @@ public:
     /// Notes the overlaps at the beginning of a step of size h, of the bodies.
     void begin(const State& state, double h, const sdk::Team& team = {}) {
         system_.collect_overlaps(state, h, team, before_);
-        now_ = before_;
+        now_.clear();
     }
     /// Throws StepTooDeep if they have grown too much at the end of it. h: of the next step.
     void require_within(const State& state, double h, const sdk::Team& team = {});

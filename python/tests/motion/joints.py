@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What touches and has joints, motors or springs: cars, pendulums that meet a stop, a bead on a rod, orbits,
-cams."""
+"""What touches and has joints, motors or springs: cars, pendulums that meet a stop, a bead on a rod, orbits, cams."""
 import numpy as np
 
 from .scenes import (G, STEPS, Cases, Motion, about_x, about_y, box, capsule, constant_acceleration, cylinder, end_of,
