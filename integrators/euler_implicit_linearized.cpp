@@ -70,6 +70,7 @@ public:
           constraint_stiffness_(values[3].text == "definite"),
           linearization_(system, values[4].real),
           blocks_(system.constraint_blocks()),
+          bodies_(system.bodies_of_columns()),
           n_(system.n()),
           m_(system.m()) {
         delta_.resize(static_cast<std::size_t>(n_));
@@ -135,7 +136,8 @@ private:
 
         const StepRequest request{.warm_start = true,
                                   .method_error = note_velocity_error(state, h),
-                                  .error_of_solves = velocity_error_.of_solver()};
+                                  .error_of_solves = velocity_error_.of_solver(),
+                                  .bodies = bodies_};
         untouched_.find(spins_, problem_.D, n_);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
@@ -519,6 +521,7 @@ private:
     bool constraint_stiffness_;
     Linearization linearization_;
     std::vector<std::int32_t> blocks_;
+    std::vector<std::int32_t> bodies_;  ///< by column
     std::int32_t n_, m_;
     MatrixAssembler H_, R_, D_, G_;
     UnilateralRows rows_;

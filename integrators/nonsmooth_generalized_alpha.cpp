@@ -43,6 +43,7 @@ public:
           energy_(system),
           projection_(system),
           cones_(free_cones(system)),
+          bodies_(system.bodies_of_columns()),
           n_(system.n()),
           m_(system.m()) {
         for (Vector& load : loads_) load.setZero(n_);
@@ -171,7 +172,7 @@ private:
             }
             ++report.newton_iterations;
             report.solved = before;
-            if (!report.take(solver.solve(problem_, solution_, {.warm_start = true}))) break;
+            if (!report.take(solver.solve(problem_, solution_, {.warm_start = true, .bodies = bodies_}))) break;
         }
     }
 
@@ -217,6 +218,7 @@ private:
     EnergyOfStep energy_;
     PositionProjection projection_;
     std::vector<Cone> cones_;
+    std::vector<std::int32_t> bodies_;  // by column
     std::int32_t n_, m_;
     // D_Aᵀ λ_A of the step to come and of the last one, and A as a force; n.
     std::array<Vector, 3> loads_;

@@ -216,8 +216,8 @@ TEST(Auto, CountsAnalysesAndFactorizationsSinceItWasMade) {
     }
 }
 
-// In a simulation a start that is within the tolerance is sharpened once. From then on no stage is needed, and what was
-// counted before stays.
+// In a simulation a start that is within the tolerance and moves is sharpened once. From then on, and at rest, no stage
+// is needed, and what was counted before stays.
 TEST(Auto, KeepsItsCountsWhereTheStartIsTheAnswer) {
     const PreparedProblem problem(read_problem(example("box_stack")));
     Solver solver = make_solver(registry(), parse_solver("auto"));
@@ -236,6 +236,11 @@ TEST(Auto, KeepsItsCountsWhereTheStartIsTheAnswer) {
     EXPECT_TRUE(third.stages.empty());
     EXPECT_EQ(third.analyses, second.analyses);
     EXPECT_EQ(third.factorizations, second.factorizations);
+    settings.tolerance = std::max(1.5 * third.error.natural, 1e-16);
+    for (const bool stands : {true, false}) {
+        settings.stands_still = [stands](std::span<const double>, double) { return stands; };
+        EXPECT_EQ(solver.solve(problem, solution, settings).stages.empty(), stands);
+    }
 }
 
 // A tolerance that is a goal may be missed, the farther the more work was spent; another may not.

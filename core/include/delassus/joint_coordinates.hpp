@@ -92,6 +92,8 @@ public:
     void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     /// Of bodies that a free joint holds.
     [[nodiscard]] std::vector<std::int32_t> vectors() const override;
+    /// Trees, which count as bodies here.
+    [[nodiscard]] std::vector<std::int32_t> bodies_of_columns() const override;
     /// Of bodies that nothing but a free joint holds and that carry none.
     void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const override;
     void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,

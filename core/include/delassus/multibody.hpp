@@ -623,6 +623,8 @@ public:
     void add_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     void add_gyroscopic_damping(const State& state, double factor, Tangent tangent, MatrixAssembler& H) const override;
     [[nodiscard]] std::vector<std::int32_t> vectors() const override;
+    /// Bodies, reduced ones among them, and nodes, numbered as their columns follow one another.
+    [[nodiscard]] std::vector<std::int32_t> bodies_of_columns() const override;
     void free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const override;
     void add_inertial_stiffness(const State& state, const double* acceleration, double factor, Tangent tangent,
                                 MatrixAssembler& H) const override;

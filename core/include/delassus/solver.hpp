@@ -63,6 +63,9 @@ struct SolveSettings {
     /// goes on as if it had not, if it can (DELASSUS_FLAG_RESUMES); else the solution is a start like any other.
     bool resume = false;
     Origin origin = Origin::Alone;
+    /// Of a step: whether bodies with these velocities, an answer with this natural error, all stand still. Empty: they
+    /// move. Called by the thread that solves.
+    std::function<bool(std::span<const double> x, double natural)> stands_still;
     /// Threads that the solver may share its work among; the answer is the same to the bit without them. May be null.
     std::shared_ptr<ThreadTeam> team;
 

@@ -52,6 +52,9 @@ struct StepRequest {
     /// What earlier solves left in method_error, n, for each velocity in the norm of the masses of its island; it is
     /// not taken for the method's own.
     std::span<const double> error_of_solves = {};
+    /// DynamicalSystem::bodies_of_columns(), n, where the unknowns are the velocities at the end of the step: those of
+    /// bodies that stand still, but for what the solver left, become 0. Empty: they stay as they are.
+    std::span<const std::int32_t> bodies = {};
 };
 
 /// What came of it. The spans are valid until the next solve.
@@ -81,12 +84,10 @@ public:
 };
 
 /// Decides which parts of a step's problem stand still and need no solver. A part is what H and rows connect, with all
-/// columns of a body; parts without rows are not asked about.
+/// columns of a body (StepRequest::bodies); parts without rows are not asked about.
 class DELASSUS_API RestingParts {
 public:
     virtual ~RestingParts();
-    /// A number for each column; neighbours with equal numbers are of one body.
-    [[nodiscard]] virtual std::span<const std::int32_t> bodies() const = 0;
     /// Whether the part with these columns, ascending, stands still: then its x is 0 and its λ stays as it started.
     /// identity: a hash of all that the part's solution follows from but H, never 0 or 1.
     virtual bool rests(std::span<const std::int32_t> columns, std::uint64_t identity) = 0;

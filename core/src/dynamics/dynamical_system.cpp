@@ -89,6 +89,9 @@ DynamicalSystem::~DynamicalSystem() = default;
 std::int32_t DynamicalSystem::position_size() const {
     return n();
 }
+std::vector<std::int32_t> DynamicalSystem::bodies_of_columns() const {
+    return std::vector<std::int32_t>(static_cast<std::size_t>(n()), 0);
+}
 std::vector<std::int32_t> DynamicalSystem::vectors() const {
     return {};
 }

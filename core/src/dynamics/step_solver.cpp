@@ -16,6 +16,7 @@
 #include "delassus/sdk/cones.hpp"
 #include "delassus/sdk/problem_view.hpp"
 #include "delassus/timestepper.hpp"
+#include "dynamics/bodies_at_rest.hpp"
 #include "dynamics/general_factor.hpp"
 #include "dynamics/island_solver.hpp"
 #include "dynamics/islands.hpp"
@@ -106,6 +107,7 @@ struct StepSolver::Implementation {
     SolveSettings settings;
     std::deque<KeptKind> kinds;  // few
     Islands islands;
+    BodiesAtRest at_rest;
     std::vector<IslandResult> results;  // by the number of the part
     std::vector<double> left, left_in_masses;
     std::vector<Chain> chains;
@@ -166,7 +168,9 @@ StepAnswer StepSolver::solve(Problem&& problem, Solution& solution, const StepRe
     self.left.assign(static_cast<std::size_t>(problem.n()), 0.0);
     self.left_in_masses.assign(static_cast<std::size_t>(problem.n()), 0.0);
     self.answer = {};
+    self.at_rest.begin(problem, request.bodies);
     self.answer.solved = self.solve(problem, solution, request);
+    self.at_rest.stop(self.left, solution.x);
     self.answer.left = self.left;
     self.answer.left_in_masses = self.left_in_masses;
     return self.answer;
@@ -190,7 +194,7 @@ bool StepSolver::Implementation::solve(Problem& problem, Solution& solution, con
     request.warm_start = request.warm_start && solution.x.size() == n && solution.lambda.size() == m;
     if (!leaves_out || m == 0 || !Islands::can_part(problem)) return solve_whole(kind, problem, solution, request);
 
-    islands.find(problem, resting ? resting->bodies() : std::span<const std::int32_t>{});
+    islands.find(problem, resting ? request.bodies : std::span<const std::int32_t>{});
     const auto list = islands.list();
     if (!resting && list.size() == 1 && list[0].cones.size() == problem.cones.size())
         return solve_whole(kind, problem, solution, request);
@@ -320,6 +324,9 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     }
     SolveSettings own = settings;
     own.team = threads;
+    own.stands_still = [this, columns](std::span<const double> x, double error) {
+        return at_rest.all_stand(columns, x, error);
+    };
     IslandRequest island{.settings = own,
                          .warm_start = request.warm_start,
                          .leaves_out = leaves_out,

@@ -62,6 +62,7 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
       linearization_(system, settings_.linearization_limit),
       projection_(system),
       cones_(free_cones(system)),
+      bodies_(system.bodies_of_columns()),
       n_(system.n()),
       m_(system.m()),
       velocity_error_(order()),
@@ -639,7 +640,7 @@ bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
 
 // Where steps are chosen by their error, the solver must not disturb it.
 void ThetaMethod::note_velocity_error(const State& begin, double h) {
-    request_ = {.warm_start = true};
+    request_ = {.warm_start = true, .bodies = bodies_};
     velocity_error_.note(begin.v, left_, last_h_, h);
     if (chooses_steps_) return;
     request_.method_error = velocity_error_.known();

@@ -102,6 +102,7 @@ private:
     Linearization linearization_;
     PositionProjection projection_;
     std::vector<Cone> cones_;
+    std::vector<std::int32_t> bodies_;  ///< by column
     std::int32_t n_, m_;
     double last_h_ = 0.0;
     VelocityError velocity_error_;

@@ -18,6 +18,7 @@
 #include <array>
 #include <cmath>
 
+#include "dynamics/row_entries.hpp"
 #include "dynamics/velocity_contacts.hpp"
 
 namespace delassus {

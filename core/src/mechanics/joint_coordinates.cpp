@@ -593,6 +593,18 @@ std::vector<std::int32_t> JointCoordinates::vectors() const {
     return columns;
 }
 
+std::vector<std::int32_t> JointCoordinates::bodies_of_columns() const {
+    const std::vector<Link>& links = implementation_->tree.links();
+    std::vector<std::int32_t> tree(links.size(), 0), numbers(static_cast<std::size_t>(n()), 0);
+    std::int32_t trees = 0;
+    for (std::size_t k = 1; k < links.size(); ++k) {
+        const Link& link = links[k];
+        tree[k] = link.parent == 0 ? trees++ : tree[static_cast<std::size_t>(link.parent)];
+        std::fill_n(numbers.begin() + link.column, link.freedoms, tree[k]);
+    }
+    return numbers;
+}
+
 void JointCoordinates::free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const {
     auto& self = *implementation_;
     spins.clear();

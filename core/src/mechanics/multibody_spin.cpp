@@ -2,6 +2,7 @@
 // Gyroscopic torques of a multibody system, and the free spin of its bodies.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "mechanics/multibody_implementation.hpp"
 #include "mechanics/rotation.hpp"
@@ -83,6 +84,19 @@ std::vector<std::int32_t> MultibodySystem::vectors() const {
         if (node_column(node) >= 0) columns.push_back(node_column(node));
     std::sort(columns.begin(), columns.end());
     return columns;
+}
+
+std::vector<std::int32_t> MultibodySystem::bodies_of_columns() const {
+    const auto& self = *implementation_;
+    std::vector<std::int32_t> numbers(static_cast<std::size_t>(n()), 0);
+    const auto begin = [&](std::int32_t column) {
+        if (column > 0) numbers[static_cast<std::size_t>(column)] = 1;
+    };
+    for (const auto& body : self.moving) begin(body.column);
+    for (const auto& body : self.reduced) begin(body.column);
+    for (std::int32_t node = 0; node < node_count(); ++node) begin(node_column(node));
+    std::partial_sum(numbers.begin(), numbers.end(), numbers.begin());
+    return numbers;
 }
 
 void MultibodySystem::free_spins(const State& state, double h, std::vector<FreeSpin>& spins) const {

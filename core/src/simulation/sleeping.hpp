@@ -23,7 +23,6 @@ public:
     /// stops.
     void end_step(const State& before, State& now);
 
-    [[nodiscard]] std::span<const std::int32_t> bodies() const override { return unit_of_; }
     bool rests(std::span<const std::int32_t> columns, std::uint64_t identity) override;
     void solved(std::span<const std::int32_t> columns, std::uint64_t identity, std::span<double> x) override;
 

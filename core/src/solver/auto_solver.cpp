@@ -127,38 +127,23 @@ public:
         StageRunner runner(problem, solution, settings, report);
         const bool step = settings.origin == Origin::Step;
         const bool at_start = step && runner.solved_at_start();
+        if (at_start && settings.stands_still && settings.stands_still(solution.x, runner.error()->natural))
+            return runner.error();
         const Order& order = order_of(problem, settings.origin);
         const Team& team = team_of(problem, order);
+        if (at_start) {
+            sharpen(problem, team, settings, runner, report);
+            return runner.error();
+        }
         const std::vector<RankedSolver>& ranked = team.ranked;
         const std::vector<Member>& members = team.members;
-        // Where the start meets the tolerance, as at rest, an answer far within it leaves the next steps nothing to do.
-        // Newton's method gets there with an iteration or two. Where it does not, as with many rows of which some
-        // repeat others, those that follow it have one turn each; and where the order has it iterate a few times only,
-        // since each is dear, a start well within the tolerance is left alone.
-        constexpr double at_rest = 1e-6, sharper = 1e-3, well_within = 0.1;
-        constexpr std::int64_t enough = 10;
-        double left_alone = HUGE_VAL;  // of the tolerance
-        for (const Member& member : members)
-            if (member.local) left_alone = std::min(left_alone, member.iterations >= enough ? sharper : well_within);
-        const bool sharpens =
-            at_start && settings.tolerance <= at_rest && runner.worst() > left_alone * settings.tolerance;
-        if (at_start && !sharpens) return runner.error();
         Solution start = solution;
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
         std::map<const Solver*, std::size_t> users;  // the member that used it last
-        bool had_newton = false;                     // a turn, of those that sharpen
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
             const RankedSolver& own = ranked[turn.member];
-            if (sharpens) {
-                if (turn.round > 0 || (had_newton && runner.worst() <= well_within * settings.tolerance))
-                    return {TurnEnd::Done, runner.worst()};
-                had_newton = had_newton || members[turn.member].local;
-                if (!had_newton) {
-                    left[turn.member] = solution;
-                    return {TurnEnd::Exhausted, runner.worst()};
-                }
-            } else if (turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
+            if (turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
                 report.near_goal = !(runner.worst() <= settings.tolerance);
                 return {TurnEnd::Done, runner.worst()};
             }
@@ -172,7 +157,7 @@ public:
                         .resume = turn.start == turn.member && users.contains(solver) && users[solver] == turn.member};
             users[solver] = turn.member;
             // What Newton's method gains with its last iteration costs nothing.
-            if (step && (members[turn.member].local || sharpens)) stage.tighter = sharper;
+            if (step && members[turn.member].local) stage.tighter = sharper;
             Solution& iterate = left[turn.member];
             iterate = turn.start ? left[*turn.start] : start;
             TurnResult result = runner.run(*solver, stage, iterate, turn.start || has_start);
@@ -183,7 +168,6 @@ public:
             }
             return result;
         });
-        if (sharpens) report.status = Status::Solved;
         if (end == RoundsEnd::Stale && report.status != Status::Solved) report.status = Status::Stalled;
         report.message = fmt::format("{}: {}{}", order.name, runner.sentence(),
                                      end == RoundsEnd::Stale ? "; no solver got nearer in three rounds" : "");
@@ -201,6 +185,27 @@ private:
         std::vector<RankedSolver> ranked;
         std::vector<Member> members;  // the same as the rounds see them
     };
+
+    /// Newton's method leaves this share of a tolerance that it meets, for an iteration or two.
+    static constexpr double sharper = 1e-3;
+
+    /// A start that meets the tolerance, with bodies that move, as a light one that rolls slowly on a heavy one: an
+    /// error of the one is small beside the reactions of the other. Newton's method, where its iterations are not dear,
+    /// makes the motion exact. Where all stand still, the start is the answer.
+    void sharpen(const Prepared& problem, const Team& team, const SolveSettings& settings, StageRunner& runner,
+                 SolveReport& report) {
+        constexpr double least = 1e-6;
+        constexpr std::int64_t enough = 10;
+        if (settings.tolerance > least || runner.worst() <= sharper * settings.tolerance) return;
+        for (std::size_t k = 0; k < team.members.size(); ++k) {
+            const Member& member = team.members[k];
+            Solver* solver = member.local && member.iterations >= enough ? usable(team.ranked[k], problem) : nullptr;
+            if (!solver) continue;
+            runner.run(*solver, {.reason = "sharper", .tighter = sharper, .iterations = member.iterations});
+            break;
+        }
+        report.status = Status::Solved;
+    }
 
     /// Who takes turns, found once for problems alike.
     const Team& team_of(const Prepared& problem, const Order& order) {
