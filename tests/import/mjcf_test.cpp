@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What today's MJCF has, and libmujoco 2.2 refuses; and what is mended, lost or refused.
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -312,6 +314,42 @@ TEST(ImportCommand, NamesOverlapsAndTakesThemOut) {
     const auto parted = run_command(call + " --part-overlaps");
     ASSERT_EQ(parted.exit_code, 0) << parted.err;
     EXPECT_EQ(YAML::LoadFile((folder / "s.yaml").string())["keep_apart"].size(), 1U);
+}
+
+// A shin overlaps the pelvis over the knee and the hip, whose three hinges have no masses between them; the foot is a
+// joint too far.
+TEST(ImportCommand, KeepsOverlapsNearAJointApart) {
+    const ScratchFolder folder;
+    const auto part = [](const char* name, double x, const std::string& joints, const std::string& rest) {
+        return fmt::format("<body name='{}' pos='{} 0 0'>{}<geom type='box' size='0.1 0.1 0.1'/>{}</body>", name, x,
+                           joints, rest);
+    };
+    const std::string hinge = "<joint axis='0 1 0'/>",
+                      hip = "<joint axis='1 0 0'/><joint axis='0 1 0'/><joint axis='0 0 1'/>";
+    std::ofstream(folder / "m.xml") << mjcf(
+        part("pelvis", 0.0, "<freejoint/>",
+             part("thigh", 0.05, hip, part("shin", 0.05, hinge, part("foot", 0.05, hinge, "")))));
+    const std::string call = "import " + (folder / "m.xml").string() + " -o " + (folder / "s.yaml").string();
+    const auto pairs = [&] {
+        std::vector<std::string> names;
+        for (const auto& pair : YAML::LoadFile((folder / "s.yaml").string())["keep_apart"])
+            names.push_back(pair[0].as<std::string>() + " " + pair[1].as<std::string>());
+        std::ranges::sort(names);
+        return names;
+    };
+    const auto near = run_command(call);
+    ASSERT_EQ(near.exit_code, 0) << near.err;
+    EXPECT_NE(near.out.find("--keep-overlaps"), std::string::npos) << near.out;
+    EXPECT_NE(near.out.find("--part-overlaps"), std::string::npos) << near.out;
+    const std::vector<std::string> neighbours = pairs();
+    ASSERT_EQ(run_command(call + " --keep-overlaps").exit_code, 0);
+    const std::vector<std::string> none = pairs();
+    ASSERT_EQ(run_command(call + " --part-overlaps").exit_code, 0);
+    const std::vector<std::string> all = pairs();
+    EXPECT_EQ(neighbours.size(), none.size() + 2);
+    EXPECT_EQ(all.size(), none.size() + 3);
+    EXPECT_TRUE(std::ranges::count(neighbours, "pelvis shin") + std::ranges::count(neighbours, "shin pelvis") == 1);
+    EXPECT_EQ(run_command(call + " --part-overlaps --keep-overlaps").exit_code, 2);
 }
 
 #ifdef DELASSUS_HAS_URDF

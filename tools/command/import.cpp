@@ -23,7 +23,7 @@ namespace {
 struct ImportArguments {
     std::filesystem::path model, output;
     ImportSettings settings;
-    bool strict = false, part_overlaps = false;
+    bool strict = false, part_overlaps = false, keep_overlaps = false;
     std::optional<double> height;
 };
 
@@ -58,7 +58,34 @@ private:
 struct Overlap {
     std::array<std::string, 2> bodies;
     double depth = 0.0;
+    bool near = false;  ///< joined_nearby(): parts of one joint that was drawn coarsely
+    bool parted = false;
 };
+
+/// Whether two bodies are joined over at most two joints. Several joints in one place, with bodies without mass between
+/// them, count as one.
+bool joined_nearby(const MultibodySystem& system, BodyIndex from, BodyIndex to) {
+    constexpr int most = 2;
+    std::map<BodyIndex, int> joints_to = {{from, 0}};
+    for (bool nearer = true; nearer;) {
+        nearer = false;
+        for (std::int32_t k = 0; k < system.joint_count(); ++k) {
+            const JointParameters& joint = system.joint(k);
+            if (joint.kind == JointKind::Gear) continue;
+            for (const auto& [near, far] : {std::pair(joint.first, joint.second), {joint.second, joint.first}}) {
+                const auto known = joints_to.find(near);
+                if (far == world_body || known == joints_to.end()) continue;
+                const int count = known->second + (system.body(far).mass > 0.0 ? 1 : 0);
+                const auto [place, first] = joints_to.try_emplace(far, count);
+                if (!first && place->second <= count) continue;
+                place->second = count;
+                nearer = true;
+            }
+        }
+    }
+    const auto found = joints_to.find(to);
+    return found != joints_to.end() && found->second <= most;
+}
 
 std::vector<Overlap> overlaps_of(Scene& scene) {
     std::vector<Overlap> all;
@@ -74,7 +101,7 @@ std::vector<Overlap> overlaps_of(Scene& scene) {
             const std::array<std::string, 2> bodies = {system.body(a).name, system.body(b).name};
             auto found =
                 std::find_if(all.begin(), all.end(), [&](const Overlap& known) { return known.bodies == bodies; });
-            if (found == all.end()) found = all.insert(all.end(), Overlap{bodies, 0.0});
+            if (found == all.end()) found = all.insert(all.end(), {bodies, 0.0, joined_nearby(system, a, b)});
             found->depth = std::max(found->depth, -contact.gap);
         }
     }
@@ -82,14 +109,17 @@ std::vector<Overlap> overlaps_of(Scene& scene) {
     return all;
 }
 
-void print_overlaps(const std::vector<Overlap>& overlaps, bool parted) {
-    if (overlaps.empty()) return;
+template <class Which>
+void print_overlaps(const char* title, const std::vector<Overlap>& overlaps, Which&& which) {
     constexpr std::size_t most_named = 10;
-    fmt::print("{}:\n", parted ? "Overlap at the start, and are kept apart"
-                               : "Overlap at the start (--part-overlaps keeps these apart)");
-    for (std::size_t k = 0; k < std::min(overlaps.size(), most_named); ++k)
-        fmt::print("  \"{}\" and \"{}\": {:.3g} m\n", overlaps[k].bodies[0], overlaps[k].bodies[1], overlaps[k].depth);
-    if (overlaps.size() > most_named) fmt::print("  and {} pairs more\n", overlaps.size() - most_named);
+    std::size_t count = 0;
+    for (const Overlap& one : overlaps) {
+        if (!which(one)) continue;
+        if (count == 0) fmt::print("{}:\n", title);
+        if (++count <= most_named)
+            fmt::print("  \"{}\" and \"{}\": {:.3g} m\n", one.bodies[0], one.bodies[1], one.depth);
+    }
+    if (count > most_named) fmt::print("  and {} pairs more\n", count - most_named);
 }
 
 int import_scene(ImportArguments arguments) {
@@ -122,10 +152,12 @@ int import_scene(ImportArguments arguments) {
         const Registry registry(std::vector<std::filesystem::path>{});
         for (auto& system : scene.systems) const Simulation simulation(system, registry);
         overlaps = overlaps_of(scene);
-        if (arguments.part_overlaps && !overlaps.empty()) {
-            for (const Overlap& one : overlaps) arguments.settings.apart.push_back(one.bodies);
-            imported = import_model(arguments.model, arguments.output, arguments.settings);
+        for (Overlap& one : overlaps) {
+            one.parted = arguments.part_overlaps || (one.near && !arguments.keep_overlaps);
+            if (one.parted) arguments.settings.apart.push_back(one.bodies);
         }
+        if (!arguments.settings.apart.empty())
+            imported = import_model(arguments.model, arguments.output, arguments.settings);
     } catch (const Error& error) {
         throw InputError(fmt::format("{}: the scene that this model makes would be refused: {}",
                                      arguments.model.string(), error.what()));
@@ -135,7 +167,16 @@ int import_scene(ImportArguments arguments) {
     fmt::print("{}: from {} ({}): {} bodies, {} joints, {} shapes\n", arguments.output.string(),
                arguments.model.filename().string(), imported.format, imported.bodies, imported.joints, imported.shapes);
     report();
-    print_overlaps(overlaps, arguments.part_overlaps);
+    if (arguments.part_overlaps) {
+        print_overlaps("Overlap at the start, and are kept apart", overlaps, [](const Overlap&) { return true; });
+        return exit_solved;
+    }
+    print_overlaps(
+        "Overlap at the start, are joined over two joints at most, and are kept apart (--keep-overlaps lets them "
+        "touch)",
+        overlaps, [](const Overlap& one) { return one.parted; });
+    print_overlaps("Overlap at the start (--part-overlaps keeps these apart)", overlaps,
+                   [](const Overlap& one) { return !one.parted; });
     return exit_solved;
 }
 
@@ -175,8 +216,13 @@ void add_import(CLI::App& program, Action& action) {
         ->add_option("--package-path", arguments->settings.package_paths,
                      "Folder in which package:// and model:// addresses are looked for; may be given again")
         ->type_name("DIR");
-    command->add_flag("--part-overlaps", arguments->part_overlaps,
-                      "Keep bodies apart that overlap at the start by more than the contact envelope");
+    auto* part = command->add_flag("--part-overlaps", arguments->part_overlaps,
+                                   "Keep bodies apart that overlap at the start by more than the contact envelope; "
+                                   "those that are joined over two joints at most are kept apart in any case");
+    command
+        ->add_flag("--keep-overlaps", arguments->keep_overlaps,
+                   "Let all of these touch, which are pushed apart then, also those that are joined nearby")
+        ->excludes(part);
     command->callback([arguments, &action] { action.run = [arguments] { return import_scene(*arguments); }; });
 }
 
