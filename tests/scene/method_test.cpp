@@ -114,6 +114,29 @@ TEST(Method, FollowsFromTheScene) {
 }
 
 // A mass of 2 kg on a spring: ω = √(k/2). On a prismatic joint the ring of 1e-6 kg m² that it carries cannot turn.
+// Round numbers give h ω = 0.1 exactly, where fixed steps still follow a spring. It does not depend on how a scene
+// lies.
+TEST(Method, IsTheSameAtABoundHoweverTheSceneLies) {
+    for (int k = 0; k < 24; ++k) {
+        const double turn = 0.37 * k, x = std::cos(turn), y = std::sin(turn);
+        const auto division_of = [&](double stiffness) {
+            const Scene scene = parse_scene(
+                fmt::format(
+                    "step: 0.01\nend: 1\nbodies:\n"
+                    "- {{name: ground, fixed: true, shapes: [{{plane: {{}}}}]}}\n"
+                    "- {{name: post, fixed: true, position: [{0:.17g}, {1:.17g}, 0.1]}}\n"
+                    "- {{name: ball, mass: 1, inertia: {{xx: 0.004, yy: 0.004, zz: 0.004}}, position: [0, 0, 0.1],\n"
+                    "   shapes: [{{sphere: {{radius: 0.1}}}}]}}\n"
+                    "springs:\n- {{name: s, first: post, second: ball, stiffness: {2}, rest_length: 1}}\n",
+                    x, y, stiffness),
+                "test.yaml");
+            return scene.systems[0].division;
+        };
+        EXPECT_EQ(division_of(100.0), StepDivision::WhileCheap) << turn;
+        EXPECT_EQ(division_of(100.1), StepDivision::ToChosenAccuracy) << turn;
+    }
+}
+
 TEST(Method, IsImplicitWhereForcesAreStiff) {
     const auto on_spring = [](double rate, const std::string& joints) {
         return head + fmt::format(

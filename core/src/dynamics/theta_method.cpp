@@ -323,12 +323,14 @@ void ThetaMethod::remember_change(const Vector& result, double h) {
     }
 }
 
-/// What is stiff from now on, h being the longest step.
+/// What is stiff from now on, h being the longest step. What is at the bound, as by round numbers, is not, whatever
+/// rounding makes of it.
 void ThetaMethod::resolve_up_to(double h) {
+    constexpr double rounding = 1e-6;
     longest_h_ = h;
     stiff_.clear();
     if (h > 0.0 && settings_.holds_stiff && system_.has_stiffness())
-        system_.find_stiff_forces(resolved_rate_ / h, stiff_);
+        system_.find_stiff_forces((1.0 + rounding) * resolved_rate_ / h, stiff_);
 }
 
 /// H, D and the cones, which stay for the step.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace delassus::scene {
 namespace {
@@ -63,9 +64,12 @@ public:
     /// The fastest of vibrations, spins and decays, 1/s.
     struct Fastest {
         double stiffness, spin, damping;
+        /// A scene of round numbers may have h ω at a limit: it is within, whatever rounding makes of it.
         [[nodiscard]] bool within(const Fastest& limits, double step) const {
-            return stiffness * step <= limits.stiffness && spin * step <= limits.spin &&
-                   damping * step <= limits.damping;
+            constexpr double rounding = 1e-6;
+            const double least = step / (1.0 + rounding);
+            return stiffness * least <= limits.stiffness && spin * least <= limits.spin &&
+                   damping * least <= limits.damping;
         }
     };
     [[nodiscard]] Fastest fastest() const {
@@ -93,10 +97,11 @@ public:
     }
 
 private:
-    /// |largest eigenvalue| of M⁻¹ A, from below, within a few percent: the power method from a vector without
-    /// symmetry.
+    /// |largest eigenvalue| of M⁻¹ A: the power method from a vector without symmetry, until it stands still. Where
+    /// several are nearly as large, it is below them by a share like their distance.
     [[nodiscard]] double spectral_radius(const Matrix& A) const {
-        constexpr int iterations = 40;
+        constexpr int iterations = 400;
+        constexpr double still = 1e-10;
         if (A.norm() == 0.0) return 0.0;
         Eigen::VectorXd x = Eigen::VectorXd::NullaryExpr(
             n_, [](Eigen::Index i) { return 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i)); });
@@ -105,8 +110,8 @@ private:
             x.normalize();
             x = M_.solve(Eigen::VectorXd(A * x));
             if (C_.rows() > 0) x -= M_.solve(Eigen::VectorXd(C_.transpose() * S_.solve(Eigen::VectorXd(C_ * x))));
-            radius = x.norm();
-            if (!(radius > 0.0) || !std::isfinite(radius)) break;
+            const double before = std::exchange(radius, x.norm());
+            if (!(radius > 0.0) || !std::isfinite(radius) || std::abs(radius - before) <= still * radius) break;
         }
         return std::isfinite(radius) ? radius : std::numeric_limits<double>::infinity();
     }
