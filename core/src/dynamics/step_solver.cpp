@@ -324,9 +324,10 @@ void StepSolver::Implementation::solve_part(KeptKind& kind, Problem& problem, So
     }
     SolveSettings own = settings;
     own.team = threads;
-    own.stands_still = [this, columns](std::span<const double> x, double error) {
+    const auto all_stand = [this, columns](std::span<const double> x, double error) {
         return at_rest.all_stand(columns, x, error);
     };
+    own.stands_still = std::cref(all_stand);  // which allocates nothing
     IslandRequest island{.settings = own,
                          .warm_start = request.warm_start,
                          .leaves_out = leaves_out,
