@@ -176,8 +176,8 @@ public:
     /// Of velocities that are the three components of one vector, the first columns, ascending: what a method guesses
     /// of them does not depend on the axes. Default: none.
     [[nodiscard]] virtual std::vector<std::int32_t> vectors() const;
-    /// For each velocity the number, from 0, of the body that it is of; n. A body moves or stands still as a whole.
-    /// Default: all are of one.
+    /// For each velocity the number, from 0, of the body that it is of; n. A body moves or stands still as a whole, by
+    /// what acts on it alone. Default: each is one by itself.
     [[nodiscard]] virtual std::vector<std::int32_t> bodies_of_columns() const;
     /// Rows of the bilateral constraints, by blocks that belong together (a joint); m() is their sum.
     [[nodiscard]] virtual std::vector<std::int32_t> constraint_blocks() const;

@@ -90,7 +90,9 @@ std::int32_t DynamicalSystem::position_size() const {
     return n();
 }
 std::vector<std::int32_t> DynamicalSystem::bodies_of_columns() const {
-    return std::vector<std::int32_t>(static_cast<std::size_t>(n()), 0);
+    std::vector<std::int32_t> bodies(static_cast<std::size_t>(n()));
+    std::iota(bodies.begin(), bodies.end(), 0);
+    return bodies;
 }
 std::vector<std::int32_t> DynamicalSystem::vectors() const {
     return {};
