@@ -172,6 +172,34 @@ TEST(ImpactMotion, AJointMeetsItsStopAtItsTime) {
     }
 }
 
+// A heavy box lies on a light one, which strikes the floor. Between them nothing strikes, whatever rounding or a last
+// approach by 1e-8 m/s makes of their gap: both rise from the time at which the lower one strikes.
+TEST(ImpactMotion, WhatFallsTogetherRisesTogether) {
+    constexpr double e = 0.5, g = 9.81, height = 0.3, after = 0.011;
+    const double falls = std::sqrt(2.0 * height / g);
+    for (const double unit : {1.0, 1e3})  // m, then mm with the same mass and time
+        for (const double closes : {0.0, 1e-12, 1e-8, 1e-6})
+            for (const double step : {0.01, 0.0071}) {
+                SCOPED_TRACE(fmt::format("{} {} {}", unit, closes, step));
+                auto run = run_of(fmt::format(
+                    "step: {0:.17g}\nend: {1:.17g}\ngravity: [0, 0, {2:.17g}]\n"
+                    "materials: {{m: {{friction: 0.8, restitution: 0.5}}}}\nbodies:\n"
+                    "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                    "- {{name: light, density: {3:.17g}, position: [0, 0, {4:.17g}], shapes: [{{box: {{size: "
+                    "[{5:.17g}, "
+                    "{5:.17g}, {5:.17g}]}}, material: m}}]}}\n"
+                    "- {{name: heavy, density: {6:.17g}, position: [0, 0, {7:.17g}], velocity: [0, 0, {8:.17g}], "
+                    "shapes: "
+                    "[{{box: {{size: [{9:.17g}, {9:.17g}, {9:.17g}]}}, material: m}}]}}\n",
+                    step, falls + after, -g * unit, 1000.0 / (unit * unit * unit), (height + 0.15) * unit, 0.3 * unit,
+                    7800.0 / (unit * unit * unit), (height + 0.5 + 0.24 * closes) * unit, -closes * unit, 0.4 * unit));
+                run.finish();
+                const double rises = e * g * falls * after - 0.5 * g * after * after;
+                EXPECT_NEAR(run.pose("light").position[2] / unit, 0.15 + rises, 2e-4);
+                EXPECT_NEAR(run.pose("heavy").position[2] / unit, 0.5 + rises, 2e-4);
+            }
+}
+
 // Of a stack of seven, several rest, some open a little and are struck at once: no impact gives what closes it again
 // more than it takes.
 TEST(ImpactMotion, AStackThatBouncesGainsNoEnergy) {

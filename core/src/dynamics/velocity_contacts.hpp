@@ -187,6 +187,7 @@ private:
         double wanted = 0.0;                ///< what it should have been before
         double end_speed = 0.0;             ///< of the normal row
         double change = 0.0;                ///< of the normal row's speed by its impulse, D diag(H)⁻¹ Dᵀ λ
+        bool passes_on = false;             ///< has an impact, with the impulse of another one
         double recovery = 0.0;              ///< speed with which it is pushed apart
         std::optional<LimitedServo> servo;  ///< of a row with a compliance
         bool pushed = false;                ///< in the step before
@@ -218,6 +219,7 @@ private:
         return restitution_ * rows_.blocks()[block].restitution;
     }
     [[nodiscard]] bool acts(const Contact& contact, const Solution& solution) const;
+    void find_passing(const Problem& problem, const Solution& solution);
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     /// Of rows in rows_ and before_, with the rates of these times, m/s or rad/s.
     [[nodiscard]] double speed_at_begin(std::size_t row, std::size_t before) const;

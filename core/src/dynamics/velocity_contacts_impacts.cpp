@@ -155,6 +155,7 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // another gap.
 void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth,
                                      std::span<const double> last_changes, double last_h) {
+    constexpr double faint = 1e-9;
     smooth_ = smooth.data();
     if (takes_only_) return;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -174,9 +175,13 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
         };
         const auto acceleration = [&] { return (speed_of(smooth.data()) - speed_of(begin_speeds_)) / h_; };
+        double together = 0.0;  // what bodies that move as one close by is rounding, or what solvers left
+        for_each_entry(problem.D, static_cast<std::size_t>(row), 1, [&](std::size_t, std::size_t column, double value) {
+            together += faint * std::abs(value * begin_speeds_[column]);
+        });
         const double last_pull = last_changes.empty() ? 0.0 : problem.D.row_times(row, last_changes.data());
         const auto strikes = [&] {
-            return bounces ? speed < -settings_.restitution_speed
+            return bounces ? speed < -std::max(settings_.restitution_speed, together)
                            : speed < -h_ * std::max({std::abs(acceleration()), std::abs(pull), std::abs(last_pull)}) -
                                          contact.resolution / h_;
         };
@@ -206,7 +211,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             impact = meeting_from(open, block.speed, 0.0);
         }
         const double drift = (1.0 - theta_) * h_ * speed;
-        if (impact && (bounces ? impact->closing > settings_.restitution_speed : strikes())) {
+        if (impact && (bounces ? impact->closing > std::max(settings_.restitution_speed, together) : strikes())) {
             contact.impact = impact;
             contact.strikes = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;
@@ -350,6 +355,45 @@ bool VelocityContacts::any_bounce(const Solution& solution) const {
     return false;
 }
 
+// Of two bodies that touch and fall together the lower one strikes the ground. They may have met by 10⁻⁸ m/s at the
+// beginning of the step; the impulse between them then is that of the ground, at its time.
+void VelocityContacts::find_passing(const Problem& problem, const Solution& solution) {
+    const auto& D = problem.D;
+    std::vector<double> fastest(static_cast<std::size_t>(D.columns), 0.0);  // change by an impact, along the chain
+    bool any = false;
+    for (Contact& contact : contacts_) {
+        contact.passes_on = false;
+        const std::size_t row = first_row_ + contact.row;
+        if (!acts(contact, solution)) continue;
+        const double change = contact.impact->change;
+        for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double) {
+            fastest[column] = std::max(fastest[column], change);
+        });
+        contact.passes_on = change < mostly * coupling(D, diagonal_, row, row) * solution.lambda[row];
+        any = any || contact.passes_on;
+    }
+    if (!any) return;
+    for (bool passed_on = true; passed_on;) {
+        passed_on = false;
+        for (std::size_t k = 0; k < contacts_.size(); ++k) {
+            const std::size_t row = first_row_ + contacts_[k].row;
+            if (!(solution.lambda[row] > 0.0)) continue;
+            double most = 0.0;
+            for_each_entry(D, row, 1,
+                           [&](std::size_t, std::size_t column, double) { most = std::max(most, fastest[column]); });
+            for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double) {
+                passed_on = passed_on || fastest[column] < most;
+                fastest[column] = most;
+            });
+        }
+    }
+    for (Contact& contact : contacts_)
+        if (contact.passes_on)
+            for_each_entry(D, first_row_ + contact.row, 1, [&](std::size_t, std::size_t column, double) {
+                contact.passes_on = contact.passes_on && contact.impact->change < mostly * fastest[column];
+            });
+}
+
 // An impact at τ changes the velocities by v⁺ − ṽ, with all that holds against it; what presses besides is in ṽ as
 // well. So positions, which the step moves by (1 − θ) v + θ v⁺, lack
 //
@@ -358,7 +402,8 @@ bool VelocityContacts::any_bounce(const Solution& solution) const {
 // which is added before what else is off is undone (position_projection.cpp). τ is that of the impacts on a velocity,
 // weighed by their impulses. Of a contact that pushed in the step before as much goes on as it pushed with there: s is
 // the share of the rest. Masses, joints and contacts that push pass an impact on to velocities on which none acts, and
-// with it s and τ.
+// with it s and τ. So do contacts whose bodies met at next to no speed, if the impulse is mostly that of a faster
+// impact on one of them (find_passing()).
 bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solution) {
     if (!any_impact(solution)) return false;
     all_bounce_ = true;
@@ -387,9 +432,10 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
         found_.clear();
         return any;
     };
+    find_passing(problem, solution);
     for (const Contact& contact : contacts_) {
         const std::size_t first = first_row_ + contact.row;
-        if (!acts(contact, solution)) continue;
+        if (!acts(contact, solution) || contact.passes_on) continue;
         const double share = std::max(1.0 - contact.last[0] / solution.lambda[first], 0.0);
         const OnVelocity value{share, share * (1.0 - theta_ - contact.impact->acts / h_)};
         for_each_entry(D, first, 1,
@@ -399,7 +445,8 @@ bool VelocityContacts::find_impacts(const Problem& problem, const Solution& solu
     settle();
     for (const std::size_t column : directly) on_velocities_[column].alone = true;
     for (std::size_t k = 0; k < contacts_.size(); ++k)
-        if (const std::size_t first = first_row_ + contacts_[k].row; !acts(contacts_[k], solution))
+        if (const std::size_t first = first_row_ + contacts_[k].row;
+            !acts(contacts_[k], solution) || contacts_[k].passes_on)
             for_each_entry(D, first, static_cast<std::size_t>(rows_.blocks()[k].cone.rows),
                            [&](std::size_t row, std::size_t column, double) {
                                if (solution.lambda[row] != 0.0) on_velocities_[column].alone = false;
