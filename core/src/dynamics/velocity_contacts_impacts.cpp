@@ -175,13 +175,14 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             return problem.D.row_times(row, v) + rows_.rows()[contact.row].rate;
         };
         const auto acceleration = [&] { return (speed_of(smooth.data()) - speed_of(begin_speeds_)) / h_; };
-        double together = 0.0;  // what bodies that move as one close by is rounding, or what solvers left
+        double slowest = 0.0;  // impact: by less, bodies that move as one close by rounding, or by what solvers left
         for_each_entry(problem.D, static_cast<std::size_t>(row), 1, [&](std::size_t, std::size_t column, double value) {
-            together += faint * std::abs(value * begin_speeds_[column]);
+            slowest += faint * std::abs(value * begin_speeds_[column]);
         });
+        slowest = std::max(slowest, settings_.restitution_speed);
         const double last_pull = last_changes.empty() ? 0.0 : problem.D.row_times(row, last_changes.data());
         const auto strikes = [&] {
-            return bounces ? speed < -std::max(settings_.restitution_speed, together)
+            return bounces ? speed < -slowest
                            : speed < -h_ * std::max({std::abs(acceleration()), std::abs(pull), std::abs(last_pull)}) -
                                          contact.resolution / h_;
         };
@@ -211,7 +212,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             impact = meeting_from(open, block.speed, 0.0);
         }
         const double drift = (1.0 - theta_) * h_ * speed;
-        if (impact && (bounces ? impact->closing > std::max(settings_.restitution_speed, together) : strikes())) {
+        if (impact && (bounces ? impact->closing > slowest : strikes())) {
             contact.impact = impact;
             contact.strikes = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;

@@ -126,8 +126,7 @@ public:
                               SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);
         const bool step = settings.origin == Origin::Step;
-        const bool begins_at_rest =
-            std::ranges::all_of(solution.x, [](double speed) { return speed == 0.0; });  // those that go with λ follow
+        const bool begins_at_rest = step && stands(problem, solution);  // before the velocities are those of the start
         const bool at_start = step && runner.solved_at_start();
         if (at_start && settings.stands_still && settings.stands_still(solution.x, runner.error()->natural))
             return runner.error();
@@ -190,6 +189,13 @@ private:
 
     /// Newton's method leaves this share of a tolerance that it meets, for an iteration or two.
     static constexpr double sharper = 1e-3;
+
+    static bool stands(const Prepared& problem, const Solution& start) {
+        double fastest = 0.0;
+        for (const double speed : start.x) fastest = std::max(fastest, std::abs(speed));
+        problem.communicator().max(std::span(&fastest, 1));
+        return fastest == 0.0;
+    }
 
     /// A start that meets the tolerance, with bodies that move, as a light one that rolls slowly on a heavy one: an
     /// error of the one is small beside the reactions of the other. Newton's method, where its iterations are not dear,
