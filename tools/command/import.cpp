@@ -109,12 +109,12 @@ std::vector<Overlap> overlaps_of(Scene& scene) {
     return all;
 }
 
-template <class Which>
-void print_overlaps(const char* title, const std::vector<Overlap>& overlaps, Which&& which) {
+/// Those that are kept apart, or the others.
+void print_overlaps(const char* title, const std::vector<Overlap>& overlaps, bool parted) {
     constexpr std::size_t most_named = 10;
     std::size_t count = 0;
     for (const Overlap& one : overlaps) {
-        if (!which(one)) continue;
+        if (one.parted != parted) continue;
         if (count == 0) fmt::print("{}:\n", title);
         if (++count <= most_named)
             fmt::print("  \"{}\" and \"{}\": {:.3g} m\n", one.bodies[0], one.bodies[1], one.depth);
@@ -167,16 +167,12 @@ int import_scene(ImportArguments arguments) {
     fmt::print("{}: from {} ({}): {} bodies, {} joints, {} shapes\n", arguments.output.string(),
                arguments.model.filename().string(), imported.format, imported.bodies, imported.joints, imported.shapes);
     report();
-    if (arguments.part_overlaps) {
-        print_overlaps("Overlap at the start, and are kept apart", overlaps, [](const Overlap&) { return true; });
-        return exit_solved;
-    }
-    print_overlaps(
-        "Overlap at the start, are joined over two joints at most, and are kept apart (--keep-overlaps lets them "
-        "touch)",
-        overlaps, [](const Overlap& one) { return one.parted; });
-    print_overlaps("Overlap at the start (--part-overlaps keeps these apart)", overlaps,
-                   [](const Overlap& one) { return !one.parted; });
+    print_overlaps(arguments.part_overlaps
+                       ? "Overlap at the start, and are kept apart"
+                       : "Overlap at the start, are joined over two joints at most, and are kept apart "
+                         "(--keep-overlaps lets them touch)",
+                   overlaps, true);
+    print_overlaps("Overlap at the start (--part-overlaps keeps these apart)", overlaps, false);
     return exit_solved;
 }
 

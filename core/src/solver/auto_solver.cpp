@@ -126,7 +126,8 @@ public:
                               SolveReport& report) override {
         StageRunner runner(problem, solution, settings, report);
         const bool step = settings.origin == Origin::Step;
-        const bool begins_at_rest = step && stands(problem, solution);  // before the velocities are those of the start
+        // Asked before solved_at_start() gives the velocities that go with the reactions.
+        const bool begins_at_rest = std::ranges::all_of(solution.x, [](double speed) { return speed == 0.0; });
         const bool at_start = step && runner.solved_at_start();
         if (at_start && settings.stands_still && settings.stands_still(solution.x, runner.error()->natural))
             return runner.error();
@@ -190,32 +191,26 @@ private:
     /// Newton's method leaves this share of a tolerance that it meets, for an iteration or two.
     static constexpr double sharper = 1e-3;
 
-    static bool stands(const Prepared& problem, const Solution& start) {
-        double fastest = 0.0;
-        for (const double speed : start.x) fastest = std::max(fastest, std::abs(speed));
-        problem.communicator().max(std::span(&fastest, 1));
-        return fastest == 0.0;
-    }
-
     /// A start that meets the tolerance, with bodies that move, as a light one that rolls slowly on a heavy one: an
     /// error of the one is small beside the reactions of the other. Newton's method, where its iterations are not dear,
     /// makes the motion exact. Where all stand still, the start is the answer. Whether what stood begins to move is
-    /// looked at as closely as can be: an arch sways as a whole at a speed that makes next to no error.
+    /// looked at as closely as can be: the error of an arch that sways as a whole is small beside its speed.
     void sharpen(const Prepared& problem, const Team& team, const SolveSettings& settings, bool begins_at_rest,
                  StageRunner& runner, SolveReport& report) {
         constexpr double least = 1e-6, rounding = 1e-5;
         constexpr std::int64_t enough = 10;
+        const auto newton = std::ranges::find_if(
+            team.members, [](const Member& member) { return member.local && member.iterations >= enough; });
+        if (settings.tolerance > least || newton == team.members.end()) return;
+        double moves = begins_at_rest ? 0.0 : 1.0;  // on any process
+        problem.communicator().max(std::span(&moves, 1));
         const double share = runner.worst() / settings.tolerance;
-        if (settings.tolerance > least || share <= (begins_at_rest ? rounding : sharper)) return;
-        for (std::size_t k = 0; k < team.members.size(); ++k) {
-            const Member& member = team.members[k];
-            Solver* solver = member.local && member.iterations >= enough ? usable(team.ranked[k], problem) : nullptr;
-            if (!solver) continue;
-            runner.run(*solver, {.reason = "sharper",
-                                 .tighter = sharper * (begins_at_rest ? share : 1.0),
-                                 .iterations = member.iterations});
-            break;
-        }
+        if (share <= (moves > 0.0 ? sharper : rounding)) return;
+        Solver* solver = usable(team.ranked[static_cast<std::size_t>(newton - team.members.begin())], problem);
+        if (!solver) return;
+        runner.run(
+            *solver,
+            {.reason = "sharper", .tighter = sharper * (moves > 0.0 ? 1.0 : share), .iterations = newton->iterations});
         report.status = Status::Solved;
     }
 
