@@ -109,7 +109,7 @@ private:
             solve(state, h, solver, report);
             move(h, solver, report);
             require_finite(state, end_, h, name);
-            projection_.project(state, end_, h, problem_.H, contacts_, solver, report, name);
+            projection_.project(state, end_, h, problem_, {}, contacts_, solver, report, name);
         }
         keep(h, report);
         state = end_;

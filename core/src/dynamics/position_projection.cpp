@@ -31,7 +31,8 @@ PositionProjection::PositionProjection(DynamicalSystem& system)
       n_(system.n()),
       m_(system.m()),
       resolution_(system.gap_resolution()),
-      constraint_(static_cast<std::size_t>(m_)) {}
+      constraint_(static_cast<std::size_t>(m_)),
+      ways_(system) {}
 
 /// The problem; whether there is anything to undo.
 bool PositionProjection::assemble(const State& end, double h, const VelocityContacts& contacts) {
@@ -112,14 +113,14 @@ void PositionProjection::solve(StepSolver& solver, StepReport& report) {
     ++report.newton_iterations;
 }
 
-void PositionProjection::project(const State& begin, State& end, double h, const SparseMatrix& H,
-                                 const VelocityContacts& contacts, StepSolver& solver, StepReport& report,
-                                 std::string_view method) {
+void PositionProjection::project(const State& begin, State& end, double h, const Problem& problem,
+                                 std::span<const double> left, const VelocityContacts& contacts, StepSolver& solver,
+                                 StepReport& report, std::string_view method) {
     moved_ = false;
     if (n_ == 0 || !assemble(end, h, contacts)) return;
     problem_.name = "position";
     problem_.law = Law::Associated;
-    problem_.H = H;
+    problem_.H = problem.H;
     if (contacts.begins_deep()) {
         make_compliant();
     } else if (problem_.E.rows > 0) {
@@ -140,6 +141,8 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     }
     system_.increment(end.q.data(), delta_.data(), end.q.data());
     require_finite(begin, end, h, method);
+    if (m_ == 0) return;
+    ways_.find(problem, begin, end, left);
     require_nearer(begin, end, h, method);
 }
 
@@ -162,14 +165,18 @@ void PositionProjection::project_velocities(State& end, const SparseMatrix& H, S
     for (std::size_t i = 0; i < end.v.size(); ++i) end.v[i] += solution_.x[i];
 }
 
-// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below 10⁻⁶, or
-// 10⁴ times the resolution, may be the tolerance of the solver.
+// A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below a
+// thousandth of a row's way, or 10⁴ times the resolution, may be the tolerance of the solver.
 void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
+    constexpr double share_of_way = 1e-3;
     double off = 0.0, left = 0.0;
-    for (std::size_t i = 0; i < constraint_.size(); ++i) off = std::max(off, std::abs(constraint_[i]));
-    if (m_ > 0) system_.constraint(end, constraint_.data());
-    for (const double C : constraint_) left = std::max(left, std::abs(C));
-    if (left <= 0.5 * off || left <= std::max(1e4 * resolution_, 1e-6)) return;
+    for (const double C : constraint_) off = std::max(off, std::abs(C));
+    system_.constraint(end, constraint_.data());
+    for (std::size_t row = 0; row < constraint_.size(); ++row) {
+        const double C = std::abs(constraint_[row]);
+        if (C > ways_.digits() + share_of_way * ways_.of(problem_.D, row)) left = std::max(left, C);
+    }
+    if (left <= 0.5 * off || left <= 1e4 * resolution_) return;
     throw StepTooLong(fmt::format(
         "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves constraints off by {:.2g}, and projecting "
         "the positions by {:.2g}; take shorter steps, or a method that iterates on positions (euler_implicit, hht)",

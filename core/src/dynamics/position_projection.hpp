@@ -9,6 +9,7 @@
 
 #include "delassus/export.hpp"
 #include "delassus/timestepper.hpp"
+#include "dynamics/row_ways.hpp"
 
 namespace delassus {
 
@@ -20,16 +21,18 @@ public:
     /// system outlives it.
     explicit PositionProjection(DynamicalSystem& system);
 
-    /// Moves end.q by the least motion in the norm of H, of a step of size h; contacts: of this step. Adds what
-    /// contacts gave by it to report.recovered. Throws StepFailure if the motion is not finite or does not bring the
-    /// constraints nearer to 0.
-    void project(const State& begin, State& end, double h, const SparseMatrix& H, const VelocityContacts& contacts,
-                 StepSolver& solver, StepReport& report, std::string_view method);
+    /// Moves end.q by the least motion in the norm of H, of a step of size h; problem: that of the step, of velocities;
+    /// left: as of RowWays; contacts: of this step. Adds what contacts gave by it to report.recovered. Throws
+    /// StepFailure if the motion is not finite or does not bring the constraints nearer to 0.
+    void project(const State& begin, State& end, double h, const Problem& problem, std::span<const double> left,
+                 const VelocityContacts& contacts, StepSolver& solver, StepReport& report, std::string_view method);
     /// What the last project() moved by, n: the step had erred by as much. Empty if it moved nothing, or if the step
     /// began with a penetration.
     [[nodiscard]] std::span<const double> moved() const {
         return moved_ ? std::span<const double>(delta_) : std::span<const double>();
     }
+    /// Memory for what a step is judged by.
+    [[nodiscard]] RowWays& ways() { return ways_; }
     /// Changes end.v by the least, in the norm of H, to where the constraints stay: C_q v + C_t = 0.
     void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 
@@ -48,6 +51,7 @@ private:
     Problem problem_;
     Solution solution_;
     std::vector<double> constraint_, delta_, force_, diagonal_;
+    RowWays ways_;
     bool moved_ = false;
 };
 

@@ -173,7 +173,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     if (!stiff_.empty()) report.damped = lost_by_stiff_forces(state, h, result_);
     if (linearization_.wanted()) judge_linearization(state, h, result_, solver, report);
     const bool projected = !settings_.linearly_implicit || struck || contacts_.landed(solution_);
-    if (projected) projection_.project(state, end_, h, problem_.H, contacts_, solver, report, settings_.name);
+    if (projected) projection_.project(state, end_, h, problem_, left_, contacts_, solver, report, settings_.name);
     if (struck && m_ > 0) projection_.project_velocities(end_, problem_.H, solver, report);
     if (settings_.linearly_implicit && m_ > 0) judge_constraints(state, h);
     mark_struck(struck);
@@ -662,24 +662,19 @@ void ThetaMethod::judge_linearization(const State& begin, double h, const Vector
                          report);
 }
 
-// A row's C at the end is what the linear model of its step missed. Beyond linearization_limit times the way h |D| |v|
-// of what it holds, and where it grows, the step was too long for the model. What is below 10⁻⁶ may be a solver's.
+// A row's C at the end is what the linear model of its step missed. Beyond linearization_limit times the way of what it
+// holds, and where it grows, the step was too long for the model.
 void ThetaMethod::judge_constraints(const State& begin, double h) {
-    const auto& D = problem_.D;
+    RowWays& ways = projection_.ways();
+    ways.find(problem_, begin, end_, left_);
     system_.constraint(begin, constraint_.data());
-    double before = 1e-6;
+    double before = ways.digits();
     for (const double C : constraint_) before = std::max(before, std::abs(C));
     system_.constraint(end_, constraint_.data());
     for (std::size_t row = 0; row < constraint_.size(); ++row) {
         const double off = std::abs(constraint_[row]);
         if (off <= 2.0 * before) continue;
-        double way = 0.0;
-        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
-            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
-            way += h * std::abs(D.value[static_cast<std::size_t>(e)]) *
-                   std::max(std::abs(begin.v[column]), std::abs(end_.v[column]));
-        }
-        const double allowed = settings_.linearization_limit * way;
+        const double allowed = settings_.linearization_limit * ways.of(problem_.D, row);
         if (off <= allowed) continue;
         throw StepTooLong(fmt::format(
             "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, where "
