@@ -244,6 +244,34 @@ TEST(LinearizationLimit, EndsARunThatWouldHangBack) {
     }
 }
 
+/// The longest step that a method takes whole of a bob that swings freely from the horizontal, of lengths in so many a
+/// metre; what is below 1e-3 of it is not tried.
+double longest_step(double units) {
+    double taken = 0.0;
+    for (double h = 1e-3; h < 1.0; h *= 1.3) {
+        Running run = running(
+            fmt::format(
+                "step: 0.001\nend: 10\ngravity: [0, 0, {}]\nbodies: [{{name: bob, mass: 1, inertia: {{xx: {}, "
+                "yy: {}, zz: {}}}, position: [{}, 0, 0], velocity: [0, 0, {}]}}]\njoints: [{{name: hinge, kind: "
+                "spherical, second: bob, point: [0, 0, 0]}}]\ncoordinates: maximal\n",
+                -g * units, 0.1 * units * units, 0.1 * units * units, 0.1 * units * units, units, -2.0 * units),
+            "linearly_implicit_trapezoidal", h);
+        run.simulation.step();
+        if (run.simulation.totals().divided_steps > 0) break;
+        taken = h;
+    }
+    return taken;
+}
+
+// In millimetres, and for a mechanism of a millimetre, as in metres.
+TEST(LinearizationLimit, LetsConstraintsMissAShareOfTheWayWhateverTheUnits) {
+    const double longest = longest_step(1.0);
+    EXPECT_GT(longest, 1e-2);
+    EXPECT_LT(longest, 0.9);
+    EXPECT_EQ(longest_step(1e3), longest);
+    EXPECT_EQ(longest_step(1e-6), longest);
+}
+
 // In parts the steps are those that a user would have to ask for. The bob swings as on a rod: at 0.5 s it is at
 // x = 0.39104879 (φ¨ = g cos φ, by a method of order 4 with steps of 10 µs).
 TEST(LinearizationLimit, DividesStepsThatAreTooLong) {
@@ -334,6 +362,38 @@ TEST(Limits, AreRefusedWhereTheyMakeNoSense) {
 }
 
 // The step is solved once without the stop, which is no row then; the servo keeps its place in what is left.
+// A motor without a bound of its force drives an arm beyond its stop.
+TEST(Limits, AStopThatAMotorRunsAgainstIsNamed) {
+    Running run(parse_scene(
+        "step: 0.01\nend: 3\nbodies: [{name: arm, mass: 1, inertia: {xx: 0.01, yy: 0.02, zz: 0.02}, position: [0.5, 0, "
+        "1]}]\njoints: [{name: elbow, kind: revolute, second: arm, point: [0, 0, 1], axis: [0, 1, 0], lower: -1, "
+        "upper: "
+        "1}]\nmotors: [{name: drive, joint: elbow, speed: true, motion: 2}]\n",
+        "motor"));
+    const std::string sentence = failure_of(run);
+    EXPECT_TRUE(says(sentence, "joints at a stop: \"elbow\" at 0.98 of 1 with the motor \"drive\"")) << sentence;
+    EXPECT_NEAR(run.simulation.state().t, 0.49, 1e-9);
+}
+
+// A body that nothing can move is driven through by 10 mm/s: no step lets them sink in by more than the accuracy, but
+// all of them together do.
+TEST(Limits, OverlapsThatAddUpAreSaid) {
+    Running run(parse_scene(
+        "step: 0.01\nend: 0.5\nbodies:\n- {name: ram, position: [0, 0, 0.3], motion: {translation: [0, 0, {linear: "
+        "{rate: -0.01}}]}, shapes: [{box: {size: [0.2, 0.2, 0.2]}}]}\n- {name: block, density: 1000, position: [0, 0, "
+        "0.1], shapes: [{box: {size: [0.2, 0.2, 0.2]}}]}\njoints: [{name: weld, kind: fixed, second: block, point: [0, "
+        "0, 0]}]\n",
+        "ram"));
+    EXPECT_EQ(failure_of(run), "");
+    const auto& totals = run.simulation.totals();
+    // A step reports its contacts as they were at its beginning; 0.2 mm are allowed.
+    EXPECT_EQ(totals.deep_steps, 47);
+    EXPECT_TRUE(says(totals.first_deep, "bodies \"ram\" and \"block\" overlap by 0.0003 m")) << totals.first_deep;
+    const auto warnings = run.simulation.warnings();
+    ASSERT_EQ(warnings.size(), 1U);
+    EXPECT_TRUE(says(warnings[0], "47 of 50 steps leave bodies in one another")) << warnings[0];
+}
+
 TEST(Limits, AServoActsBesideAStop) {
     Running run(parse_scene(
         "step: 0.005\nend: 0.6\ngravity: [0, 0, 0]\nbodies:\n"

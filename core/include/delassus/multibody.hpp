@@ -530,6 +530,8 @@ public:
     /// Bodies that overlap at a state, by pairs, ascending; h (s): of the step that begins there. What it finds is kept
     /// for collect_unilateral() of the same state and step. Not those of nodes. team: threads that may share the work.
     void collect_overlaps(const State& state, double h, const sdk::Team& team, std::vector<BodyOverlap>& overlaps);
+    /// That of a contact alone; of depth 0 where its gap is open, or it is one of nodes.
+    [[nodiscard]] BodyOverlap overlap_of(const ContactPoint& contact) const;
     /// From now on collect_unilateral() also has the contacts of shapes that would meet on straight ways to where
     /// bodies and nodes are at `end`: a step that led there had no rows for what its own reactions made bodies meet.
     void expect_end(const State& end);

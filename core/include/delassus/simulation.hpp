@@ -88,8 +88,8 @@ struct SimulationTotals {
     std::string first_unsolved;       ///< when and why the first did
     double error = 0.0;               ///< sum of StepRecord::error
     std::int64_t inexact_steps = 0;   ///< with a part that errs by more than the accuracy asks
-    /// Steps in which bodies came to overlap by more than the accuracy allows, and shorter ones did not help; when and
-    /// which the first time.
+    /// Steps after which bodies overlap by more than the accuracy allows, beside what did at the start, or in which they
+    /// came to by so much however short their parts; when and which the first time.
     std::int64_t deep_steps = 0;
     std::string first_deep;
     std::int64_t most_inverted = 0;  ///< solid elements that are turned inside out after a step
@@ -243,8 +243,6 @@ private:
     void judge(const AdaptiveStepReport& taken, SimulationTotals& totals) const;
     /// force += what contacts, stops and bounded motors did to the bodies in the last step; columns of the bodies.
     void add_unilateral_forces(std::vector<double>& force) const;
-    /// Which bodies touched in the last step, and joints that repeat others, as the end of a sentence; or empty.
-    [[nodiscard]] std::string what_acts() const;
     /// What takes the steps of method().
     void make_method();
     /// How its steps are divided by the accuracy; the solver is told.

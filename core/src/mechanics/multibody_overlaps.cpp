@@ -69,6 +69,15 @@ void MultibodySystem::Implementation::add_expected(std::vector<ContactPoint>& co
     }
 }
 
+BodyOverlap MultibodySystem::overlap_of(const ContactPoint& contact) const {
+    const auto& self = *implementation_;
+    const auto shape_a = static_cast<std::size_t>(contact.shape_a), shape_b = static_cast<std::size_t>(contact.shape_b);
+    if (!(contact.gap < 0.0) || std::max(shape_a, shape_b) >= self.shapes.size()) return {};
+    const auto [a, b] = std::minmax(self.shapes[shape_a].body, self.shapes[shape_b].body);
+    const auto &of_a = self.extents[shape_a], &of_b = self.extents[shape_b];
+    return {a, b, -contact.gap, std::min(of_a.largest, of_b.largest), std::min(of_a.half_smallest, of_b.half_smallest)};
+}
+
 void MultibodySystem::collect_overlaps(const State& state, double h, const sdk::Team& team,
                                        std::vector<BodyOverlap>& overlaps) {
     auto& self = *implementation_;
@@ -85,16 +94,12 @@ void MultibodySystem::collect_overlaps(const State& state, double h, const sdk::
     }
     std::map<std::pair<BodyIndex, BodyIndex>, BodyOverlap> pairs;
     for (const ContactPoint& contact : self.detected.contacts) {
-        const auto shape_a = static_cast<std::size_t>(contact.shape_a),
-                   shape_b = static_cast<std::size_t>(contact.shape_b);
-        if (!(contact.gap < 0.0) || std::max(shape_a, shape_b) >= self.shapes.size()) continue;
-        const auto [a, b] = std::minmax(self.shapes[shape_a].body, self.shapes[shape_b].body);
-        const auto& of_a = self.extents[shape_a];
-        const auto& of_b = self.extents[shape_b];
-        BodyOverlap& pair = pairs.try_emplace({a, b}, BodyOverlap{a, b, 0.0, HUGE_VAL, HUGE_VAL}).first->second;
-        pair.depth = std::max(pair.depth, -contact.gap);
-        pair.extent = std::min({pair.extent, of_a.largest, of_b.largest});
-        pair.thickness = std::min({pair.thickness, of_a.half_smallest, of_b.half_smallest});
+        const BodyOverlap own = overlap_of(contact);
+        if (!(own.depth > 0.0)) continue;
+        BodyOverlap& pair = pairs.try_emplace({own.a, own.b}, own).first->second;
+        pair.depth = std::max(pair.depth, own.depth);
+        pair.extent = std::min(pair.extent, own.extent);
+        pair.thickness = std::min(pair.thickness, own.thickness);
     }
     for (const auto& [key, pair] : pairs) overlaps.push_back(pair);
 }

@@ -27,10 +27,10 @@ double depth_in(const std::vector<BodyOverlap>& list, const BodyOverlap& pair) {
 
 OverlapWatch::OverlapWatch(MultibodySystem& system, double accuracy, const State& start, double h)
     : system_(system), accuracy_(accuracy) {
-    system.collect_overlaps(start, h, {}, before_);
+    system.collect_overlaps(start, h, {}, start_);
     const BodyOverlap* worst = nullptr;
     std::size_t others = 0;
-    for (const BodyOverlap& pair : before_) {
+    for (const BodyOverlap& pair : start_) {
         if (pair.depth <= allowed(pair)) continue;
         if (worst) ++others;
         if (!worst || pair.depth > worst->depth) worst = &pair;
@@ -66,6 +66,22 @@ void OverlapWatch::require_within(const State& state, double h, const sdk::Team&
                     "times what its accuracy allows",
                     quoted_name(system_, worst->a), quoted_name(system_, worst->b), grown, state.t, beyond),
         worst->a, worst->b, grown, depth_in(last_, *worst) - depth_in(before_, *worst));
+}
+
+std::string OverlapWatch::too_deep(std::span<const ContactPoint> contacts) const {
+    BodyOverlap worst{};
+    double beyond = 1.0;
+    for (const ContactPoint& contact : contacts) {
+        if (!(contact.gap < 0.0)) continue;
+        const BodyOverlap pair = system_.overlap_of(contact);
+        const double share = (pair.depth - depth_in(start_, pair)) / allowed(pair);
+        if (!(share > beyond)) continue;
+        worst = pair;
+        beyond = share;
+    }
+    if (!(beyond > 1.0)) return {};
+    return fmt::format("bodies {} and {} overlap by {:.2g} m, {:.3g} times what the accuracy allows",
+                       quoted_name(system_, worst.a), quoted_name(system_, worst.b), worst.depth, beyond);
 }
 
 std::vector<BodyIndex> OverlapWatch::given_up() const {

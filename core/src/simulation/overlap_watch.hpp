@@ -3,6 +3,7 @@
 #pragma once
 
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,6 +52,9 @@ public:
     void require_within(const State& state, double h, const sdk::Team& team = {});
     /// They come to overlap however short the steps: they are not watched until they have come apart.
     void give_up(std::pair<BodyIndex, BodyIndex> bodies) { given_up_.insert(bodies); }
+    /// Which contacts after a step are deeper than the accuracy allows, beside what overlapped at the start, a
+    /// sentence; empty: none. What steps let sink in by less than each of them may, adds up.
+    [[nodiscard]] std::string too_deep(std::span<const ContactPoint> contacts) const;
     /// Those that are not watched, a then b of each pair, ascending.
     [[nodiscard]] std::vector<BodyIndex> given_up() const;
     void set_given_up(const std::vector<BodyIndex>& pairs);
@@ -63,7 +67,8 @@ private:
     MultibodySystem& system_;
     double accuracy_;
     std::string at_start_;
-    std::vector<BodyOverlap> before_, now_, last_;  // of the step's begin, of the last trial and the one before
+    std::vector<BodyOverlap> start_, before_, now_,
+        last_;  // of the run's start, of the step's begin, of the last trial and the one before
     std::set<std::pair<BodyIndex, BodyIndex>> given_up_;
 };
 

@@ -22,6 +22,7 @@
 #include "simulation/stops_at_start.hpp"
 #include "simulation/touching.hpp"
 #include "simulation/watched_step.hpp"
+#include "simulation/what_acts.hpp"
 #include "solver/auto_solver.hpp"
 #include "support/frames.hpp"
 #include "support/trace.hpp"
@@ -355,6 +356,7 @@ private:
         for (const auto& contact : report.step.contacts)
             record.penetration = std::max(record.penetration, -contact.gap);
         if (all_.shared_) record.penetration = all_.shared_->penetration();
+        if (all_.overlaps_ && deep_.empty()) deep_ = all_.overlaps_->too_deep(report.step.contacts);
     }
 
     void judge(const AdaptiveStepReport& report, SimulationTotals& totals) override { all_.judge(report, totals); }
@@ -373,13 +375,17 @@ private:
     void undo() override {
         if (all_.sleeping_) all_.sleeping_->load(sleeping_);
     }
-    [[nodiscard]] std::string what_acts() const override { return all_.what_acts(); }
+    [[nodiscard]] std::string what_acts() const override {
+        if (all_.overlaps_ && run_.now.step == 0 && !all_.overlaps_->at_start().empty())
+            return "; " + all_.overlaps_->at_start();
+        return delassus::what_acts(*all_.system_, all_.state());
+    }
     bool go_on(const std::string& failure) override { return all_.go_on(failure); }
     [[nodiscard]] std::string name() const override { return fmt::format("system \"{}\", ", all_.system_->name); }
 
     Simulation& all_;
     std::vector<double> sleeping_;  // Sleeping::save() before the step
-    std::string deep_;              // what came to overlap whatever its substeps; or empty
+    std::string deep_;              // what overlaps by more than the accuracy allows; or empty
 };
 
 const StepRecord& Simulation::step() {
@@ -433,48 +439,6 @@ void Simulation::add_unilateral_forces(std::vector<double>& force) const {
                     now.value()[k] * found->second[static_cast<std::size_t>(i)];
         }
     }
-}
-
-std::string Simulation::what_acts() const {
-    constexpr std::size_t most = 4;
-    if (overlaps_ && now_.step == 0 && !overlaps_->at_start().empty()) return "; " + overlaps_->at_start();
-    std::vector<ContactPoint> nearest(report().contacts.begin(), report().contacts.end());
-    std::sort(nearest.begin(), nearest.end(), [](const auto& a, const auto& b) { return a.gap < b.gap; });
-    std::vector<std::string> pairs;
-    const MultibodySystem& mechanics = *system_->system;
-    const auto name = [&](std::int32_t body) {
-        if (body >= mechanics.body_count()) return fmt::format("node {}", body - mechanics.body_count());
-        return body < 0 ? std::string("world") : mechanics.body(body).name;
-    };
-    for (const ContactPoint& contact : nearest) {
-        const auto bodies = mechanics.contact_bodies(contact);
-        if (bodies[0] < 0 && bodies[1] < 0) continue;
-        std::string pair = fmt::format("\"{}\" and \"{}\"", name(bodies[0]), name(bodies[1]));
-        if (std::find(pairs.begin(), pairs.end(), pair) == pairs.end()) pairs.push_back(std::move(pair));
-        if (pairs.size() == most) break;
-    }
-    std::string text;
-    if (!pairs.empty()) text = fmt::format("; bodies that touched last, the nearest first: {}", fmt::join(pairs, ", "));
-    if (const auto joints = mechanics.joints_with_rows_left_out(); !joints.empty())
-        text += fmt::format("; joints that repeat or contradict others: \"{}\"", fmt::join(joints, "\", \""));
-    if (!text.empty()) return text;
-    const std::vector<double>& v = state().v;
-    double fastest = 0.0;
-    for (BodyIndex body = 0; body < mechanics.body_count(); ++body) {
-        const auto column = mechanics.body_column(body);
-        if (column < 0) continue;
-        const auto at = static_cast<std::size_t>(column);
-        if (const double speed = std::hypot(v[at], v[at + 1], v[at + 2]); speed > fastest) {
-            fastest = speed;
-            text = fmt::format("; the body that moves fastest: \"{}\", {:.3g} m/s", name(body), speed);
-        }
-    }
-    if (!text.empty() || system_->joints.empty()) return text;
-    std::vector<std::string> joints;
-    for (const JointParameters& joint : system_->joints)
-        if (joints.size() < most) joints.push_back(joint.name);
-    return fmt::format("; nothing moves yet, held by {} joints, the first of them \"{}\"", system_->joints.size(),
-                       fmt::join(joints, "\", \""));
 }
 
 std::vector<ContactRecord> Simulation::contacts() const {
@@ -541,11 +505,10 @@ std::vector<std::string> Simulation::warnings() const {
             "touches there comes and goes by rounding",
             system_->name, totals.inexact_steps, now_.step, system_->accuracy));
     if (const auto& totals = now_.totals; totals.deep_steps > 0)
-        sentences.push_back(
-            fmt::format("{} of {} steps leave bodies in one another by more than \"accuracy\" allows, and shorter "
-                        "parts of them did "
-                        "not help; the first: {}",
-                        totals.deep_steps, now_.step, totals.first_deep));
+        sentences.push_back(fmt::format(
+            "system \"{}\": {} of {} steps leave bodies in one another by more than \"accuracy\" allows; the "
+            "first: {}",
+            system_->name, totals.deep_steps, now_.step, totals.first_deep));
     if (shared_ && method().integrator != system_->integrator)
         sentences.push_back(
             fmt::format("system \"{}\": several processes cannot share {}; {} took its place, which is less exact",

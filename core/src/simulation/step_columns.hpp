@@ -140,7 +140,7 @@ inline constexpr std::array<TotalColumn, 43> total_columns = {{
      &SimulationTotals::error, "/error"},
     {"inexact_steps", "1", "steps with a part that errs by more than the accuracy asks",
      &SimulationTotals::inexact_steps, "/inexact_steps"},
-    {"deep_steps", "1", "steps that leave bodies in one another beyond the accuracy, however short their parts",
+    {"deep_steps", "1", "steps after which bodies overlap by more than the accuracy allows",
      &SimulationTotals::deep_steps, "/deep_steps"},
     {"first_deep", "", "when and which the first time", &SimulationTotals::first_deep, "/first_deep"},
     {"most_inverted", "1", "solid elements that are turned inside out after a step", &SimulationTotals::most_inverted,
