@@ -192,6 +192,25 @@ TEST(Terrain, ARimAndARidgeHoldABox) {
     }
 }
 
+// A box that is tilted along a ridge: the lower end comes near first, whichever it is, and is called the same when the
+// other one has come near.
+TEST(Terrain, WhatLiesOnARidgeKeepsItsNameWhenMoreComesNear) {
+    const Shape roof =
+        surface(ShapeKind::Terrain,
+                {{{-2.0, 0.0, 0.0}, {2.0, 0.0, 0.0}, {0.0, 2.0, -1.0}, {0.0, -2.0, -1.0}}, {{0, 1, 2}, {1, 0, 3}}});
+    const Shape box = shape(ShapeKind::Box, {0.5, 0.5, 0.5}, 0);
+    for (const double tilt : {-0.01, 0.01}) {
+        const Pose at = pose(Vector3d(0.1, 0.0, 0.51), turn(tilt, Vector3d::UnitY()));
+        const auto near = on(roof, box, at, 0.007), all = on(roof, box, at, 0.05);
+        ASSERT_EQ(near.size(), 1U) << tilt;
+        ASSERT_EQ(all.size(), 2U) << tilt;
+        const auto same = std::find_if(all.begin(), all.end(),
+                                       [&](const ContactPoint& one) { return one.feature == near[0].feature; });
+        ASSERT_NE(same, all.end()) << tilt;
+        EXPECT_NEAR(same->gap, near[0].gap, 1e-12) << tilt;
+    }
+}
+
 TEST(Terrain, InAValleyBothSidesAct) {
     const Shape valley = field(5, 4.0, [](double x, double) { return std::abs(x); });
     const auto ball = on(valley, shape(ShapeKind::Sphere, {0.3, 0.0, 0.0}, 0),

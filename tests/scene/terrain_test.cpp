@@ -127,6 +127,37 @@ TEST(TerrainScene, ASphereRollsAlongAVShapedValley) {
     EXPECT_NEAR(run.pose("ball").position[1], 0.0, 1e-9);
 }
 
+// Two slopes of 45°, without friction: what slides down one of them meets the other one head on with the speed v after
+// the time t₁ = v √2/g, at the middle, and goes back with v/2. Points on the two sides have names of their own, so that
+// those that rest are not taken for those that strike; it used to depend on the side from which the body came.
+TEST(TerrainScene, WhatSlidesIntoAValleyBouncesOffItsOtherSide) {
+    const std::string ground =
+        "height_field: {size: [4, 4], heights: " + rows(5, 5, 4.0, 4.0, [](double x, double) { return std::abs(x); }) +
+        "}";
+    constexpr double x0 = 0.7;
+    const double slope = g / std::numbers::sqrt2, t1 = std::sqrt(2.0 * x0 * std::numbers::sqrt2 / slope),
+                 rest = 1.0 - t1;
+    const double expected = (0.5 * slope * t1 * rest - 0.5 * slope * rest * rest) / std::numbers::sqrt2;
+    for (const double step : {0.002, 0.005, 0.01})
+        for (const double side : {-1.0, 1.0})
+            for (const bool ball : {true, false}) {
+                SCOPED_TRACE(fmt::format("step {}, side {}, {}", step, side, ball ? "ball" : "box"));
+                const std::string shape = ball ? "sphere: {radius: 0.3}" : "box: {size: [0.6, 0.4, 0.6]}";
+                SceneOverrides overrides;
+                overrides.step = step;
+                Running run(parse_scene(
+                    scene_on(ground,
+                             fmt::format("  - {{name: body, density: 1000, shapes: [{{{}, material: m}}], position: "
+                                         "[{:.17g}, 0.1, {:.17g}], orientation: {{axis: [0, 1, 0], angle: {}}}}}\n",
+                                         shape, side * x0, x0 + 0.3 * std::numbers::sqrt2, 45.0 * side),
+                             "[0, 0, -9.81]", "{friction: 0, restitution: 0.5}"),
+                    "s", overrides));
+                run.finish();
+                EXPECT_NEAR(run.pose("body").position[0], side * expected, 1e-5);
+                EXPECT_NEAR(run.pose("body").position[1], 0.1, 1e-9);
+            }
+}
+
 TEST(TerrainScene, ASphereSwingsInAParabolaWithItsFrequency) {
     // Rolling: (7/5) (R − r) ω² = g with R the radius of curvature at the bottom.
     const double R = 2.0, r = 0.1, omega = std::sqrt(5.0 / 7.0 * g / (R - r)), period = 2.0 * std::numbers::pi / omega;

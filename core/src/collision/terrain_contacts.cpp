@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <tuple>
 
 #include "mechanics/contact_feature.hpp"
 
@@ -81,13 +80,15 @@ void TerrainContacts::on_triangle(const Terrain& surface, const Terrain::Triangl
     }
 }
 
-void TerrainContacts::put_edge_point(std::int32_t number, const Separation& point, const Vector3d& origin) {
+void TerrainContacts::put_edge_point(std::int32_t number, const Separation& point, const Vector3d& origin,
+                                     std::uint32_t feature) {
     Point result;
     result.distance = point.distance;
     result.normal = point.normal;
     result.on_terrain = origin + point.point_a;
     result.on_shape = origin + point.point_b;
     result.place = number;
+    result.feature = feature;
     points_.push_back(result);
 }
 
@@ -135,9 +136,9 @@ void TerrainContacts::on_edge(const Terrain& surface, std::int32_t number, doubl
     } else if (normal.dot(edge.inward[0]) > angle || normal.dot(edge.inward[1]) > angle) {
         return;
     }
-    if (point_core) return put_edge_point(number, *nearest, middle);
+    if (point_core) return put_edge_point(number, *nearest, middle, nearest->feature);
     manifold_.between(segment_, local_, offset, *nearest, limit, core_points_);
-    for (const CorePoint& point : core_points_) put_edge_point(number, point, middle);
+    for (const CorePoint& point : core_points_) put_edge_point(number, point, middle, point.feature);
 }
 
 void TerrainContacts::find(const Terrain& surface, const AlignedBox3d& box, double limit, double depth) {
@@ -175,26 +176,17 @@ void TerrainContacts::leave_out_copies() {
     points_.swap(kept_);
 }
 
-// A vertex has the name of the vertex, whatever it touches; where it touches several facets, they are told apart by
-// their order. Points over ridges have the number of the ridge, and are told apart by their order.
+// Names say what touches what, whatever else is near: a vertex and a facet, on which a vertex keeps its name while it
+// slides from triangle to triangle; a ridge, and what of the shape, or which end of the ridge, it is.
 void TerrainContacts::name_features(bool terrain_is_a) {
-    for (std::size_t i = 0; i < points_.size(); ++i) points_[i].feature = static_cast<std::uint32_t>(i);
-    std::sort(points_.begin(), points_.end(), [](const Point& p, const Point& q) {
-        return std::tie(p.vertex, p.place, p.feature) < std::tie(q.vertex, q.place, q.feature);
-    });
-    std::size_t rank = 0;
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-        Point& point = points_[i];
-        const bool same = i > 0 && points_[i - 1].vertex == point.vertex &&
-                          (point.vertex >= 0 || points_[i - 1].place == point.place);
-        rank = same ? rank + 1 : 0;
-        point.feature = point.vertex >= 0 ? feature_id(terrain_is_a ? FeatureKind::VertexOfB : FeatureKind::VertexOfA,
-                                                       static_cast<std::size_t>(point.vertex), rank << 7)
-                                          : feature_id(FeatureKind::Edges, static_cast<std::size_t>(point.place), rank);
+    const FeatureKind vertex = terrain_is_a ? FeatureKind::VertexOfB : FeatureKind::VertexOfA;
+    for (Point& point : points_) {
+        const auto place = static_cast<std::size_t>(point.place);
+        point.feature = point.vertex >= 0 ? feature_id(vertex, static_cast<std::size_t>(point.vertex), place)
+                                          : feature_id(FeatureKind::Edges, place, short_feature_of_b(point.feature));
     }
-    std::sort(points_.begin(), points_.end(), [](const Point& p, const Point& q) {
-        return std::tie(p.feature, p.place) < std::tie(q.feature, q.place);
-    });
+    std::stable_sort(points_.begin(), points_.end(),
+                     [](const Point& p, const Point& q) { return p.feature < q.feature; });
     // Where there are more than these bits count.
     for (std::size_t i = 1; i < points_.size(); ++i)
         points_[i].feature = std::max(points_[i].feature, points_[i - 1].feature + 1);

@@ -18,9 +18,9 @@ private:
     struct Point {
         double distance = 0.0;
         Vector3d normal, on_terrain, on_shape;
-        std::int32_t vertex = -1;  ///< of the shape's core, or −1 at a sharp edge
-        std::int32_t place = 0;    ///< the facet; of a sharp edge its number
-        std::uint32_t feature = 0;
+        std::int32_t vertex = -1;   ///< of the shape's core, or −1 at a sharp edge
+        std::int32_t place = 0;     ///< the facet; of a sharp edge its number
+        std::uint32_t feature = 0;  ///< at a sharp edge: of the edge and the shape, by Manifold
     };
     /// points_ from the triangles near a box.
     void find(const Terrain& surface, const AlignedBox3d& box, double limit, double depth);
@@ -29,7 +29,7 @@ private:
     [[nodiscard]] bool belongs_elsewhere(const Terrain& surface, const Terrain::Triangle& triangle,
                                          const Vector3d& point, double depth) const;
     void on_edge(const Terrain& surface, std::int32_t edge, double limit, double depth);
-    void put_edge_point(std::int32_t number, const Separation& point, const Vector3d& origin);
+    void put_edge_point(std::int32_t number, const Separation& point, const Vector3d& origin, std::uint32_t feature);
     void leave_out_copies();
     void name_features(bool terrain_is_a);
 

@@ -351,13 +351,20 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         const Before* before = find_before(block.key);
         if (before && before_.blocks()[before->block].cone.rows != block.cone.rows) before = nullptr;
         if (before) {
+            const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
+            contact.met_on_the_way =
+                before->block >= first_before && before_.contacts()[before->block - first_before].on_the_way;
+            const bool nearly = nearly_equal(row, before->row, block.cone.rows);
+            contact.nearly_as_before = nearly && (settings_.once || contact.pushed || !contact.along_normal);
+            // Points are named by their order where nothing else tells them apart, which changes where one comes or
+            // goes: what has the name, and rows that no motion explains, is another one.
+            if (point && !nearly && !contact.met_on_the_way) before = nullptr;
+        }
+        if (before) {
             contact.before = before->row;
             contact.was_there = true;
             contact.gap = before_.rows()[before->row].gap;
             contact.approach = -before_.blocks()[before->block].speed;
-            const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
-            contact.met_on_the_way =
-                before->block >= first_before && before_.contacts()[before->block - first_before].on_the_way;
         } else {
             contact.gap = rows_.rows()[row].gap - theta_ * h_ * block.speed;
             contact.approach = -block.speed;
@@ -366,10 +373,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         contact.left = settings_.once && block.restitution > 0.0 && opening > settings_.recovery_speed &&
                        (1.0 - theta_) * h_ * opening > std::abs(contact.gap);
         contact.pushed = contact.pushed && !contact.left;
-        const bool may_turn = contact.pushed || !contact.along_normal;
-        if (before && (may_turn || settings_.once))
-            contact.nearly_as_before = nearly_equal(row, before->row, block.cone.rows);
-        contact.turns = may_turn && contact.nearly_as_before;
+        contact.turns = (contact.pushed || !contact.along_normal) && contact.nearly_as_before;
         const auto entry = static_cast<std::size_t>(rows_.row_start()[row]);
         const auto entries = static_cast<std::size_t>(rows_.row_start()[row + 1]) - entry;
         contact.resolution =

@@ -15,4 +15,11 @@ constexpr std::uint32_t feature_id(FeatureKind kind, std::size_t of_a, std::size
            static_cast<std::uint32_t>(of_b & 0x7fff);
 }
 
+/// Of a feature of an edge and another shape, b: which one of them it is, in 15 bits.
+constexpr std::size_t short_feature_of_b(std::uint32_t feature) {
+    const std::uint32_t kind = feature >> 30;
+    const bool edges = kind == static_cast<std::uint32_t>(FeatureKind::Edges);
+    return kind << 13 | ((edges ? feature : feature >> 15) & 0x1fff);
+}
+
 }  // namespace delassus::collision
