@@ -152,7 +152,10 @@ double radius_of(const Json& body) {
     double radius = 0.0;
     if (body.contains("shapes"))
         for (const auto& shape : body["shapes"]) radius = std::max(radius, radius_of_shape(shape));
-    return radius;
+    if (!body.contains("inertia") || !body.contains("mass")) return radius;
+    double trace = 0.0;
+    for (const char* moment : {"xx", "yy", "zz"}) trace += body["inertia"].value(moment, 0.0);
+    return std::max(radius, std::sqrt(0.5 * trace / body["mass"].get<double>()));
 }
 
 const Json* find_named(const Json& document, const char* list, const std::string& name) {
