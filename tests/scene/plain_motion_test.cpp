@@ -141,6 +141,33 @@ TEST(PlainMotion, WhatTurnsPastAFloorDoesNotTouchIt) {
 }
 
 // Walls that are large and far away change nothing about what is near: a heavy box rests on a light can.
+// A can stands on a slope up to tan α = radius / half its height, whichever way it is turned about its axis: its cap is
+// round. As a polygon of rim points it fell from 26.2° on, or from less.
+TEST(PlainMotion, ACanStandsOnASlopeUpToItsRim) {
+    const double limit = std::atan(0.1 / 0.2);
+    for (const double turned : {0.0, 10.0, 30.0, 47.3})
+        for (const double share : {0.999, 1.001}) {
+            SCOPED_TRACE(fmt::format("turned by {}, {} of the limit", turned, share));
+            const double slope = share * limit;
+            Running run(parse_scene(
+                fmt::format("step: 0.005\nend: 2\ngravity: [{:.17g}, 0, {:.17g}]\nmaterials: {{m: {{friction: "
+                            "1}}}}\nbodies:\n- {{name: slope, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n- "
+                            "{{name: can, density: 1000, position: [0, 0, 0.2], orientation: {{axis: [0, 0, 1], angle: "
+                            "{}}}, shapes: [{{cylinder: {{radius: 0.1, length: 0.4}}, material: m}}]}}\n",
+                            9.81 * std::sin(slope), -9.81 * std::cos(slope), turned),
+                "can"));
+            run.finish();
+            const auto& pose = run.pose("can");
+            const double tilt = 2.0 * std::asin(std::hypot(pose.orientation[1], pose.orientation[2]));
+            if (share < 1.0) {
+                EXPECT_LT(tilt, 1e-9);
+                EXPECT_LT(std::hypot(pose.position[0], pose.position[1]), 1e-9);
+            } else {
+                EXPECT_GT(tilt, 0.01);
+            }
+        }
+}
+
 TEST(PlainMotion, AHeavyBoxRestsInARoom) {
     std::string room =
         "step: 0.002\nend: 1\nmaterials: {m: {friction: 0.5}}\nbodies:\n"

@@ -14,7 +14,7 @@ namespace {
 
 // Features of a cylinder that its prism does not have: the ends of the generator (or rim points) that supports a
 // direction, and the generator.
-constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc;
+constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc, kLeaningRim = 0x7ffb;
 
 struct Edge {
     Vector3d tail, head;
@@ -91,28 +91,42 @@ void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction)
             return;
         }
         // Every third vertex of the cap, and among them the rim point furthest along the direction.
-        const Polytope::Face& cap = core.faces[core.faces.size() - (along > 0.0 ? 2 : 1)];
+        const bool upper = along > 0.0;
+        const Polytope::Face& cap = core.faces[core.faces.size() - (upper ? 2 : 1)];
         for (std::size_t i = 0; i < cap.loop.size(); i += 3)
             put(placed.vertices[cap.loop[i]], cap.loop[i], cap.edges[i]);
+        const auto corner = [](const Vector3d& point, std::int32_t name) {
+            return Corner{point, name, -1, -1, -1, kGenerator, -1};
+        };
+        const auto nearest_to = [&](const Vector3d& point) {
+            const auto nearest = std::min_element(polygon_.begin(), polygon_.end(), [&](const auto& p, const auto& q) {
+                return (p.point - point).squaredNorm() < (q.point - point).squaredNorm();
+            });
+            return static_cast<std::size_t>(nearest - polygon_.begin());
+        };
+        // On the arc from the nearest corner to the nearer one of its neighbours.
+        const auto insert = [&](const Corner& rim) {
+            const std::size_t count = polygon_.size(), nearest = nearest_to(rim.point);
+            const auto to = [&](std::size_t i) { return (polygon_[i % count].point - rim.point).squaredNorm(); };
+            const bool after = to(nearest + 1) < to(nearest + count - 1);
+            polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)), rim);
+        };
         const double tilt = placed.axis().cross(direction).norm();
-        if (tilt < 1e-12) return;
-        const Vector3d lowest = rim_point(placed, direction, along > 0.0);
-        std::size_t nearest = 0;
-        const auto to = [&](std::size_t i) { return (polygon_[i].point - lowest).squaredNorm(); };
-        for (std::size_t i = 1; i < polygon_.size(); ++i) {
-            if (to(i) < to(nearest)) nearest = i;
+        if (tilt >= 1e-12) {
+            const Corner lowest = corner(rim_point(placed, direction, upper), upper ? kUpperRim : kLowerRim);
+            // A cap that rolls on its rim passes its vertices: each touches at a cusp of its path, which no step
+            // resolves. So the rim point stands for the vertex that is nearest to it, unless the cap lies flat.
+            if (tilt > kFlatAngle) {
+                polygon_[nearest_to(lowest.point)] = lowest;
+                return;
+            }
+            insert(lowest);
         }
-        const Manifold::Corner corner{lowest, along > 0.0 ? kUpperRim : kLowerRim, -1, -1, -1, kGenerator, -1};
-        // A cap that rolls on its rim passes its vertices: each touches at a cusp of its path, which no step resolves.
-        // So the rim point stands for the vertex that is nearest to it, unless the cap lies flat.
-        if (tilt > kFlatAngle) {
-            polygon_[nearest] = corner;
-            return;
-        }
-        // It lies on the arc to the nearer neighbour of the nearest vertex.
-        const std::size_t count = polygon_.size();
-        const bool after = to((nearest + 1) % count) < to((nearest + count - 1) % count);
-        polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)), corner);
+        // What lies flat would fall over the rim point that goes ahead, or down, not over an edge between two vertices.
+        const Vector3d lean = placed.way + placed.solid->cylinder_radius * direction.cross(placed.turn);
+        const double known = placed.way.norm() + placed.solid->cylinder_radius * placed.turn.norm();
+        if (placed.axis().cross(lean).norm() > 1e-9 * known)
+            insert(corner(rim_point(placed, lean, upper), kLeaningRim));
         return;
     }
     if (core.faces.empty()) {

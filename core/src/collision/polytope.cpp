@@ -120,7 +120,7 @@ Polytope prism_polytope(double radius, double half, std::int32_t sides) {
         const std::int32_t next = (i + 1) % sides;
         loops.push_back({2 * i, 2 * next, 2 * next + 1, 2 * i + 1});
         top.push_back(2 * i + 1);
-        bottom.push_back(2 * (sides - 1 - i));
+        bottom.push_back(2 * ((sides - i) % sides));
     }
     loops.push_back(std::move(top));
     loops.push_back(std::move(bottom));

@@ -44,7 +44,7 @@ struct Polytope {
 /// From −half to +half along z.
 [[nodiscard]] Polytope segment_polytope(double half);
 [[nodiscard]] Polytope box_polytope(const Vector3d& half);
-/// The prism along z over a regular polygon inscribed in a circle.
+/// The prism along z over a regular polygon inscribed in a circle. The loops of both caps begin on the x axis.
 [[nodiscard]] Polytope prism_polytope(double radius, double half, std::int32_t sides);
 
 /// From vertices and the loops of the faces: finds normals and edges.

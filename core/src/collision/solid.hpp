@@ -44,6 +44,7 @@ struct Placed {
     Vector3d position = Vector3d::Zero();
     std::vector<Vector3d> vertices, normals, directions;
     bool rotated = false;
+    Vector3d way = Vector3d::Zero(), turn = Vector3d::Zero();  ///< of its body in the step, m and rad, as far as known
 
     /// Fills vertices, normals and directions once a detection.
     void rotate_core();
