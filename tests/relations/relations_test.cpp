@@ -135,9 +135,27 @@ TEST(SceneDocument, OfMotionsOfSeveralFormsIsNotTurned) {
     EXPECT_FALSE(with("[{\"ramp\": {\"to\": 1, \"duration\": 1}}, 0, 0]"));
 }
 
+TEST(SceneDocument, MirroredTwiceIsItself) {
+    int mirrored = 0;
+    for (std::uint64_t counter = 0; counter < 40; ++counter) {
+        const Json scene = relations::random_scene(3, counter);
+        if (!relations::can_be_mirrored(scene)) continue;
+        ++mirrored;
+        const Json image = relations::mirrored(scene);
+        EXPECT_NE(image, scene) << counter;
+        // Orientations of unit length to the last digit are told once in full.
+        const Json twice = relations::mirrored(image);
+        EXPECT_EQ(relations::mirrored(relations::mirrored(twice)), twice) << counter;
+        EXPECT_EQ(twice["gravity"], scene["gravity"]) << counter;
+        EXPECT_EQ(twice["bodies"][0]["position"], scene["bodies"][0]["position"]) << counter;
+    }
+    EXPECT_GT(mirrored, 20);
+}
+
 TEST(Relations, HoldForAPendulum) {
     const auto outcomes = judged(scene_of(pendulum));
-    for (const char* name : {"sound", "placed", "units", "order", "pieces", "refined", "coordinates", "cut"})
+    for (const char* name :
+         {"sound", "placed", "mirrored", "units", "order", "pieces", "refined", "coordinates", "cut"})
         EXPECT_EQ(outcomes.at(name).verdict, Verdict::Held) << name << ": " << outcomes.at(name).detail;
     EXPECT_EQ(outcomes.at("refusal").verdict, Verdict::NotJudged);
 }

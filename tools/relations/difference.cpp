@@ -61,10 +61,16 @@ std::vector<double> distances(const Motion& base, const Motion& other, const Des
         for (std::size_t i = 0; i < base.bodies.size(); ++i) {
             if (place[i] == other.bodies.size()) continue;
             const double *a = base.poses[k].data() + 7 * i, *b = other.poses[k * every].data() + 7 * place[i];
-            const Eigen::Vector3d position =
+            Eigen::Vector3d position =
                 back * (Eigen::Map<const Eigen::Vector3d>(b) / described.units.length - described.placement.shift);
+            Eigen::Quaterniond orientation = back * orientation_of(b);
+            if (described.mirrored) {
+                position.x() *= -1.0;
+                orientation.y() *= -1.0;
+                orientation.z() *= -1.0;
+            }
             const double apart = (position - Eigen::Map<const Eigen::Vector3d>(a)).norm() / size;
-            const double turned = angle_between(orientation_of(a), back * orientation_of(b));
+            const double turned = angle_between(orientation_of(a), orientation);
             if (!(apart <= largest)) largest = apart;
             if (!(turned <= largest)) largest = turned;
         }

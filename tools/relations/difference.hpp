@@ -14,10 +14,12 @@ namespace delassus::relations {
 /// in which they move.
 [[nodiscard]] double size_of(const Json& scene, const Motion& motion);
 
-/// How a motion was described: its lengths and times are `units` of the base's, and it was placed elsewhere.
+/// How a motion was described: its lengths and times are `units` of the base's, and it was placed elsewhere; or it was
+/// mirrored.
 struct Described {
     Units units;
     Placement placement;
+    bool mirrored = false;
 };
 
 /// For each common time, up to where the last steps share what remains, the largest distance of a body that both have:

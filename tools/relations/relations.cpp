@@ -26,10 +26,10 @@ namespace {
 // tried, the larger answer counts, and everything that follows is allowed ten times. From where d(A, P) exceeds 1e-6,
 // that is G > 1e4, nothing is said: the motion is chaotic, or the method is.
 //
-// *The same problem, described otherwise* (placed, units, order). What differs is rounding, ε ≈ 1e-16 of what enters,
-// with a new error in each step; a million times smaller than δ. And a solver goes another way to its tolerance: a
-// natural error η_k of step k is an error of the velocities of about η_k times those that reactions correct
-// (docs/tolerance.md), at speeds of about size/T for a motion of the length T. Both runs say their η_k. So
+// *The same problem, described otherwise* (placed, mirrored, units, order). What differs is rounding, ε ≈ 1e-16 of what
+// enters, with a new error in each step; a million times smaller than δ. And a solver goes another way to its
+// tolerance: a natural error η_k of step k is an error of the velocities of about η_k times those that reactions
+// correct (docs/tolerance.md), at speeds of about size/T for a motion of the length T. Both runs say their η_k. So
 //
 //     d(A, B)/10 ≤ d(A, P) + G Σ (η_k of A + η_k of B) + G R.
 //
@@ -39,7 +39,7 @@ namespace {
 //
 // A method that divides its steps by a limit of errors compares it with lengths along the axes and with angles. In
 // other units, or turned, it divides them otherwise. Each run is then to be right to the accuracy of 1e-3 a second, and
-// 2e-3 t G is added to what is allowed where a scene is placed otherwise or has other units.
+// 2e-3 t G is added to what is allowed where a scene is placed otherwise, is mirrored or has other units.
 //
 // *The same motion by another approximation* (coordinates, cut). Each run has an error of its own, e. With fixed steps
 // it is measured by half the step, H: e_A is of the size of d(A, H), two times it for order 1, 4/3 for order 2. A
@@ -135,6 +135,12 @@ public:
         described.placement = {Eigen::Quaterniond(0.62, 0.31, -0.47, 0.55).normalized(),
                                {2.3 * size_, -1.7 * size_, 0.9 * size_}};
         return same_problem(placed(scene_, described.placement), described, rate_of_limits());
+    }
+    Judgement mirror_image() {
+        if (!can_be_mirrored(scene_))
+            return {Verdict::NotJudged,
+                    "it has motions of several forms, axes of the world, a height field, or a screw's springs"};
+        return same_problem(mirrored(scene_), {.units = {}, .placement = {}, .mirrored = true}, rate_of_limits());
     }
     Judgement other_units() {
         Described described;
@@ -404,11 +410,12 @@ private:
 }  // namespace
 
 std::string_view meaning_of(std::string_view relation) {
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> meanings = {{
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 11> meanings = {{
         {"sound",
          "no crash, no state that is not finite, no energy from nothing, no shape inside another, unless said"},
         {"refusal", "a refusal is one sentence that names what it is about"},
         {"placed", "the scene turned and moved as a whole, gravity with it, moves alike"},
+        {"mirrored", "the mirror image of the scene moves as the mirror image of its motion"},
         {"units", "the scene in mm, g and ms moves alike"},
         {"order", "bodies, joints and all else in another order move alike"},
         {"pieces", "a run that is stopped, written, read and gone on with has the same bits"},
@@ -430,10 +437,11 @@ std::string_view name_of(Verdict verdict) {
 
 std::vector<Outcome> judge_scene(const Json& scene, const Registry& registry, const JudgeOrder& order) {
     using Member = Judgement (*)(Judge&);
-    static constexpr std::array<Member, 10> members = {
+    static constexpr std::array<Member, 11> members = {
         [](Judge& judge) { return judge.sound(); },
         [](Judge& judge) { return judge.refusal(); },
         [](Judge& judge) { return judge.placed_elsewhere(); },
+        [](Judge& judge) { return judge.mirror_image(); },
         [](Judge& judge) { return judge.other_units(); },
         [](Judge& judge) { return judge.other_order(); },
         [](Judge& judge) { return judge.in_pieces(); },

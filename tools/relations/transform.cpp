@@ -39,40 +39,102 @@ Json& items(Json& scene, const char* key) {
     return found == scene.end() ? none : *found;
 }
 
-/// Turns and moves points, turns vectors.
-class Placing {
-public:
-    explicit Placing(const Placement& placement) : placement_(placement) {}
-
-    void point(Json& item, const char* key) const {
-        if (item.contains(key)) item[key] = json_of(placement_.turn * vector_of(item[key]) + placement_.shift);
-    }
-    void direction(Json& item, const char* key) const {
-        if (item.contains(key)) item[key] = json_of(placement_.turn * vector_of(item[key]));
-    }
-    void orientation(Json& item) const {
-        item["orientation"] =
-            json_of(placement_.turn * (item.contains("orientation") ? quaternion_of(item["orientation"])
-                                                                    : Eigen::Quaterniond::Identity()));
-    }
-    /// Three motions of one form, whose amplitudes are a vector.
-    void motions(Json& three) const {
-        if (three[0].is_number()) {
-            three = json_of(placement_.turn * vector_of(three));
-            return;
-        }
-        for (const auto& [form, key] : {std::pair("sine", "amplitude"), std::pair("linear", "rate")}) {
-            if (!three[0].contains(form)) continue;
-            Eigen::Vector3d vector;
-            for (int i = 0; i < 3; ++i) vector[i] = three[static_cast<std::size_t>(i)][form][key].get<double>();
-            vector = placement_.turn * vector;
-            for (int i = 0; i < 3; ++i) three[static_cast<std::size_t>(i)][form][key] = vector[i];
-        }
-    }
-
-private:
-    Placement placement_;
+/// x → turn x + shift.
+struct Place {
+    Placement placement;
+    [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector3d& x) const { return polar(x) + placement.shift; }
+    [[nodiscard]] Eigen::Vector3d polar(const Eigen::Vector3d& v) const { return placement.turn * v; }
+    [[nodiscard]] Eigen::Vector3d axial(const Eigen::Vector3d& v) const { return polar(v); }
+    [[nodiscard]] Eigen::Quaterniond orientation(const Eigen::Quaterniond& q) const { return placement.turn * q; }
 };
+
+/// x → S x with S = diag(−1, 1, 1), what turns S R S: a vector that says how something turns goes to −S v. Of bodies
+/// and shapes too, whose own axes are mirrored with them.
+struct Mirror {
+    [[nodiscard]] static Eigen::Vector3d point(const Eigen::Vector3d& x) { return polar(x); }
+    [[nodiscard]] static Eigen::Vector3d polar(const Eigen::Vector3d& v) { return {-v.x(), v.y(), v.z()}; }
+    [[nodiscard]] static Eigen::Vector3d axial(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
+    [[nodiscard]] static Eigen::Quaterniond orientation(const Eigen::Quaterniond& q) {
+        return {q.w(), q.x(), -q.y(), -q.z()};
+    }
+};
+
+/// item[key] ← change of the vector that is there, if there is one.
+template <class Change>
+void change_vector(Json& item, const char* key, const Change& change) {
+    if (item.contains(key)) item[key] = json_of(change(vector_of(item[key])));
+}
+
+template <class Motion>
+void change_orientation(Json& item, const Motion& motion) {
+    item["orientation"] = json_of(motion.orientation(item.contains("orientation") ? quaternion_of(item["orientation"])
+                                                                                  : Eigen::Quaterniond::Identity()));
+}
+
+/// Three motions of one form, whose amplitudes are a vector.
+template <class Change>
+void change_motions(Json& three, const Change& change) {
+    if (three[0].is_number()) {
+        three = json_of(change(vector_of(three)));
+        return;
+    }
+    for (const auto& [form, key] : {std::pair("sine", "amplitude"), std::pair("linear", "rate")}) {
+        if (!three[0].contains(form)) continue;
+        Eigen::Vector3d vector;
+        for (int i = 0; i < 3; ++i) {
+            const Json& amplitude = three[static_cast<std::size_t>(i)][form][key];
+            vector[i] = amplitude.get<double>();
+        }
+        vector = change(vector);
+        for (int i = 0; i < 3; ++i) three[static_cast<std::size_t>(i)][form][key] = vector[i];
+    }
+}
+
+/// What is given in the world, moved.
+template <class Motion>
+Json moved(const Json& scene, const Motion& motion) {
+    const auto point = [&](const Eigen::Vector3d& x) { return motion.point(x); };
+    const auto polar = [&](const Eigen::Vector3d& v) { return motion.polar(v); };
+    const auto axial = [&](const Eigen::Vector3d& v) { return motion.axial(v); };
+    Json result = scene;
+    change_vector(result, "gravity", polar);
+    for (auto& body : items(result, "bodies")) {
+        change_vector(body, "position", point);
+        change_vector(body, "velocity", polar);
+        change_orientation(body, motion);
+        if (!body.contains("motion")) continue;
+        auto& given = body["motion"];
+        if (given.contains("translation")) change_motions(given["translation"], polar);
+        if (given.contains("rotation")) {
+            change_vector(given["rotation"], "axis", axial);
+            change_vector(given["rotation"], "point", point);
+        }
+    }
+    for (auto& joint : items(result, "joints")) {
+        // The axes about which, or along which, coordinates count.
+        const bool turns = joint["kind"] == "revolute" || joint["kind"] == "universal";
+        for (const char* key : {"point", "second_point"}) change_vector(joint, key, point);
+        for (const char* key : {"axis", "second_axis"})
+            turns ? change_vector(joint, key, axial) : change_vector(joint, key, polar);
+    }
+    for (auto& spring : items(result, "springs"))
+        for (const char* key : {"first_point", "second_point"}) change_vector(spring, key, point);
+    for (auto& bushing : items(result, "bushings")) change_vector(bushing, "point", point);
+    for (auto& load : items(result, "loads")) {
+        change_vector(load, "point", point);
+        if (load.value("follower", false)) continue;
+        if (load.contains("force")) change_motions(load["force"], polar);
+        if (load.contains("torque")) change_motions(load["torque"], axial);
+    }
+    return result;
+}
+
+void mirror_shape(Json& shape) {
+    change_vector(shape, "position", Mirror::polar);
+    change_orientation(shape, Mirror());
+    if (shape.contains("convex"))
+        for (auto& point : shape["convex"]["points"]) point = json_of(Mirror::polar(vector_of(point)));
+}
 
 void scale(Json& value, double factor) {
     if (value.is_number()) value = value.get<double>() * factor;
@@ -211,33 +273,36 @@ bool can_be_placed(const Json& scene) {
 }
 
 Json placed(const Json& scene, const Placement& placement) {
-    Json result = scene;
-    const Placing placing(placement);
-    placing.direction(result, "gravity");
+    return moved(scene, Place{placement});
+}
+
+bool can_be_mirrored(const Json& scene) {
+    if (!can_be_placed(scene)) return false;
+    const auto items_of = [&](const char* key) { return scene.contains(key) ? scene[key] : Json::array(); };
+    for (const auto& body : items_of("bodies"))
+        if (body.contains("shapes"))
+            for (const auto& shape : body["shapes"])
+                if (shape.contains("height_field")) return false;
+    for (const auto& joint : items_of("joints"))
+        if (joint["kind"] == "cylindrical" && joint.contains("spring")) return false;
+    return true;
+}
+
+Json mirrored(const Json& scene) {
+    Json result = moved(scene, Mirror());
     for (auto& body : items(result, "bodies")) {
-        placing.point(body, "position");
-        placing.direction(body, "velocity");
-        placing.orientation(body);
-        if (!body.contains("motion")) continue;
-        auto& motion = body["motion"];
-        if (motion.contains("translation")) placing.motions(motion["translation"]);
-        if (motion.contains("rotation")) {
-            placing.direction(motion["rotation"], "axis");
-            placing.point(motion["rotation"], "point");
-        }
+        change_vector(body, "angular_velocity", Mirror::axial);
+        if (body.contains("inertia"))
+            for (const char* product : {"xy", "xz"})
+                if (body["inertia"].contains(product))
+                    body["inertia"][product] = -body["inertia"][product].get<double>();
+        if (body.contains("shapes"))
+            for (auto& shape : body["shapes"]) mirror_shape(shape);
     }
-    for (auto& joint : items(result, "joints")) {
-        for (const char* key : {"point", "second_point"}) placing.point(joint, key);
-        for (const char* key : {"axis", "second_axis"}) placing.direction(joint, key);
-    }
-    for (auto& spring : items(result, "springs"))
-        for (const char* key : {"first_point", "second_point"}) placing.point(spring, key);
-    for (auto& bushing : items(result, "bushings")) placing.point(bushing, "point");
     for (auto& load : items(result, "loads")) {
-        placing.point(load, "point");
-        if (load.value("follower", false)) continue;
-        for (const char* key : {"force", "torque"})
-            if (load.contains(key)) placing.motions(load[key]);
+        if (!load.value("follower", false)) continue;
+        if (load.contains("force")) change_motions(load["force"], Mirror::polar);
+        if (load.contains("torque")) change_motions(load["torque"], Mirror::axial);
     }
     return result;
 }

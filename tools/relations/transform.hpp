@@ -26,6 +26,11 @@ struct Units {
 [[nodiscard]] bool can_be_placed(const Json& scene);
 /// Of a scene that can be placed.
 [[nodiscard]] Json placed(const Json& scene, const Placement& placement);
+/// Whether it can be placed, has no height field, whose cells have their diagonals in one direction, and no joint has
+/// coordinates along and about an axis with different springs.
+[[nodiscard]] bool can_be_mirrored(const Json& scene);
+/// Of a scene that can be mirrored: at the plane x = 0.
+[[nodiscard]] Json mirrored(const Json& scene);
 [[nodiscard]] Json in_units(const Json& scene, const Units& units);
 /// Its lists shuffled, but for material pairs; the order of a seed.
 [[nodiscard]] Json reordered(const Json& scene, std::uint64_t seed);

@@ -88,8 +88,8 @@ struct SimulationTotals {
     std::string first_unsolved;       ///< when and why the first did
     double error = 0.0;               ///< sum of StepRecord::error
     std::int64_t inexact_steps = 0;   ///< with a part that errs by more than the accuracy asks
-    /// Steps after which bodies overlap by more than the accuracy allows, beside what did at the start, or in which they
-    /// came to by so much however short their parts; when and which the first time.
+    /// Steps after which bodies overlap by more than the accuracy allows, beside what did at the start, or in which
+    /// they came to by so much however short their parts; when and which the first time.
     std::int64_t deep_steps = 0;
     std::string first_deep;
     std::int64_t most_inverted = 0;  ///< solid elements that are turned inside out after a step

@@ -42,8 +42,9 @@ void lower(double rounding, double small, std::string_view method, const State& 
 void return_positions(const DynamicalSystem& system, std::string_view method, const State& begin, State& end, double h,
                       const LeastChange& least) {
     std::vector<double> off(static_cast<std::size_t>(system.m()));
+    const double size = 1.0 + largest(end.q);
     lower(
-        16.0 * epsilon * (1.0 + largest(end.q)), 1e-10, method, begin, h,
+        16.0 * epsilon * size, 1e-10 * size, method, begin, h,
         [&] {
             system.constraint(end, off.data());
             return largest(off);

@@ -33,7 +33,7 @@ public:
     }
     /// problem: that of the step, of velocities. left: StepAnswer::left_in_masses, or empty.
     void find(const Problem& problem, const State& begin, const State& end, std::span<const double> left) {
-        constexpr double last_digits = 1e-10, left_at_most = 20.0;
+        constexpr double last_digits = 1e-9, left_at_most = 20.0;
         h_ = end.t - begin.t;
         digits_ = last_digits;
         for (const double q : begin.q) digits_ = std::max(digits_, last_digits * std::abs(q));
