@@ -77,7 +77,7 @@ std::int32_t Manifold::face_towards(const Placed& placed, const Vector3d& direct
 }
 
 /// The polygon, edge or vertex that faces a direction: of the faces at the vertices that support it, the most aligned.
-void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction) {
+void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction, const Placed* other) {
     polygon_.clear();
     const Polytope& core = placed.solid->core;
     const auto put = [&](const Vector3d& point, std::int32_t vertex, std::int32_t leaving) {
@@ -123,8 +123,15 @@ void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction)
             insert(lowest);
         }
         // What lies flat would fall over the rim point that goes ahead, or down, not over an edge between two vertices.
-        const Vector3d lean = placed.way + placed.solid->cylinder_radius * direction.cross(placed.turn);
-        const double known = placed.way.norm() + placed.solid->cylinder_radius * placed.turn.norm();
+        const double radius = placed.solid->cylinder_radius;
+        Vector3d way = placed.way, turn = placed.turn;
+        double known = way.norm() + radius * turn.norm();
+        if (other) {
+            known += other->way.norm() + radius * other->turn.norm();
+            way -= other->way;
+            turn -= other->turn;
+        }
+        const Vector3d lean = way + radius * direction.cross(turn);
         if (placed.axis().cross(lean).norm() > 1e-9 * known)
             insert(corner(rim_point(placed, lean, upper), kLeaningRim));
         return;
@@ -196,7 +203,7 @@ bool Manifold::from_face(const Placed& reference, std::int32_t face, const Place
                          std::vector<CorePoint>& points) {
     const Vector3d& normal = reference.normals[face];
     const double offset = reference.solid->core.faces[face].offset;
-    incident_polygon(incident, -normal);
+    incident_polygon(incident, -normal, &reference);
     clip(reference, face, -to_incident, 1e-7 * std::min(reference.solid->reach, incident.solid->reach));
     const Vector3d origin = reference_is_a ? Vector3d::Zero() : Vector3d(-to_incident);
     for (const Corner& corner : polygon_) {

@@ -41,7 +41,8 @@ private:
         std::int32_t leaving_cut = -1;  ///< position in the reference loop, where leaving is −1
     };
     static std::int32_t face_towards(const Placed& placed, const Vector3d& direction);
-    void incident_polygon(const Placed& placed, const Vector3d& direction);
+    /// other: against which it moves; null: against what stands still.
+    void incident_polygon(const Placed& placed, const Vector3d& direction, const Placed* other = nullptr);
     void clip(const Placed& reference, std::int32_t face, const Vector3d& to_reference, double tolerance);
     bool from_face(const Placed& reference, std::int32_t face, const Placed& incident, const Vector3d& to_incident,
                    bool reference_is_a, double limit, std::vector<CorePoint>& points);
