@@ -135,6 +135,15 @@ TEST(SceneDocument, OfMotionsOfSeveralFormsIsNotTurned) {
     EXPECT_FALSE(with("[{\"ramp\": {\"to\": 1, \"duration\": 1}}, 0, 0]"));
 }
 
+TEST(Relations, DoNotTurnWhatTheyDoNotKnow) {
+    Json scene = scene_of(pendulum);
+    EXPECT_TRUE(relations::is_known(scene));
+    scene["elastic_blocks"] = Json::array({{{"name", "rod"}}});
+    EXPECT_FALSE(relations::is_known(scene));
+    for (const char* name : {"placed", "mirrored", "units"})
+        EXPECT_EQ(judged(scene).at(name).verdict, Verdict::NotJudged) << name;
+}
+
 TEST(SceneDocument, MirroredTwiceIsItself) {
     int mirrored = 0;
     for (std::uint64_t counter = 0; counter < 40; ++counter) {

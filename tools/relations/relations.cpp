@@ -129,6 +129,7 @@ public:
     }
 
     Judgement placed_elsewhere() {
+        if (const auto gone = not_known()) return *gone;
         if (!can_be_placed(scene_))
             return {Verdict::NotJudged, "it has motions of several forms, or axes of the world"};
         Described described;
@@ -137,12 +138,14 @@ public:
         return same_problem(placed(scene_, described.placement), described, rate_of_limits());
     }
     Judgement mirror_image() {
+        if (const auto gone = not_known()) return *gone;
         if (!can_be_mirrored(scene_))
             return {Verdict::NotJudged,
                     "it has motions of several forms, axes of the world, a height field, or a screw's springs"};
         return same_problem(mirrored(scene_), {.units = {}, .placement = {}, .mirrored = true}, rate_of_limits());
     }
     Judgement other_units() {
+        if (const auto gone = not_known()) return *gone;
         Described described;
         described.units = {1e3, 1e3, 1e3};  // mm, g, ms
         return same_problem(in_units(scene_, described.units), described, rate_of_limits());
@@ -249,6 +252,12 @@ private:
                 for (const auto& item : scene_[list])
                     if (text.find("\"" + item.value("name", std::string("?")) + "\"") != std::string::npos) return true;
         return false;
+    }
+
+    /// Why the scene cannot be described otherwise, if so.
+    [[nodiscard]] std::optional<Judgement> not_known() const {
+        if (is_known(scene_)) return std::nullopt;
+        return Judgement{Verdict::NotJudged, "it has elastic bodies, beams or other things beside bodies and joints"};
     }
 
     /// Why nothing can be compared with this run, if so.

@@ -258,6 +258,14 @@ bool can_be_turned(const Json& three) {
 
 }  // namespace
 
+bool is_known(const Json& scene) {
+    for (const auto& [key, value] : scene.items())
+        if (value.is_array() && !value.empty() && value.front().is_object() &&
+            std::find(list_keys.begin(), list_keys.end(), key) == list_keys.end())
+            return false;
+    return true;
+}
+
 bool can_be_placed(const Json& scene) {
     const auto items_of = [&](const char* key) { return scene.contains(key) ? scene[key] : Json::array(); };
     for (const auto& body : items_of("bodies"))

@@ -21,6 +21,8 @@ struct Units {
     double length = 1.0, mass = 1.0, time = 1.0;
 };
 
+/// Whether its lists are those that the functions here know: list_keys.
+[[nodiscard]] bool is_known(const Json& scene);
 /// Whether the three components of each given motion and load have one form, so that turned ones have it too, and no
 /// bushing has the axes of the world.
 [[nodiscard]] bool can_be_placed(const Json& scene);
