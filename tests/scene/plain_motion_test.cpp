@@ -168,6 +168,35 @@ TEST(PlainMotion, ACanStandsOnASlopeUpToItsRim) {
         }
 }
 
+// A plate rests on a can as long as its mass centre is above the cap, on whichever side, and whichever of the two comes
+// first in the scene.
+TEST(PlainMotion, APlateRestsOnACanUpToItsRim) {
+    constexpr double degree = 3.14159265358979323846 / 180.0;
+    for (const bool can_first : {true, false})
+        for (const double side : {0.0, 7.0, 30.0, 47.3})
+            for (const double off : {0.0998, 0.1002}) {
+                SCOPED_TRACE(fmt::format("{} first, {} m off at {} degrees", can_first ? "can" : "plate", off, side));
+                const std::string can =
+                    "- {name: can, fixed: true, orientation: {axis: [0, 0, 1], angle: 11}, shapes: [{cylinder: "
+                    "{radius: "
+                    "0.1, length: 0.4}, material: m}]}\n";
+                const std::string plate = fmt::format(
+                    "- {{name: plate, density: 1000, position: [{:.17g}, {:.17g}, 0.21], shapes: [{{box: {{size: [0.6, "
+                    "0.5, 0.02]}}, material: m}}]}}\n",
+                    off * std::cos(side * degree), off * std::sin(side * degree));
+                Running run = run_of("step: 0.005\nend: 1\nmaterials: {m: {friction: 1}}\nbodies:\n" +
+                                     (can_first ? can + plate : plate + can));
+                run.finish();
+                const auto& orientation = run.pose("plate").orientation;
+                const double tilt = std::hypot(orientation[1], orientation[2]);
+                if (off < 0.1) {
+                    EXPECT_LT(tilt, 1e-9);
+                } else {
+                    EXPECT_GT(tilt, 1e-3);
+                }
+            }
+}
+
 TEST(PlainMotion, AHeavyBoxRestsInARoom) {
     std::string room =
         "step: 0.002\nend: 1\nmaterials: {m: {friction: 0.5}}\nbodies:\n"

@@ -192,8 +192,7 @@ TEST(TerrainScene, WhatFallsOnHillsComesToRestAboveThem) {
     const std::vector<std::string> kinds{
         "sphere: {radius: 0.12}", "box: {size: [0.3, 0.2, 0.16]}", "capsule: {radius: 0.08, length: 0.2}",
         "cylinder: {radius: 0.1, length: 0.2}",
-        "convex: {points: [[0.15, 0, -0.05], [-0.15, 0.1, -0.05], [-0.15, -0.1, -0.05], "
-        "[-0.15, 0, 0.15]]}"};
+        "convex: {points: [[0.15, 0, -0.05], [-0.15, 0.1, -0.05], [-0.15, -0.1, -0.05], [-0.15, 0, 0.15]]}"};
     std::string bodies;
     for (int i = 0; i < 10; ++i)
         bodies += fmt::format(

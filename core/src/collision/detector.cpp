@@ -207,7 +207,7 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
         throw InputError(fmt::format("Collision detection got the displacements of {} bodies; there are {}.",
                                      displacements.size(), poses.size()));
     sweeps_.assign(placed_.size(), {});
-    for (Placed& placed : placed_) placed.way = placed.turn = Vector3d::Zero();
+    for (Placed& placed : placed_) placed.body = {};
     if (displacements.empty()) return;
     for (std::size_t i = 0; i < placed_.size(); ++i) {
         const std::int32_t body = setup_.shapes[i].body;
@@ -220,11 +220,10 @@ void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplaceme
         sweep.rotation = vector(rotation);
         sweep.fall = vector(fall);
         sweep.straight = sweep.translation = vector(translation);
-        placed_[i].way = sweep.straight;
-        placed_[i].turn = sweep.rotation;
         const double angle = sweep.rotation.norm();
         sweep.turned = angle * placed_[i].solid->reach;
         sweep.arm = placed_[i].position - vector(poses[static_cast<std::size_t>(body)].position);
+        placed_[i].body = {true, sweep.straight, sweep.rotation, -sweep.arm};
         if (angle > 0.0 && !sweep.arm.isZero(0.0)) {
             sweep.translation += Eigen::AngleAxisd(angle, sweep.rotation / angle) * sweep.arm - sweep.arm;
             sweep.turned += sweep.arm.norm() * (1.0 - std::cos(std::min(0.5 * angle, std::numbers::pi)));

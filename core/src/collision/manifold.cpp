@@ -14,7 +14,7 @@ namespace {
 
 // Features of a cylinder that its prism does not have: the ends of the generator (or rim points) that supports a
 // direction, and the generator.
-constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc, kLeaningRim = 0x7ffb;
+constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc, kLeaningRims = 0x7ff9;
 
 struct Edge {
     Vector3d tail, head;
@@ -27,6 +27,15 @@ Vector3d rim_point(const Placed& placed, const Vector3d& direction, bool upper) 
     across -= axis.dot(across) * axis;
     return placed.solid->cylinder_radius * across.normalized() +
            (upper ? placed.solid->half_length : -placed.solid->half_length) * axis;
+}
+
+/// Whether a face lies within the cap of a cylinder on which it lies; offset: from the cylinder to the other.
+bool holds(const Placed& cylinder, const Placed& other, std::int32_t face, const Vector3d& offset) {
+    const auto& loop = other.solid->core.faces[static_cast<std::size_t>(face)].loop;
+    return std::all_of(loop.begin(), loop.end(), [&](std::int32_t v) {
+        return cylinder.axis().cross(offset + other.vertices[static_cast<std::size_t>(v)]).norm() <=
+               cylinder.solid->cylinder_radius;
+    });
 }
 
 /// The edges whose points all nearly support a direction.
@@ -76,8 +85,47 @@ std::int32_t Manifold::face_towards(const Placed& placed, const Vector3d& direct
     return best;
 }
 
+Manifold::Corner Manifold::rim_corner(const Vector3d& point, std::int32_t name) {
+    return {point, name, -1, -1, -1, kGenerator, -1};
+}
+
+std::size_t Manifold::nearest_corner(const Vector3d& point) const {
+    const auto nearest = std::min_element(polygon_.begin(), polygon_.end(), [&](const auto& p, const auto& q) {
+        return (p.point - point).squaredNorm() < (q.point - point).squaredNorm();
+    });
+    return static_cast<std::size_t>(nearest - polygon_.begin());
+}
+
+/// Between the nearest corner and the nearer one of its neighbours.
+void Manifold::insert_on_arc(const Corner& rim) {
+    const std::size_t count = polygon_.size(), nearest = nearest_corner(rim.point);
+    const auto to = [&](std::size_t i) { return (polygon_[i % count].point - rim.point).squaredNorm(); };
+    const bool after = to(nearest + 1) < to(nearest + count - 1);
+    polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)), rim);
+}
+
+/// What lies flat would fall over the rim, not over an edge between two of its vertices: where it goes ahead or is
+/// drawn by its weight, or where a mass centre is.
+void Manifold::put_leaning_rims(const Placed& cylinder, const Vector3d& direction, const Placed* other,
+                                const Vector3d& to_other) {
+    constexpr double rounding = 1e-9, apart = 1e-3;
+    const double radius = cylinder.solid->cylinder_radius;
+    const bool upper = cylinder.axis().dot(direction) > 0.0;
+    const auto put = [&](const Vector3d& lean, double known, std::int32_t name) {
+        if (!(cylinder.axis().cross(lean).norm() > rounding * known)) return;
+        const Corner rim = rim_corner(rim_point(cylinder, lean, upper), name);
+        if ((polygon_[nearest_corner(rim.point)].point - rim.point).norm() > apart * radius) insert_on_arc(rim);
+    };
+    const BodyInStep own = cylinder.body, against = other ? other->body : BodyInStep{};
+    put(own.way - against.way + radius * direction.cross(own.turn - against.turn),
+        own.way.norm() + against.way.norm() + radius * (own.turn.norm() + against.turn.norm()), kLeaningRims);
+    if (own.known) put(own.centre, radius, kLeaningRims + 1);
+    if (against.known) put(to_other + against.centre, radius, kLeaningRims + 2);
+}
+
 /// The polygon, edge or vertex that faces a direction: of the faces at the vertices that support it, the most aligned.
-void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction, const Placed* other) {
+void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction, const Placed* other,
+                                const Vector3d& to_other) {
     polygon_.clear();
     const Polytope& core = placed.solid->core;
     const auto put = [&](const Vector3d& point, std::int32_t vertex, std::int32_t leaving) {
@@ -95,45 +143,18 @@ void Manifold::incident_polygon(const Placed& placed, const Vector3d& direction,
         const Polytope::Face& cap = core.faces[core.faces.size() - (upper ? 2 : 1)];
         for (std::size_t i = 0; i < cap.loop.size(); i += 3)
             put(placed.vertices[cap.loop[i]], cap.loop[i], cap.edges[i]);
-        const auto corner = [](const Vector3d& point, std::int32_t name) {
-            return Corner{point, name, -1, -1, -1, kGenerator, -1};
-        };
-        const auto nearest_to = [&](const Vector3d& point) {
-            const auto nearest = std::min_element(polygon_.begin(), polygon_.end(), [&](const auto& p, const auto& q) {
-                return (p.point - point).squaredNorm() < (q.point - point).squaredNorm();
-            });
-            return static_cast<std::size_t>(nearest - polygon_.begin());
-        };
-        // On the arc from the nearest corner to the nearer one of its neighbours.
-        const auto insert = [&](const Corner& rim) {
-            const std::size_t count = polygon_.size(), nearest = nearest_to(rim.point);
-            const auto to = [&](std::size_t i) { return (polygon_[i % count].point - rim.point).squaredNorm(); };
-            const bool after = to(nearest + 1) < to(nearest + count - 1);
-            polygon_.insert(polygon_.begin() + static_cast<std::ptrdiff_t>(nearest + (after ? 1 : 0)), rim);
-        };
         const double tilt = placed.axis().cross(direction).norm();
         if (tilt >= 1e-12) {
-            const Corner lowest = corner(rim_point(placed, direction, upper), upper ? kUpperRim : kLowerRim);
+            const Corner lowest = rim_corner(rim_point(placed, direction, upper), upper ? kUpperRim : kLowerRim);
             // A cap that rolls on its rim passes its vertices: each touches at a cusp of its path, which no step
             // resolves. So the rim point stands for the vertex that is nearest to it, unless the cap lies flat.
             if (tilt > kFlatAngle) {
-                polygon_[nearest_to(lowest.point)] = lowest;
+                polygon_[nearest_corner(lowest.point)] = lowest;
                 return;
             }
-            insert(lowest);
+            insert_on_arc(lowest);
         }
-        // What lies flat would fall over the rim point that goes ahead, or down, not over an edge between two vertices.
-        const double radius = placed.solid->cylinder_radius;
-        Vector3d way = placed.way, turn = placed.turn;
-        double known = way.norm() + radius * turn.norm();
-        if (other) {
-            known += other->way.norm() + radius * other->turn.norm();
-            way -= other->way;
-            turn -= other->turn;
-        }
-        const Vector3d lean = way + radius * direction.cross(turn);
-        if (placed.axis().cross(lean).norm() > 1e-9 * known)
-            insert(corner(rim_point(placed, lean, upper), kLeaningRim));
+        put_leaning_rims(placed, direction, other, to_other);
         return;
     }
     if (core.faces.empty()) {
@@ -203,7 +224,7 @@ bool Manifold::from_face(const Placed& reference, std::int32_t face, const Place
                          std::vector<CorePoint>& points) {
     const Vector3d& normal = reference.normals[face];
     const double offset = reference.solid->core.faces[face].offset;
-    incident_polygon(incident, -normal, &reference);
+    incident_polygon(incident, -normal, &reference, -to_incident);
     clip(reference, face, -to_incident, 1e-7 * std::min(reference.solid->reach, incident.solid->reach));
     const Vector3d origin = reference_is_a ? Vector3d::Zero() : Vector3d(-to_incident);
     for (const Corner& corner : polygon_) {
@@ -295,7 +316,7 @@ void Manifold::beside_edges(const Placed& a, const Placed& b, const Vector3d& of
 
 // Points nearer to each other than a thousandth of the patch say the same: the one with the lower feature stays. Of too
 // many, the deepest is taken first, then always the one furthest from those taken; of equals the lower feature.
-void Manifold::reduce(std::vector<CorePoint>& points) {
+void Manifold::reduce(std::vector<CorePoint>& points, std::size_t most) {
     std::sort(points.begin(), points.end(),
               [](const CorePoint& p, const CorePoint& q) { return p.feature < q.feature; });
     double patch = 0.0;
@@ -310,14 +331,14 @@ void Manifold::reduce(std::vector<CorePoint>& points) {
         if (!near) points[kept++] = points[i];
     }
     points.resize(kept);
-    if (kept <= kMostPoints) return;
+    if (kept <= most) return;
     std::vector<double> far(kept, std::numeric_limits<double>::infinity());
     std::vector<CorePoint> chosen;
     std::size_t next = 0;
     for (std::size_t i = 1; i < kept; ++i) {
         if (points[i].distance < points[next].distance) next = i;
     }
-    while (chosen.size() < kMostPoints) {
+    while (chosen.size() < most) {
         chosen.push_back(points[next]);
         for (std::size_t i = 0; i < kept; ++i)
             far[i] = std::min(far[i], (points[i].point_a - chosen.back().point_a).squaredNorm());
@@ -334,9 +355,14 @@ void Manifold::between(Placed& a, Placed& b, const Vector3d& offset, const Separ
     const std::int32_t face_a = face_towards(a, nearest.normal);
     const std::int32_t face_b = face_towards(b, -nearest.normal);
     bool found = false;
-    // The face that is more aligned is the reference, up to rounding that of a.
-    if (face_b >= 0 &&
-        (face_a < 0 || -b.normals[face_b].dot(nearest.normal) > a.normals[face_a].dot(nearest.normal) + 1e-14)) {
+    // The face that is more aligned is the reference; up to rounding that of a, but that a cap, of which there are but
+    // samples, is the reference of what lies within it, and of nothing else.
+    const double aligned_a = face_a < 0 ? 0.0 : a.normals[face_a].dot(nearest.normal),
+                 aligned_b = face_b < 0 ? 0.0 : -b.normals[face_b].dot(nearest.normal);
+    bool of_b = face_b >= 0 && (face_a < 0 || aligned_b > aligned_a + 1e-14);
+    if (face_a >= 0 && face_b >= 0 && std::abs(aligned_b - aligned_a) <= 1e-14 && a.is_cylinder() != b.is_cylinder())
+        of_b = a.is_cylinder() ? !holds(a, b, face_b, offset) : holds(b, a, face_a, -offset);
+    if (of_b) {
         found = from_face(b, face_b, a, -offset, false, limit, points);
     } else if (face_a >= 0) {
         found = from_face(a, face_a, b, offset, true, limit, points);
@@ -349,7 +375,7 @@ void Manifold::between(Placed& a, Placed& b, const Vector3d& offset, const Separ
     const bool sampled = a.is_cylinder() || b.is_cylinder();
     if (!found || (sampled && std::none_of(points.begin(), points.end(), deeper))) points.push_back(nearest);
     if (!sampled && face_a < 0 && face_b < 0) beside_edges(a, b, offset, nearest, limit, points);
-    reduce(points);
+    reduce(points, sampled ? kMostPointsOfCaps : kMostPoints);
 }
 
 void Manifold::facing(const Placed& placed, const Vector3d& direction, std::vector<FacingPoint>& points) {
@@ -376,7 +402,7 @@ void Manifold::on_plane(Placed& other, const Vector3d& point, const Vector3d& no
         result.feature = feature(corner, !plane_is_a);
         points.push_back(result);
     }
-    reduce(points);
+    reduce(points, other.is_cylinder() ? kMostPointsOfCaps : kMostPoints);
 }
 
 }  // namespace delassus::collision

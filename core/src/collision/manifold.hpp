@@ -15,8 +15,8 @@ struct FacingPoint {
     std::int32_t vertex;
 };
 
-/// The most points of a pair.
-constexpr std::size_t kMostPoints = 8;
+/// The most points of a pair; of a pair with a cylinder, whose caps have up to four rim points beside six vertices.
+constexpr std::size_t kMostPoints = 8, kMostPointsOfCaps = 10;
 
 class Manifold {
 public:
@@ -40,9 +40,15 @@ private:
         std::int32_t leaving = -1;      ///< edge of the incident shape
         std::int32_t leaving_cut = -1;  ///< position in the reference loop, where leaving is −1
     };
+    static Corner rim_corner(const Vector3d& point, std::int32_t name);
+    [[nodiscard]] std::size_t nearest_corner(const Vector3d& point) const;
+    void insert_on_arc(const Corner& rim);
     static std::int32_t face_towards(const Placed& placed, const Vector3d& direction);
-    /// other: against which it moves; null: against what stands still.
-    void incident_polygon(const Placed& placed, const Vector3d& direction, const Placed* other = nullptr);
+    /// other: what it touches, to_other (m) from its own position; null: what stands still.
+    void incident_polygon(const Placed& placed, const Vector3d& direction, const Placed* other = nullptr,
+                          const Vector3d& to_other = Vector3d::Zero());
+    void put_leaning_rims(const Placed& cylinder, const Vector3d& direction, const Placed* other,
+                          const Vector3d& to_other);
     void clip(const Placed& reference, std::int32_t face, const Vector3d& to_reference, double tolerance);
     bool from_face(const Placed& reference, std::int32_t face, const Placed& incident, const Vector3d& to_incident,
                    bool reference_is_a, double limit, std::vector<CorePoint>& points);
@@ -51,7 +57,7 @@ private:
     void beside_edges(const Placed& a, const Placed& b, const Vector3d& offset, const Separation& nearest, double limit,
                       std::vector<CorePoint>& points);
     [[nodiscard]] static std::uint32_t feature(const Corner& corner, bool incident_is_a);
-    static void reduce(std::vector<CorePoint>& points);
+    static void reduce(std::vector<CorePoint>& points, std::size_t most);
 
     std::vector<Corner> polygon_, clipped_;
     std::vector<CorePoint> beside_;

@@ -36,6 +36,13 @@ struct Solid {
 /// Throws InputError for a margin that leaves no core, or a mesh without volume; name is for its message.
 [[nodiscard]] Solid make_solid(const Shape& shape, std::int32_t index);
 
+/// Of the body of a shape, as far as it is known.
+struct BodyInStep {
+    bool known = false;
+    Vector3d way = Vector3d::Zero(), turn = Vector3d::Zero();  ///< in the step, m and rad
+    Vector3d centre = Vector3d::Zero();                        ///< of mass, from the shape's origin
+};
+
 /// A solid in the world. The polytope's vectors are rotated, not moved: pairs are handled relative to a's position, so
 /// that being far from the world's origin costs no accuracy.
 struct Placed {
@@ -44,7 +51,7 @@ struct Placed {
     Vector3d position = Vector3d::Zero();
     std::vector<Vector3d> vertices, normals, directions;
     bool rotated = false;
-    Vector3d way = Vector3d::Zero(), turn = Vector3d::Zero();  ///< of its body in the step, m and rad, as far as known
+    BodyInStep body;
 
     /// Fills vertices, normals and directions once a detection.
     void rotate_core();

@@ -35,8 +35,7 @@ Turning turning(const Placed& placed, const Sweep& sweep, double t, Placed& move
 void advance(const Placed& placed, const Sweep& sweep, double t, Placed& moved) {
     moved.solid = placed.solid;
     moved.rotated = false;
-    moved.way = placed.way;
-    moved.turn = placed.turn;
+    moved.body = placed.body;
     moved.position = placed.position + t * sweep.straight;
     const double angle = sweep.rotation.norm();
     moved.rotation = placed.rotation;

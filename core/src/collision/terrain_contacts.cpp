@@ -199,8 +199,8 @@ void TerrainContacts::collide(const Placed& terrain, const Placed& shape, bool t
     local_.solid = shape.solid;
     local_.rotation.noalias() = to_terrain * shape.rotation;
     local_.position.noalias() = to_terrain * (shape.position - terrain.position);
-    local_.way.noalias() = to_terrain * shape.way;
-    local_.turn.noalias() = to_terrain * shape.turn;
+    local_.body = {shape.body.known, to_terrain * shape.body.way, to_terrain * shape.body.turn,
+                   to_terrain * shape.body.centre};
     local_.rotated = false;
     const double swept = shape.solid->radius + terrain.solid->radius, limit = envelope + swept;
     const Vector3d half = half_extent(local_) + Vector3d::Constant(envelope + terrain.solid->radius);
