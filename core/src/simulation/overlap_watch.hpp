@@ -67,8 +67,8 @@ private:
     MultibodySystem& system_;
     double accuracy_;
     std::string at_start_;
-    std::vector<BodyOverlap> start_, before_, now_,
-        last_;  // of the run's start, of the step's begin, of the last trial and the one before
+    std::vector<BodyOverlap> start_;                // of the run's start
+    std::vector<BodyOverlap> before_, now_, last_;  // of the step's begin, of the last trial and the one before
     std::set<std::pair<BodyIndex, BodyIndex>> given_up_;
 };
 
