@@ -356,12 +356,17 @@ void Manifold::between(Placed& a, Placed& b, const Vector3d& offset, const Separ
     const std::int32_t face_b = face_towards(b, -nearest.normal);
     bool found = false;
     // The face that is more aligned is the reference; up to rounding that of a, but that a cap, of which there are but
-    // samples, is the reference of what lies within it, and of nothing else.
+    // samples, is the reference of what lies within it, and of nothing else. Of two caps it is the larger one.
     const double aligned_a = face_a < 0 ? 0.0 : a.normals[face_a].dot(nearest.normal),
                  aligned_b = face_b < 0 ? 0.0 : -b.normals[face_b].dot(nearest.normal);
     bool of_b = face_b >= 0 && (face_a < 0 || aligned_b > aligned_a + 1e-14);
-    if (face_a >= 0 && face_b >= 0 && std::abs(aligned_b - aligned_a) <= 1e-14 && a.is_cylinder() != b.is_cylinder())
-        of_b = a.is_cylinder() ? !holds(a, b, face_b, offset) : holds(b, a, face_a, -offset);
+    if (face_a >= 0 && face_b >= 0 && std::abs(aligned_b - aligned_a) <= 1e-14) {
+        if (a.is_cylinder() && b.is_cylinder()) {
+            of_b = b.solid->cylinder_radius > a.solid->cylinder_radius;
+        } else if (a.is_cylinder() || b.is_cylinder()) {
+            of_b = a.is_cylinder() ? !holds(a, b, face_b, offset) : holds(b, a, face_a, -offset);
+        }
+    }
     if (of_b) {
         found = from_face(b, face_b, a, -offset, false, limit, points);
     } else if (face_a >= 0) {
