@@ -142,7 +142,7 @@ TEST(PlainMotion, WhatTurnsPastAFloorDoesNotTouchIt) {
 
 // Walls that are large and far away change nothing about what is near: a heavy box rests on a light can.
 // A can stands on a slope up to tan α = radius / half its height, whichever way it is turned about its axis: its cap is
-// round. As a polygon of rim points it fell from 26.2° on, or from less.
+// round, though it touches by some points of its rim.
 TEST(PlainMotion, ACanStandsOnASlopeUpToItsRim) {
     const double limit = std::atan(0.1 / 0.2);
     for (const double turned : {0.0, 10.0, 30.0, 47.3})

@@ -129,7 +129,7 @@ TEST(TerrainScene, ASphereRollsAlongAVShapedValley) {
 
 // Two slopes of 45°, without friction: what slides down one of them meets the other one head on with the speed v after
 // the time t₁ = v √2/g, at the middle, and goes back with v/2. Points on the two sides have names of their own, so that
-// those that rest are not taken for those that strike; it used to depend on the side from which the body came.
+// those that rest are not taken for those that strike, from whichever side the body comes.
 TEST(TerrainScene, WhatSlidesIntoAValleyBouncesOffItsOtherSide) {
     const std::string ground =
         "height_field: {size: [4, 4], heights: " + rows(5, 5, 4.0, 4.0, [](double x, double) { return std::abs(x); }) +

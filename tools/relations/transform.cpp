@@ -115,7 +115,7 @@ Json moved(const Json& scene, const Motion& motion) {
         const bool turns = joint["kind"] == "revolute" || joint["kind"] == "universal";
         for (const char* key : {"point", "second_point"}) change_vector(joint, key, point);
         for (const char* key : {"axis", "second_axis"})
-            turns ? change_vector(joint, key, axial) : change_vector(joint, key, polar);
+            change_vector(joint, key, [&](const Eigen::Vector3d& v) { return turns ? axial(v) : polar(v); });
     }
     for (auto& spring : items(result, "springs"))
         for (const char* key : {"first_point", "second_point"}) change_vector(spring, key, point);

@@ -13,7 +13,7 @@ namespace delassus::collision {
 namespace {
 
 // Features of a cylinder that its prism does not have: the ends of the generator (or rim points) that supports a
-// direction, and the generator.
+// direction, the generator, and the first of the rim points of put_leaning_rims().
 constexpr std::int32_t kLowerRim = 0x7ffd, kUpperRim = 0x7ffe, kGenerator = 0x7ffc, kLeaningRims = 0x7ff9;
 
 struct Edge {

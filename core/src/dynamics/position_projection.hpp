@@ -31,8 +31,6 @@ public:
     [[nodiscard]] std::span<const double> moved() const {
         return moved_ ? std::span<const double>(delta_) : std::span<const double>();
     }
-    /// Memory for what a step is judged by.
-    [[nodiscard]] RowWays& ways() { return ways_; }
     /// Changes end.v by the least, in the norm of H, to where the constraints stay: C_q v + C_t = 0.
     void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 

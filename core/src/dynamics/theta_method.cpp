@@ -61,6 +61,7 @@ ThetaMethod::ThetaMethod(DynamicalSystem& system, ThetaSettings settings)
       energy_(system),
       linearization_(system, settings_.linearization_limit),
       projection_(system),
+      ways_(system),
       cones_(free_cones(system)),
       bodies_(system.bodies_of_columns()),
       n_(system.n()),
@@ -665,16 +666,15 @@ void ThetaMethod::judge_linearization(const State& begin, double h, const Vector
 // A row's C at the end is what the linear model of its step missed. Beyond linearization_limit times the way of what it
 // holds, and where it grows, the step was too long for the model.
 void ThetaMethod::judge_constraints(const State& begin, double h) {
-    RowWays& ways = projection_.ways();
-    ways.find(problem_, begin, end_, left_);
+    ways_.find(problem_, begin, end_, left_);
     system_.constraint(begin, constraint_.data());
-    double before = ways.digits();
+    double before = ways_.digits();
     for (const double C : constraint_) before = std::max(before, std::abs(C));
     system_.constraint(end_, constraint_.data());
     for (std::size_t row = 0; row < constraint_.size(); ++row) {
         const double off = std::abs(constraint_[row]);
         if (off <= 2.0 * before) continue;
-        const double allowed = settings_.linearization_limit * ways.of(problem_.D, row);
+        const double allowed = settings_.linearization_limit * ways_.of(problem_.D, row);
         if (off <= allowed) continue;
         throw StepTooLong(fmt::format(
             "{} cannot take the step from t = {:.9g} with h = {:.9g}: it leaves a constraint off by {:.2g}, where "

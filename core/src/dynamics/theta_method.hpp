@@ -15,6 +15,7 @@
 #include "dynamics/linearization.hpp"
 #include "dynamics/position_error.hpp"
 #include "dynamics/position_projection.hpp"
+#include "dynamics/row_ways.hpp"
 #include "dynamics/step_memory.hpp"
 #include "dynamics/struck_spins.hpp"
 #include "dynamics/untouched_spins.hpp"
@@ -101,6 +102,7 @@ private:
     EnergyOfStep energy_;
     Linearization linearization_;
     PositionProjection projection_;
+    RowWays ways_;
     std::vector<Cone> cones_;
     std::vector<std::int32_t> bodies_;  ///< by column
     std::int32_t n_, m_;

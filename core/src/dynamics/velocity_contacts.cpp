@@ -354,8 +354,9 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
             const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
             contact.met_on_the_way =
                 before->block >= first_before && before_.contacts()[before->block - first_before].on_the_way;
-            const bool nearly = nearly_equal(row, before->row, block.cone.rows);
-            contact.nearly_as_before = nearly && (settings_.once || contact.pushed || !contact.along_normal);
+            const bool counts = settings_.once || contact.pushed || !contact.along_normal;
+            const bool nearly = (point || counts) && nearly_equal(row, before->row, block.cone.rows);
+            contact.nearly_as_before = nearly && counts;
             // Points are named by their order where nothing else tells them apart, which changes where one comes or
             // goes: what has the name, and rows that no motion explains, is another one.
             if (point && !nearly && !contact.met_on_the_way) before = nullptr;
