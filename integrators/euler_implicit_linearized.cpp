@@ -349,7 +349,7 @@ private:
         impulse_.resize(static_cast<std::size_t>(n_));
         for (std::int32_t i = 0; i < n_; ++i) impulse_[i] = problem_.a[i] - force_[i];
         system_.multiply_mass(begin, 1.0, delta_.data(), impulse_.data());
-        report.damped = damped(begin);
+        report.energy.damped = damped(begin);
         force_.assign(static_cast<std::size_t>(n_), 0.0);
         system_.add_force(end_, h, force_.data());
         if (!spins_.empty()) {  // their torques count for nothing here: they are not part of the linear model
@@ -493,7 +493,7 @@ private:
             for (; entry < end; ++entry) speed += penetrating_value_[entry] * end_.v[penetrating_column_[entry]];
             const double reaction = lambda[m_ + first_row_[block]];
             const double before = -approaches_[block].speed;
-            report.recovered += reaction * std::clamp(std::max(speed, 0.5 * (speed + before)), 0.0, recovery);
+            report.energy.recovered += reaction * std::clamp(std::max(speed, 0.5 * (speed + before)), 0.0, recovery);
         }
     }
 

@@ -239,7 +239,7 @@ TEST_P(SecondOrder, ARockingBlockGainsNoEnergy) {
     const double first = system.energy(system.initial_state());
     double largest = first;
     const State end = advance(system, GetParam(), {}, 6.0, 3000, [&](const State& state, const StepReport& report) {
-        largest = std::max(largest, system.energy(state) - report.recovered);
+        largest = std::max(largest, system.energy(state) - report.energy.recovered);
     });
     EXPECT_LT(largest, first + 1e-4 * first);
     EXPECT_NEAR(end.q[2], 0.0, 1e-6);

@@ -157,7 +157,13 @@ void print_summary(std::vector<Simulation>& simulations, const SharesOfSystems& 
             fmt::print("  steps from {:.2e} to {:.2e} s, {} trials rejected, {} impacts\n", totals.smallest_step,
                        totals.largest_step, totals.rejected, totals.impacts);
         if (std::isfinite(totals.energy))
-            fmt::print("  energy {:.6g} J, change {:+.3e} J\n", totals.energy, totals.energy - totals.start_energy);
+            fmt::print("  energy {:.6g} J, change {:+.3e} J{}{}\n", totals.energy, totals.energy - totals.start_energy,
+                       totals.turnover > 0.0 && std::isfinite(totals.supplied)
+                           ? fmt::format("; {:+.3e} J supplied", totals.supplied)
+                           : "",
+                       std::isfinite(totals.work) && totals.work != 0.0
+                           ? fmt::format("; {:+.3e} J by contacts and dry friction", totals.work)
+                           : "");
         fmt::print("  worst drift {:.2e}, deepest penetration {:.2e} m, at most {} contacts\n", totals.worst_drift,
                    totals.worst_penetration, totals.most_contacts);
         if (const auto start = simulation.start(); !start.empty()) fmt::print("  start: {}\n", start);

@@ -284,6 +284,13 @@ public:
 
     /// Kinetic plus potential energy, J; NaN where the system does not know it. Default: NaN.
     [[nodiscard]] virtual double energy(const State& state) const;
+    /// Whether anything supplies energy or takes it away: loads, motors, actuators, bodies with a given motion.
+    /// Default: false.
+    [[nodiscard]] virtual bool is_driven() const { return false; }
+    /// The power of loads and actuators, and of springs, dampers and beams at bodies with a given motion, that changes
+    /// energy(), W; NaN where it is not known. What rows with a given rate do is not in it: λ times that rate, taken
+    /// away. Default: 0.
+    [[nodiscard]] virtual double supplied_power(const State&) const { return 0.0; }
 };
 
 /// ½ vᵀ M v with the mass matrix at a state, J; v: n. momentum ← M v.

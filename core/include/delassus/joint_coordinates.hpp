@@ -122,6 +122,8 @@ public:
     [[nodiscard]] double free_fall() const override;
     [[nodiscard]] double gap_resolution() const override;
     [[nodiscard]] double energy(const State& state) const override;
+    [[nodiscard]] double supplied_power(const State& state) const override;
+    [[nodiscard]] bool is_driven() const override;
 
 private:
     struct Implementation;

@@ -660,6 +660,8 @@ public:
     /// 1e-9 of the median size of the shapes.
     [[nodiscard]] double gap_resolution() const override;
     [[nodiscard]] double energy(const State& state) const override;
+    [[nodiscard]] double supplied_power(const State& state) const override;
+    [[nodiscard]] bool is_driven() const override;
 
 private:
     struct Implementation;

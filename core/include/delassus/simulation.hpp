@@ -64,6 +64,11 @@ struct SimulationTotals {
     double potential_drop = 0.0;              ///< largest fall of the potential energy below its start, J
     double recovered = 0.0;                   ///< energy that contacts gave by pushing apart what penetrated, J
     double damped = 0.0;                      ///< energy that the method took from vibrations, J
+    double supplied = 0.0;  ///< energy that loads, motors and given motions supplied, J; NaN: not accounted for
+    double turnover = 0.0;  ///< StepEnergy::turnover, J
+    double doubt = 0.0;     ///< by how much of it `supplied` may be off, J
+    double work = 0.0;      ///< energy that contacts, stops and dry friction gave, J; < 0: took; NaN: as above
+    double rest = 0.0;      ///< change of the energy that neither explains: by dampers and the method, J; NaN: as above
     double start_overlap = 0.0;  ///< what is left of the deepest overlap of the start, m; 0 once it has not shrunk
     double credit = 0.0;         ///< rise of the energy while the overlaps of the start shrank, J
     double lowest = 0.0;         ///< least energy up to now but for `recovered`, J

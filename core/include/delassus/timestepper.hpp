@@ -25,6 +25,20 @@ struct BlockReaction {
     std::array<double, 3> force{};  ///< in its first rows, the mean over the step; 0 beyond its rows
 };
 
+/// What a step does to the energy, J.
+struct StepEnergy {
+    double recovered = 0.0;  ///< contacts gave it by pushing apart what penetrated; ≥ 0
+    double damped = 0.0;     ///< the method took it from vibrations; < 0: gave
+    // Where Timestepper::accounts():
+    double supplied = 0.0;  ///< by loads, motors and given motions; < 0: they took
+    double turnover = 0.0;  ///< sum of the absolute values of what their forces and rows supplied, each by itself
+    double doubt = 0.0;     ///< by how much of it `supplied` may be off
+    double work = 0.0;      ///< contacts, stops and dry friction gave it; < 0: took
+
+    /// Adds so many times what others do.
+    DELASSUS_API void add(const StepEnergy& other, double times = 1.0);
+};
+
 /// What a step did, and what acted in it.
 struct StepReport {
     std::int32_t newton_iterations = 0;  ///< linear or cone problems solved
@@ -42,9 +56,8 @@ struct StepReport {
     /// The error of a linearised method's forces at the end of the step, as a share of the velocities
     /// (docs/integrators.md); 0 where forces are linear, or where it is not measured.
     double linearization = 0.0;
-    double linearization_rounding = 0.0;   ///< what the last digits of positions may make of it; not part of it
-    double recovered = 0.0;                ///< energy that contacts gave by pushing apart what penetrated, J; ≥ 0
-    double damped = 0.0;                   ///< energy that the method took from vibrations, J; < 0: gave
+    double linearization_rounding = 0.0;  ///< what the last digits of positions may make of it; not part of it
+    StepEnergy energy;
     std::vector<BlockReaction> reactions;  ///< one for each unilateral block of the problem, in its order
     std::vector<ContactPoint> contacts;    ///< UnilateralRows::contacts(): the last of these blocks are theirs
     std::vector<double> multipliers;       ///< λ of the bilateral constraints at the end of the step, forces; m
@@ -111,6 +124,8 @@ public:
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
     /// Whether StepReport::error says what a step errs by, which costs no solve. Default: no.
     [[nodiscard]] virtual bool estimates_error() const { return false; }
+    /// Whether StepReport::supplied and work say what changed the energy. Default: no.
+    [[nodiscard]] virtual bool accounts() const { return false; }
     /// The tolerance, as StepControl::absolute, by which steps of a fixed size are to be taken in parts, or several at
     /// once where the method has an extension. Infinity by default: every step is one.
     [[nodiscard]] virtual double error_limit() const { return std::numeric_limits<double>::infinity(); }

@@ -137,7 +137,7 @@ void PositionProjection::project(const State& begin, State& end, double h, const
         system_.add_force(end, 1.0, force_.data());
         double work = 0.0;
         for (std::size_t i = 0; i < force_.size(); ++i) work -= force_[i] * delta_[i];
-        report.recovered += std::max(work, 0.0);
+        report.energy.recovered += std::max(work, 0.0);
     }
     system_.increment(end.q.data(), delta_.data(), end.q.data());
     require_finite(begin, end, h, method);

@@ -22,7 +22,7 @@ public:
     explicit PositionProjection(DynamicalSystem& system);
 
     /// Moves end.q by the least motion in the norm of H, of a step of size h; problem: that of the step, of velocities;
-    /// left: as of RowWays; contacts: of this step. Adds what contacts gave by it to report.recovered. Throws
+    /// left: as of RowWays; contacts: of this step. Adds what contacts gave by it to report.energy.recovered. Throws
     /// StepFailure if the motion is not finite or does not bring the constraints nearer to 0.
     void project(const State& begin, State& end, double h, const Problem& problem, std::span<const double> left,
                  const VelocityContacts& contacts, StepSolver& solver, StepReport& report, std::string_view method);

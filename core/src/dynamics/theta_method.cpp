@@ -155,11 +155,12 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     find_spins(state, h);
     if (settings_.linearly_implicit) extrapolate(h);
     solve_step(state, h, solver, report);
+    result_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
+    account(state, h, report);
     const double acting = bounced_.size() > 0 ? contacts_.share_of_rest(problem_, solution_) : 0.0;
     contacts_.add_known_impulses(solution_.lambda);
     contacts_.drop_negligible(problem_, solution_);
 
-    result_ = Eigen::Map<const Vector>(solution_.x.data(), n_);
     move(state, h, result_, 1.0, end_);
     const bool struck = timed_ && contacts_.find_impacts(problem_, solution_);
     if (struck) {
@@ -171,7 +172,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
         for (const StruckSpins::Spin& spin : struck_spins_.spins())
             std::copy(spin.speed.begin(), spin.speed.end(), end_.v.begin() + spin.column);
     require_finite(state, end_, h, settings_.name);
-    if (!stiff_.empty()) report.damped = lost_by_stiff_forces(state, h, result_);
+    if (!stiff_.empty()) report.energy.damped = lost_by_stiff_forces(state, h, result_);
     if (linearization_.wanted()) judge_linearization(state, h, result_, solver, report);
     const bool projected = !settings_.linearly_implicit || struck || contacts_.landed(solution_);
     if (projected) projection_.project(state, end_, h, problem_, left_, contacts_, solver, report, settings_.name);
@@ -639,6 +640,32 @@ bool ThetaMethod::solve(StepSolver& solver, StepReport& report) {
     left_.assign(answer.left_in_masses.begin(), answer.left_in_masses.end());
     if (settings_.linearly_implicit) contacts_.resolution().note(answer.left);
     return report.take(answer);
+}
+
+// With the mean velocities v̄ of the step, an impulse P along rows D changes the kinetic energy by P·D v̄. All of it is
+// supplied by constraints that have a given rate.
+void ThetaMethod::account(const State& begin, double h, StepReport& report) {
+    back_ = 0.5 * (Eigen::Map<const Vector>(begin.v.data(), n_) + result_);
+    const auto [work, supplied, turnover, doubt] =
+        contacts_.account(problem_, solution_, {back_.data(), static_cast<std::size_t>(n_)});
+    report.energy.work = work;
+    report.energy.supplied = supplied;
+    report.energy.turnover = turnover;
+    report.energy.doubt = doubt;
+    if (!system_.is_driven()) return;
+    const auto add = [&](double energy) {
+        report.energy.supplied += energy;
+        report.energy.turnover += std::abs(energy);
+    };
+    move(begin, h, result_, theta_, at_theta_);
+    at_theta_.v.assign(back_.begin(), back_.end());
+    add(h * system_.supplied_power(at_theta_));
+    if (m_ == 0) return;
+    rate_.resize(m_);
+    system_.constraint_rate(at_theta_, rate_.data());
+    for (std::int32_t row = 0; row < m_; ++row)
+        if (rate_[row] != 0.0)
+            add(solution_.lambda[static_cast<std::size_t>(row)] * problem_.D.row_times(row, back_.data()));
 }
 
 // Where steps are chosen by their error, the solver must not disturb it.

@@ -44,6 +44,7 @@ public:
 
     [[nodiscard]] int order() const override { return settings_.theta == 0.5 ? 2 : 1; }
     [[nodiscard]] bool estimates_error() const override { return true; }
+    [[nodiscard]] bool accounts() const override { return true; }
     void choose_steps(double tolerance) override;
     void restart() override;
     void follow_impacts(bool follow) override { contacts_.follow_impacts(follow); }
@@ -89,6 +90,7 @@ private:
     void note_velocity_error(const State& begin, double h);
     [[nodiscard]] bool solve(StepSolver& solver, StepReport& report);
     void judge_constraints(const State& begin, double h);
+    void account(const State& begin, double h, StepReport& report);
     void judge_linearization(const State& begin, double h, const Vector& result, StepSolver& solver,
                              StepReport& report);
 

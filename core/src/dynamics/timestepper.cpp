@@ -50,13 +50,21 @@ bool StepReport::take(const StepAnswer& answer) {
     return false;
 }
 
+void StepEnergy::add(const StepEnergy& other, double times) {
+    recovered += times * other.recovered;
+    damped += times * other.damped;
+    supplied += times * other.supplied;
+    turnover += times * other.turnover;
+    doubt += times * other.doubt;
+    work += times * other.work;
+}
+
 void StepReport::follow(const StepReport& before) {
     newton_iterations += before.newton_iterations;
     unilateral_blocks = std::max(unilateral_blocks, before.unilateral_blocks);
     linearization = std::max(linearization, before.linearization);
     linearization_rounding = std::max(linearization_rounding, before.linearization_rounding);
-    recovered += before.recovered;
-    damped += before.damped;
+    energy.add(before.energy);
     natural = std::max(natural, before.natural);
     if (before.solved) return;
     solved = false;

@@ -134,6 +134,15 @@ public:
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.
     /// solution: of the whole problem.
     [[nodiscard]] double work(const Problem& problem, const Solution& solution, std::span<const double> mean) const;
+    /// Energy of a step, J.
+    struct Account {
+        double work = 0.0;  ///< Σ P·u of all contacts, stops, friction and limited motors; below 0 they take energy
+        double supplied = 0.0;  ///< by bodies with a given motion that touch, limited motors and servos
+        double turnover = 0.0;  ///< the same, absolute values of each row
+        double doubt = 0.0;     ///< by how much of it `supplied` may be off
+    };
+    /// Both, at the mean velocities of the step, n, or those of impacts within it. solution: as of work().
+    [[nodiscard]] Account account(const Problem& problem, const Solution& solution, std::span<const double> mean);
     /// After append_to(), of contacts without restitution: none strikes at its time, and rows stay as they are in the
     /// middle of the step. Such contacts take energy only.
     void only_take();
@@ -215,6 +224,9 @@ private:
         [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 
+    [[nodiscard]] double work_of_block(std::size_t block, const Problem& problem, const Solution& solution,
+                                       std::span<const double> mean) const;
+    [[nodiscard]] double mean_rate(const Contact& contact, std::size_t i) const;
     [[nodiscard]] double restitution_of(std::size_t block) const {
         return restitution_ * rows_.blocks()[block].restitution;
     }

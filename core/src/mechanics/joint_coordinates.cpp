@@ -800,5 +800,13 @@ double JointCoordinates::energy(const State& state) const {
     self.place(state);
     return self.bodies.energy(self.state);
 }
+bool JointCoordinates::is_driven() const {
+    return implementation_->bodies.is_driven();
+}
+double JointCoordinates::supplied_power(const State& state) const {
+    auto& self = *implementation_;
+    self.place(state);
+    return self.bodies.supplied_power(self.state);
+}
 
 }  // namespace delassus

@@ -109,6 +109,16 @@ double MultibodySystem::energy(const State& state) const {
     return energy;
 }
 
+bool MultibodySystem::is_driven() const {
+    const auto& self = *implementation_;
+    const auto is_motor = [](const mechanics::Joint& joint) {
+        return std::ranges::any_of(joint.rows, [](const mechanics::Row& row) { return row.drive != nullptr; });
+    };
+    return !self.loads.empty() || !self.prescribed.empty() || !self.bounded_motors.empty() ||
+           !self.bounded_actuators.empty() || std::ranges::any_of(self.joints, is_motor) ||
+           std::ranges::any_of(self.springs, [](const auto& spring) { return !spring.potential || spring.row.drive; });
+}
+
 std::int64_t MultibodySystem::inverted_solids(const State& state) const {
     const auto& self = *implementation_;
     if (self.solids_count() == 0) return 0;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // M, f, K and R of a multibody system.
+#include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "mechanics/multibody_implementation.hpp"
@@ -203,6 +205,27 @@ void MultibodySystem::add_inertial_stiffness(const State& state, const double* a
     });
 }
 
+void MultibodySystem::Implementation::add_loads(double t, double factor, double* result) const {
+    for (const auto& load : loads) {
+        const Vector3d force = load_factor * at_time(load.parameters.force, t);
+        for (const auto& [node, share] : load.parameters.nodes)
+            if (const auto column = nodes[static_cast<std::size_t>(node)].column; column >= 0)
+                Eigen::Map<Vector3d>(result + column) += factor * share * force;
+        if (!load.parameters.nodes.empty()) continue;
+        const auto& place = at[load.parameters.body];
+        if (place.column < 0) continue;
+        const Vector3d torque = load_factor * at_time(load.parameters.torque, t);
+        if (load.parameters.follower) {
+            Eigen::Map<Vector3d>(result + place.column) += factor * (place.A * force);
+            Eigen::Map<Vector3d>(result + place.column + 3) += factor * (load.point.cross(force) + torque);
+            continue;
+        }
+        Eigen::Map<Vector3d>(result + place.column) += factor * force;
+        Eigen::Map<Vector3d>(result + place.column + 3) +=
+            factor * (load.point.cross(place.A.transpose() * force) + place.A.transpose() * torque);
+    }
+}
+
 // Gravity m g; gyroscopic torque −ω̄ × J ω̄ (Newton and Euler in the body frame); springs −(k C + c Ċ) ∇C; loads
 // (F, s̄ × Aᵀ F + Aᵀ T).
 void MultibodySystem::add_force(const State& state, double factor, double* result) const {
@@ -243,25 +266,60 @@ void MultibodySystem::add_force(const State& state, double factor, double* resul
         inertia.force(at, gravity, forces);
         scatter(forces, at, factor, result);
     });
-    for (const auto& load : self.loads) {
-        const Vector3d force = self.load_factor * at_time(load.parameters.force, state.t);
-        for (const auto& [node, share] : load.parameters.nodes)
-            if (const auto column = node_column(node); column >= 0)
-                Eigen::Map<Vector3d>(result + column) += factor * share * force;
-        if (!load.parameters.nodes.empty()) continue;
-        const auto& place = self.at[load.parameters.body];
-        if (place.column < 0) continue;
-        const Vector3d torque = self.load_factor * at_time(load.parameters.torque, state.t);
-        if (load.parameters.follower) {
-            Eigen::Map<Vector3d>(result + place.column) += factor * (place.A * force);
-            Eigen::Map<Vector3d>(result + place.column + 3) += factor * (load.point.cross(force) + torque);
+    self.add_loads(state.t, factor, result);
+    self.add_modal_force(state, factor, result);
+}
+
+// What an element does to all bodies at its ends is what its potential loses and its damper takes. So what it does to
+// those that are free to move, beside that, is what it takes from the others: of a spring T times the part of Ċ that is
+// prescribed. The potential of an actuator is not counted, so that all it does is supplied.
+double MultibodySystem::supplied_power(const State& state) const {
+    const auto& self = *implementation_;
+    const auto moves_as_prescribed = [&](BodyIndex body) {
+        return body != world_body && self.bodies[static_cast<std::size_t>(body)].prescribed;
+    };
+    for (const auto& inertia : self.beam_inertias)
+        if (std::ranges::any_of(inertia.bodies(), moves_as_prescribed)) return std::numeric_limits<double>::quiet_NaN();
+    if (self.has_armature && !self.prescribed.empty()) return std::numeric_limits<double>::quiet_NaN();
+    self.place(state);
+    std::vector<double>& force = self.generalized_force;
+    force.assign(state.v.size(), 0.0);
+    self.add_loads(state.t, 1.0, force.data());
+    double power = 0.0;
+    for (const auto& spring : self.springs) {
+        if (spring.potential && !spring.row.drive && self.prescribed.empty()) continue;
+        const auto columns = spring.row.columns(self.at, true);
+        spring.row.gradient(self.at, columns, self.gradient);
+        const double T = tension(spring, columns, self.gradient, self.at, state.t);
+        if (!spring.potential) {
+            scatter(columns, self.gradient, -T, force.data());
             continue;
         }
-        Eigen::Map<Vector3d>(result + place.column) += factor * force;
-        Eigen::Map<Vector3d>(result + place.column + 3) +=
-            factor * (load.point.cross(place.A.transpose() * force) + place.A.transpose() * torque);
+        if (spring.row.drive) power -= T * spring.row.drive->rate(state.t);
+        const RowVector v = velocities_of(columns, self.at);
+        for (int k = 0; k < columns.bodies; ++k)
+            if (columns.column[static_cast<std::size_t>(k)] < 0)
+                power += T * self.gradient.segment<6>(6 * k).dot(v.segment<6>(6 * k));
     }
-    self.add_modal_force(state, factor, result);
+    if (!self.prescribed.empty()) {
+        for (const auto& damper : self.turn_dampers) {
+            const auto &first = self.at[damper.first], &second = self.at[damper.second];
+            const Vector3d slip = second.A * second.omega - first.A * first.omega;
+            if (first.column < 0) power -= damper.damping * slip.dot(first.A * first.omega);
+            if (second.column < 0) power += damper.damping * slip.dot(second.A * second.omega);
+        }
+        for (const auto& beam : self.beams) {
+            const mechanics::Beam::Ends ends{self.at[beam.bodies()[0]], self.at[beam.bodies()[1]]};
+            mechanics::Beam::Forces forces;
+            beam.force(ends, forces);
+            for (std::size_t k = 0; k < ends.size(); ++k) {
+                if (ends[k].column >= 0) continue;
+                const auto place = 6 * static_cast<Eigen::Index>(k);
+                power -= forces.segment<3>(place).dot(ends[k].v) + forces.segment<3>(place + 3).dot(ends[k].omega);
+            }
+        }
+    }
+    return std::inner_product(force.begin(), force.end(), state.v.begin(), power);
 }
 
 // Springs: f = −(k C + c Ċ) ∇C, so that K = k ∇C ∇Cᵀ + (k C + c Ċ) ∇²C + c ∇C (∂Ċ/∂q)ᵀ with Ċ = ∇C · v and

@@ -97,6 +97,7 @@ struct MultibodySystem::Implementation {
     mutable std::vector<mechanics::ModalPlacement> modal_at;  // of `reduced`
     mutable mechanics::RowVector gradient;
     mutable mechanics::RowMatrix hessian;
+    mutable std::vector<double> generalized_force;
     std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
     std::vector<BodyDisplacement> displacements;  // of the same; fixed ones have none
     /// What was detected last for collect_overlaps().
@@ -163,6 +164,9 @@ struct MultibodySystem::Implementation {
         each(cables);
         for (const auto& beam : beams) visit(beam, mechanics::Beam::Ends{at[beam.bodies()[0]], at[beam.bodies()[1]]});
     }
+
+    /// result (n) += factor · the forces of loads at this time; after place().
+    void add_loads(double t, double factor, double* result) const;
 
     /// Visits the elements with a consistent mass: visit(element, placements of its ends). After place().
     template <class Visitor>

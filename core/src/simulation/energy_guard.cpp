@@ -20,7 +20,7 @@ bool any_damping(const MultibodySystem& mechanics, const State& state) {
 
 }  // namespace
 
-EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
+EnergyGuard::EnergyGuard(const SceneSystem& system) {
     const MultibodySystem& mechanics = *system.system;
     const State start = mechanics.initial_state();
     dissipates_ = mechanics.has_unilateral() || any_damping(mechanics, start);
@@ -45,16 +45,16 @@ EnergyGuard::EnergyGuard(const SceneSystem& system) : system_(&system) {
     for (std::size_t i = 0; i < n; ++i) digits_ += std::abs(fall[i] * momentum[i]);
 }
 
-bool EnergyGuard::watches(const SimulationTotals& totals) const {
-    const auto& bodies = system_->bodies;
-    const bool driven =
-        !system_->motors.empty() || !system_->actuators.empty() || !system_->loads.empty() ||
-        std::any_of(bodies.begin(), bodies.end(), [](const auto& body) { return body.motion.has_value(); });
-    return std::isfinite(totals.start_energy) && !driven;
+bool EnergyGuard::watches(const SimulationTotals& totals) {
+    return std::isfinite(totals.start_energy) && std::isfinite(totals.supplied);
+}
+
+const char* EnergyGuard::though(const SimulationTotals& totals) {
+    return totals.turnover > 0.0 ? "beyond what loads, motors and given motions supply" : "though nothing supplies any";
 }
 
 double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) const {
-    const double available = totals.start_kinetic + totals.potential_drop + totals.recovered;
+    const double available = totals.start_kinetic + totals.potential_drop + totals.recovered + totals.turnover;
     const double square = longest_step * longest_step;
     const double floor = fall_ * square + digits_ / square + 1e-10 * std::abs(totals.start_energy);
     return std::max(available, floor);
@@ -72,7 +72,7 @@ void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
     before_ = totals.growth;
     last_taken_ = HUGE_VAL;
     const double left = system_.planned_end > t ? system_.planned_end - t : system_.planned_end;
-    allowed_ = before_ < budget && totals.start_overlap == 0.0 && guard_.watches(totals)
+    allowed_ = before_ < budget && totals.start_overlap == 0.0 && !system_.system->is_driven() && guard_.watches(totals)
                    ? std::max(0.5 * budget, before_ + (budget - before_) * std::min(h / left, 1.0))
                    : HUGE_VAL;
 }

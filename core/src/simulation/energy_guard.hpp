@@ -11,35 +11,39 @@ namespace delassus {
 
 struct SimulationTotals;
 
-// Where no motor, actuator, load or kinematic body gives energy, E = K + V never exceeds E₀ in truth: joints and
-// contacts take energy or leave it. Kinetic energy comes from the start or from the potential, so that
+// Joints and contacts take energy or leave it. So E = K + V never exceeds E₀ in truth, but for what loads, motors and
+// given motions supply, S. Where a method does not account for that, nobody knows, and nothing is watched. Kinetic
+// energy comes from the start, from the potential or from outside, so that
 //
-//     A = K₀ + max_k (V₀ − V_k)⁺ + W
+//     A = K₀ + max_k (V₀ − V_k)⁺ + W + Σ |S_i|
 //
-// is the most that there can have been up to now, W being what contacts gave by pushing apart what penetrated. Methods
-// err: a growth by some percent of A is an inaccuracy, one by A itself means that the motion is not that of the system.
-// The guard compares E − E₀ − W with limit · max(A, floor), where floor = ½ ‖2 h g‖²_M + ‖1e-10 q/h‖²_M + 1e-10 |E₀|: a
-// step cannot tell a motion below a free fall over two steps from rest (a stiff part that starts off its equilibrium
-// overshoots by about that), nor one by the last digits of the positions, and energies of far bodies are rounded.
+// is the most that there can have been up to now, W being what contacts gave by pushing apart what penetrated, and S_i
+// what each row and the forces supply in each step. Methods err: a growth by some percent of A is an inaccuracy, one by
+// A itself means that the motion is not that of the system. The guard compares E − S − E₀ − W with limit · max(A,
+// floor), where floor = ½ ‖2 h g‖²_M + ‖1e-10 q/h‖²_M + 1e-10 |E₀|: a step cannot tell a motion below a free fall over
+// two steps from rest (a stiff part that starts off its equilibrium overshoots by about that), nor one by the last
+// digits of the positions, and energies of far bodies are rounded.
 class EnergyGuard {
 public:
     /// system outlives it.
     explicit EnergyGuard(const SceneSystem& system);
 
-    /// Whether energy is known, and nothing supplies any.
-    [[nodiscard]] bool watches(const SimulationTotals& totals) const;
+    /// Whether energy is known, and what is supplied.
+    [[nodiscard]] static bool watches(const SimulationTotals& totals);
 
-    /// Whether energy is known, and nothing supplies or takes any: what it falls by is the method's damping.
+    /// Whether these are known, and nothing takes any: what it falls by is the method's damping.
     [[nodiscard]] bool conserved(const SimulationTotals& totals) const { return !dissipates_ && watches(totals); }
 
-    /// G at an energy after a step that recovered so much more than is in the totals, J.
+    /// Ends a sentence about a growth.
+    [[nodiscard]] static const char* though(const SimulationTotals& totals);
+
+    /// G at an energy E − S after a step that recovered so much more than is in the totals, J.
     [[nodiscard]] DELASSUS_API static double growth(const SimulationTotals& totals, double energy, double recovered);
 
     /// max(A, floor); longest_step: of the run, s.
     [[nodiscard]] double scale(const SimulationTotals& totals, double longest_step) const;
 
 private:
-    const SceneSystem* system_;
     bool dissipates_;  // contacts, stops, friction or damping can take energy
     double fall_;      // ½ ‖2 g‖²_M, of a step of 1 s
     double digits_;    // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
@@ -47,20 +51,21 @@ private:
 
 // Below that a growth is an error all the same. Joints and contacts take energy or leave it, so that E never rises:
 //
-//     G = max(E − E₀, (E − W) − min(E − W))
+//     G = max(E − E₀, (E − W) − min(E − W)),      with E − S − D in the place of E
 //
-// The one counts what bodies get that a step lets sink in and the next ones lift. The other sees a rise that friction
-// hides, and not what they lift. What overlaps at the start gives energy, which is no growth, as long as the deepest
-// overlap shrinks. What of G does not come back adds up over a run. All of it may come to B = accuracy · max(A, floor)
-// until the time T at which the scene ends (by itself: a run that is ended before and goes on later takes the same
-// steps). Half of B is free, for what comes and goes; of the rest a step may take the share of the time that is left:
+// (D: by how much S may be off). The one counts what bodies get that a step lets sink in and the next ones lift. The
+// other sees a rise that friction hides, and not what they lift. What overlaps at the start gives energy, which is no
+// growth, as long as the deepest overlap shrinks. What of G does not come back adds up over a run. All of it may come
+// to B = accuracy · max(A, floor) until the time T at which the scene ends (by itself: a run that is ended before and
+// goes on later takes the same steps). Half of B is free, for what comes and goes; of the rest a step may take the
+// share of the time that is left:
 //
 //     G⁺ ≤ max(B/2, G + (B − G) h/(T − t)),      G: the largest growth up to now
 //
-// with T in place of T − t beyond T.
-// A step that takes more is too long and goes in parts, each halving of which lowers what it takes by 2ᵖ for a method
-// of order p. Where a halving leaves more than 0.7 of it, as where an impact gives energy, parts do not help and the
-// step counts as it is, and so do all once B is used up.
+// with T in place of T − t beyond T. A step that takes more is too long and goes in parts, each halving of which lowers
+// what it takes by 2ᵖ for a method of order p. Where a halving leaves more than 0.7 of it, as where an impact gives
+// energy, parts do not help and the step counts as it is, and so do all once B is used up, and where anything supplies
+// energy, as S is known to O(h²) only.
 class EnergyWatch {
 public:
     /// A step that takes more than its share.

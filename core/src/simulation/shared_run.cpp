@@ -277,12 +277,13 @@ void SharedRun::complete(StepReport& report, double h) {
     report.linearization = largest[1];
     report.linearization_rounding = largest[2];
     std::array<double, 4> sums = {static_cast<double>(report.reactions.size()),
-                                  static_cast<double>(report.active_blocks), report.recovered, report.damped};
+                                  static_cast<double>(report.active_blocks), report.energy.recovered,
+                                  report.energy.damped};
     communicator_->sum(sums);
     report.unilateral_blocks = static_cast<std::int32_t>(sums[0]);
     report.active_blocks = static_cast<std::int32_t>(sums[1]);
-    report.recovered = sums[2];
-    report.damped = sums[3];
+    report.energy.recovered = sums[2];
+    report.energy.damped = sums[3];
     report.multipliers = steps_.bilateral();
     for (double& multiplier : report.multipliers) multiplier /= h;
 

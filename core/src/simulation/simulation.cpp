@@ -297,28 +297,39 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
             fmt::format("the constraints have drifted by {:.3g}, where limits.drift is {:.3g}: the step of {:.3g} s is "
                         "too long for {}",
                         record_.drift, limits.drift, taken.h, method().integrator));
-    totals.damped += taken.step.damped;
-    if (!guard_->watches(totals)) return;
+    totals.damped += taken.step.energy.damped;
+    const bool accounts = stepping_->timestepper()->accounts();
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    if (system_->system->is_driven()) {
+        totals.supplied += accounts ? taken.step.energy.supplied : unknown;
+        totals.turnover += taken.step.energy.turnover;
+        totals.doubt += taken.step.energy.doubt;
+    }
+    totals.work += accounts ? taken.step.energy.work : unknown;
+    totals.rest = record_.energy - totals.start_energy - totals.supplied - totals.work;
+    if (!EnergyGuard::watches(totals)) return;
+    const double energy = record_.energy - totals.supplied - totals.doubt;
     const double start_potential = totals.start_energy - totals.start_kinetic;
     totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
-    totals.recovered += taken.step.recovered;
+    totals.recovered += taken.step.energy.recovered;
     const double left = record_.penetration;
     totals.start_overlap = now_.step == 0 || left < totals.start_overlap ? left : 0.0;
     if (totals.start_overlap > 0.0) {
-        totals.credit = std::max(totals.credit, record_.energy - totals.start_energy);
-        totals.lowest = record_.energy - totals.recovered;
+        totals.credit = std::max(totals.credit, energy - totals.start_energy);
+        totals.lowest = energy - totals.recovered;
     }
-    const double growth = EnergyGuard::growth(totals, record_.energy, 0.0);
-    totals.lowest = std::min(totals.lowest, record_.energy - totals.recovered);
+    const double growth = EnergyGuard::growth(totals, energy, 0.0);
+    totals.lowest = std::min(totals.lowest, energy - totals.recovered);
     const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
     totals.growth = std::max(totals.growth, growth);
     if (growth > 0.0) totals.growth_share = std::max(totals.growth_share, growth / scale);
-    if (record_.energy - totals.start_energy - totals.recovered > limits.energy_growth * scale)
-        throw StepFailure(fmt::format(
-            "the energy has grown from {:.6g} J at the start to {:.6g} J though nothing supplies any (what can have "
-            "moved at all is {:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
-            "damps (limits.energy_growth: {:.3g})",
-            totals.start_energy, record_.energy, scale, taken.h, method().integrator, limits.energy_growth));
+    if (energy - totals.start_energy - totals.recovered > limits.energy_growth * scale)
+        throw StepFailure(
+            fmt::format("the energy has grown from {:.6g} J at the start to {:.6g} J {} (what can have moved at all is "
+                        "{:.3g} J): the step of {:.3g} s is too long for {}; take shorter steps or a method that "
+                        "damps (limits.energy_growth: {:.3g})",
+                        totals.start_energy, record_.energy, EnergyGuard::though(totals), scale, taken.h,
+                        method().integrator, limits.energy_growth));
 }
 
 // What a step of a scene has beside that of any system.
@@ -394,8 +405,8 @@ const StepRecord& Simulation::step() {
     span.say("number", static_cast<double>(now_.step + 1));
     span.say("t", now_.state.t);
     if (joint_ && now_.totals.growth_share > visible_share)
-        go_on(fmt::format("the energy rose by {:.3g} J, {:.2g} % of what can have moved, though nothing supplies any",
-                          now_.totals.growth, 100.0 * now_.totals.growth_share));
+        go_on(fmt::format("the energy rose by {:.3g} J, {:.2g} % of what can have moved, {}", now_.totals.growth,
+                          100.0 * now_.totals.growth_share, EnergyGuard::though(now_.totals)));
     notice_changes();
     Step(*this).take();
     return record_;
@@ -464,11 +475,12 @@ std::vector<std::string> Simulation::warnings() const {
     std::vector<std::string> sentences;
     if (const auto& totals = now_.totals; totals.growth_share > system_->accuracy)
         sentences.push_back(fmt::format(
-            "system \"{}\": the energy rose by up to {:.3g} J, {:.2g} % of what can have "
-            "moved, though nothing supplies any: the steps are long for {} (accuracy: {:.3g})",
-            system_->name, totals.growth, 100.0 * totals.growth_share, method().integrator, system_->accuracy));
+            "system \"{}\": the energy rose by up to {:.3g} J, {:.2g} % of what can have moved, {}: the steps are "
+            "long for {} (accuracy: {:.3g})",
+            system_->name, totals.growth, 100.0 * totals.growth_share, EnergyGuard::though(totals), method().integrator,
+            system_->accuracy));
     if (const auto& totals = now_.totals; guard_->conserved(totals)) {
-        const double fall = totals.start_energy - totals.energy;
+        const double fall = totals.start_energy + totals.supplied - totals.doubt - totals.energy;
         const double share = fall / guard_->scale(totals, totals.largest_step);
         const bool in_trees = !joint_ && !system_->joints.empty() && system_->system->node_count() == 0;
         if (share > visible_share)

@@ -89,7 +89,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 43> total_columns = {{
+inline constexpr std::array<TotalColumn, 48> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -107,6 +107,15 @@ inline constexpr std::array<TotalColumn, 43> total_columns = {{
     {"recovered", "J", "energy that contacts gave by pushing apart what penetrated", &SimulationTotals::recovered,
      "/energy/recovered"},
     {"damped", "J", "energy that the method took from vibrations", &SimulationTotals::damped, "/energy/damped"},
+    {"supplied", "J", "energy that loads, motors and given motions supplied; NaN: not accounted for",
+     &SimulationTotals::supplied, "/energy/supplied"},
+    {"turnover", "J", "sum of the absolute values of what rows and forces supplied in each step",
+     &SimulationTotals::turnover},
+    {"doubt", "J", "by how much of it what was supplied may be off", &SimulationTotals::doubt},
+    {"work", "J", "energy that contacts, stops and dry friction gave; NaN: not accounted for", &SimulationTotals::work,
+     "/energy/work"},
+    {"rest", "J", "change of the energy by dampers and the method; NaN: not accounted for", &SimulationTotals::rest,
+     "/energy/rest"},
     {"start_kinetic", "J", "kinetic energy at the start", &SimulationTotals::start_kinetic},
     {"potential_drop", "J", "largest fall of the potential energy below its start", &SimulationTotals::potential_drop},
     {"worst_drift", "m, rad", "largest violation of a bilateral constraint", &SimulationTotals::worst_drift,

@@ -94,6 +94,7 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
     } else {
         step_fixed(state, solver, report, watch);
         last_.whole = report.substeps == 1 && !report.refined;
+        last_.energy = report.step.energy;
     }
     state.t = step.end;
 }
@@ -285,14 +286,16 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     bool better = false;
     const ChosenSteps chosen(*timestepper_);
     const double end = last_.state.t + report.h;
+    StepEnergy counted;
     if (older_.whole) {
+        counted = older_.energy;
         state = older_.state;
         timestepper_->load(older_.method);
     } else {
         go_back(state);
     }
     try {
-        take_refined(looser, state, end, solver, report, watch);
+        take_refined(looser, state, end, counted, solver, report, watch);
         better = report.error < of_whole.error;
     } catch (const StepFailure&) {
         work_ -= usual;
@@ -304,8 +307,8 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     if (watch) judge(state, report, *watch);
 }
 
-void Stepping::take_refined(double looser, State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
-                            StepWatch* watch) {
+void Stepping::take_refined(double looser, State& state, double end, const StepEnergy& counted, StepSolver& solver,
+                            AdaptiveStepReport& report, StepWatch* watch) {
     StepControl control = *settings_.judged;
     control.absolute *= looser;
     control.slow *= looser;
@@ -313,6 +316,7 @@ void Stepping::take_refined(double looser, State& state, double end, StepSolver&
     const std::int64_t before = solver.effort().iterations;
     step_within_error(refined, state, end, solver, report, work_);
     report.error *= looser;
+    report.step.energy.add(counted, -1.0);
     if (!report.step.solved) throw StepFailure("solves of the substeps missed their tolerance");
     report.refined = true;
     work_ -= work_of(report.step, solver.effort().iterations - before);
@@ -387,6 +391,9 @@ SteppingMemory Stepping::save() const {
         memory.control = {work_};
         if (last_.whole) {
             memory.control.push_back(last_.state.t);
+            for (const double energy : {last_.energy.recovered, last_.energy.damped, last_.energy.supplied,
+                                        last_.energy.turnover, last_.energy.doubt, last_.energy.work})
+                memory.control.push_back(energy);
             for (const auto* values : {&last_.state.q, &last_.state.v, &last_.method})
                 memory.control.insert(memory.control.end(), values->begin(), values->end());
         }
@@ -400,18 +407,21 @@ void Stepping::load(const SteppingMemory& memory, const State& state) {
     if (control_) control_->load(memory.control);
     if (settings_.refines) {
         const auto& control = memory.control;
-        const std::size_t of_state = 2 + state.q.size() + state.v.size();
+        const std::size_t of_state = 8 + state.q.size() + state.v.size();
         if (control.size() != 1 && control.size() < of_state)
             throw InputError("the memory of divided steps has not the size of the system");
         work_ = control.front();
         last_ = {};
         if (control.size() > 1) {
-            auto next = control.begin() + 2;
+            auto next = control.begin() + 8;
             const auto take = [&](std::vector<double>& values, std::size_t count) {
                 values.assign(next, next + static_cast<std::ptrdiff_t>(count));
                 next += static_cast<std::ptrdiff_t>(count);
             };
-            last_ = {.state = {control[1], {}, {}}, .method = {}, .whole = true};
+            last_ = {.state = {control[1], {}, {}},
+                     .method = {},
+                     .whole = true,
+                     .energy = {control[2], control[3], control[4], control[5], control[6], control[7]}};
             take(last_.state.q, state.q.size());
             take(last_.state.v, state.v.size());
             take(last_.method, control.size() - of_state);

@@ -108,8 +108,9 @@ private:
     /// What a step of size h errs by, over what is allowed; NaN where it is not known.
     [[nodiscard]] double error_of(const StepReport& report, double h) const;
     void refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
-    void take_refined(double looser, State& state, double end, StepSolver& solver, AdaptiveStepReport& report,
-                      StepWatch* watch);
+    /// counted: of the step before, if it is taken again.
+    void take_refined(double looser, State& state, double end, const StepEnergy& counted, StepSolver& solver,
+                      AdaptiveStepReport& report, StepWatch* watch);
     static void judge(const State& state, const AdaptiveStepReport& report, StepWatch& watch);
     void step_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
     void show_ahead(State& state, double end, StepSolver& solver, AdaptiveStepReport& report);
@@ -127,7 +128,8 @@ private:
     struct Beginning {
         State state;
         std::vector<double> method;
-        bool whole = false;  // the step was taken as a whole, and nothing was changed from outside since
+        bool whole = false;   // the step was taken as a whole, and nothing was changed from outside since
+        StepEnergy energy{};  // of that step
     };
     Beginning last_, older_, oldest_;  // of the last advance(), and of those before it
     bool reads_ = false;               // all was known already, and nothing has changed

@@ -24,7 +24,7 @@ void WatchedStep::begin_trial(std::int64_t substeps) {
 }
 
 void WatchedStep::judge(const State& state, double h, const StepReport& report, bool last) {
-    if (watched_.energy) watched_.energy->note_recovered(report.recovered);
+    if (watched_.energy) watched_.energy->note_recovered(report.energy.recovered);
     if (watched_.overlaps) watched_.overlaps->require_within(bodies_at(state), h, solver_.team());
     if (watched_.energy && last) watched_.energy->require_within(system_.energy(bodies_at(state)), h);
 }
