@@ -44,6 +44,7 @@ struct AdaptiveStepReport {
     bool impact = false;        ///< a short step for a contact that closed at its beginning
     std::int64_t substeps = 1;  ///< in which it was taken
     bool refined = false;       ///< a fixed step that was divided by its error
+    bool again = false;         ///< with the step before, which was taken again
 };
 
 /// Chooses the steps of a timestepper. Each trial is taken once as a whole and once as two halves, and the halves are

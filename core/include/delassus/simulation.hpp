@@ -72,6 +72,7 @@ struct SimulationTotals {
     double start_overlap = 0.0;  ///< what is left of the deepest overlap of the start, m; 0 once it has not shrunk
     double credit = 0.0;         ///< rise of the energy while the overlaps of the start shrank, J
     double lowest = 0.0;         ///< least energy up to now but for `recovered`, J
+    double lowest_before = 0.0;  ///< the same before the last step, J
     double growth = 0.0;         ///< largest rise of the energy: above its start and `credit`, or above `lowest`, J
     double growth_share = 0.0;   ///< largest growth over the energy that can have moved (running.md); 0: not judged
     double worst_drift = 0.0, worst_penetration = 0.0, worst_natural = 0.0;

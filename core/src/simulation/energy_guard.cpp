@@ -23,7 +23,8 @@ bool any_damping(const MultibodySystem& mechanics, const State& state) {
 EnergyGuard::EnergyGuard(const SceneSystem& system) {
     const MultibodySystem& mechanics = *system.system;
     const State start = mechanics.initial_state();
-    dissipates_ = mechanics.has_unilateral() || any_damping(mechanics, start);
+    has_contacts_ = mechanics.has_unilateral();
+    has_damping_ = any_damping(mechanics, start);
     const auto n = static_cast<std::size_t>(mechanics.n());
     std::vector<double> fall(n, 0.0), momentum(n, 0.0);
     const auto set = [&](std::int32_t column) {
@@ -54,15 +55,24 @@ const char* EnergyGuard::though(const SimulationTotals& totals) {
 }
 
 double EnergyGuard::scale(const SimulationTotals& totals, double longest_step) const {
-    const double available = totals.start_kinetic + totals.potential_drop + totals.recovered + totals.turnover;
+    const double from_outside =
+        std::isnan(totals.supplied) ? std::abs(totals.energy - totals.start_energy) : totals.turnover;
+    const double available = totals.start_kinetic + totals.potential_drop + totals.recovered + from_outside;
     const double square = longest_step * longest_step;
     const double floor = fall_ * square + digits_ / square + 1e-10 * std::abs(totals.start_energy);
     return std::max(available, floor);
 }
 
-double EnergyGuard::growth(const SimulationTotals& totals, double energy, double recovered) {
+double EnergyGuard::loss(const SimulationTotals& totals) const {
+    if (has_damping_) return 0.0;
+    if (std::isfinite(totals.rest)) return std::max(-totals.rest - totals.doubt - totals.damped, 0.0);
+    if (has_contacts_ || !watches(totals)) return 0.0;
+    return std::max(totals.start_energy + totals.supplied - totals.energy, 0.0);
+}
+
+double EnergyGuard::growth(const SimulationTotals& totals, double energy, double recovered, bool again) {
     return std::max(energy - totals.start_energy - totals.credit,
-                    energy - totals.recovered - recovered - totals.lowest);
+                    energy - totals.recovered - recovered - (again ? totals.lowest_before : totals.lowest));
 }
 
 void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
@@ -79,7 +89,7 @@ void EnergyWatch::begin(const SimulationTotals& totals, double t, double h) {
 
 void EnergyWatch::require_within(double energy, double h) {
     constexpr double helps = 0.7;
-    const double growth = EnergyGuard::growth(*totals_, energy, recovered_);
+    const double growth = EnergyGuard::growth(*totals_, energy, recovered_, again_);
     const bool shortest = h < 1.5 * h_ / static_cast<double>(most_substeps);
     if (growth <= allowed_ || growth - before_ > helps * last_taken_ || shortest) return;
     last_taken_ = growth - before_;

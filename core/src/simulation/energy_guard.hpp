@@ -31,22 +31,26 @@ public:
     /// Whether energy is known, and what is supplied.
     [[nodiscard]] static bool watches(const SimulationTotals& totals);
 
-    /// Whether these are known, and nothing takes any: what it falls by is the method's damping.
-    [[nodiscard]] bool conserved(const SimulationTotals& totals) const { return !dissipates_ && watches(totals); }
+    /// What the method took, J: beside what is supplied, what contacts take, and `damped`; or, where these are not
+    /// accounted for and nothing takes any, what the energy fell by. 0 where it is not known.
+    [[nodiscard]] double loss(const SimulationTotals& totals) const;
 
     /// Ends a sentence about a growth.
     [[nodiscard]] static const char* though(const SimulationTotals& totals);
 
-    /// G at an energy E − S after a step that recovered so much more than is in the totals, J.
-    [[nodiscard]] DELASSUS_API static double growth(const SimulationTotals& totals, double energy, double recovered);
+    /// G at an energy E − S after a step that recovered so much more than is in the totals, J. again: it counts
+    /// for the step before, too.
+    [[nodiscard]] DELASSUS_API static double growth(const SimulationTotals& totals, double energy, double recovered,
+                                                    bool again = false);
 
-    /// max(A, floor); longest_step: of the run, s.
+    /// max(A, floor), where it is not known what is supplied with the least that this can be; longest_step: of the
+    /// run, s.
     [[nodiscard]] double scale(const SimulationTotals& totals, double longest_step) const;
 
 private:
-    bool dissipates_;  // contacts, stops, friction or damping can take energy
-    double fall_;      // ½ ‖2 g‖²_M, of a step of 1 s
-    double digits_;    // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
+    bool has_contacts_, has_damping_;  // or stops, or dry friction
+    double fall_;                      // ½ ‖2 g‖²_M, of a step of 1 s
+    double digits_;                    // ‖1e-10 q‖²_M with the largest coordinate in each place, of a step of 1 s
 };
 
 // Below that a growth is an error all the same. Joints and contacts take energy or leave it, so that E never rises:
@@ -80,8 +84,11 @@ public:
 
     /// Before a step of size h from t; the totals stay there until its end.
     void begin(const SimulationTotals& totals, double t, double h);
-    /// Before it is taken, as one or in parts.
-    void begin_trial() { recovered_ = 0.0; }
+    /// Before it is taken, as one or in parts. again: with the step before.
+    void begin_trial(bool again) {
+        recovered_ = 0.0;
+        again_ = again;
+    }
     /// After each part: energy that contacts gave by pushing apart what penetrated, J.
     void note_recovered(double energy) { recovered_ += energy; }
     /// After the last, of size h: throws Gain if the step takes more than its share, and shorter parts may take less.
@@ -96,6 +103,7 @@ private:
     const SimulationTotals* totals_ = nullptr;
     double h_ = 0.0, before_ = 0.0, allowed_ = 0.0, recovered_ = 0.0;
     double last_taken_ = 0.0;  // by the trial before, of this step
+    bool again_ = false;
 };
 
 }  // namespace delassus

@@ -177,7 +177,8 @@ Simulation::Simulation(SceneSystem& system, const Registry& registry)
         overlaps_ = std::make_unique<OverlapWatch>(*system.system, system.accuracy, bodies_at(now_.state, next_bodies_),
                                                    system.step);
     measure(state(), record_);
-    now_.totals.start_energy = now_.totals.lowest = now_.totals.energy = record_.energy;
+    now_.totals.start_energy = now_.totals.energy = record_.energy;
+    now_.totals.lowest = now_.totals.lowest_before = record_.energy;
     now_.totals.start_kinetic = record_.kinetic;
     now_.totals.worst_drift = record_.drift;
 }
@@ -318,7 +319,9 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
         totals.credit = std::max(totals.credit, energy - totals.start_energy);
         totals.lowest = energy - totals.recovered;
     }
-    const double growth = EnergyGuard::growth(totals, energy, 0.0);
+    const double growth = EnergyGuard::growth(totals, energy, 0.0, taken.again);
+    if (taken.again) totals.lowest = totals.lowest_before;
+    totals.lowest_before = totals.lowest;
     totals.lowest = std::min(totals.lowest, energy - totals.recovered);
     const double scale = guard_->scale(totals, std::max(totals.largest_step, taken.h));
     totals.growth = std::max(totals.growth, growth);
@@ -473,50 +476,54 @@ std::vector<std::string> Simulation::warnings() const {
     /// Of the size of a mechanism or its speed: more than coordinates of few digits explain.
     constexpr double large_assembly = 1e-3;
     std::vector<std::string> sentences;
-    if (const auto& totals = now_.totals; totals.growth_share > system_->accuracy)
+    const SimulationTotals& totals = now_.totals;
+    if (totals.growth_share > system_->accuracy)
         sentences.push_back(fmt::format(
             "system \"{}\": the energy rose by up to {:.3g} J, {:.2g} % of what can have moved, {}: the steps are "
             "long for {} (accuracy: {:.3g})",
             system_->name, totals.growth, 100.0 * totals.growth_share, EnergyGuard::though(totals), method().integrator,
             system_->accuracy));
-    if (const auto& totals = now_.totals; guard_->conserved(totals)) {
-        const double fall = totals.start_energy + totals.supplied - totals.doubt - totals.energy;
-        const double share = fall / guard_->scale(totals, totals.largest_step);
+    const double scale = guard_->scale(totals, totals.largest_step), loss = guard_->loss(totals);
+    if (loss > visible_share * scale) {
         const bool in_trees = !joint_ && !system_->joints.empty() && system_->system->node_count() == 0;
-        if (share > visible_share)
-            sentences.push_back(
-                fmt::format("system \"{}\": the energy fell by {:.3g} J, {:.0f} % of what can have moved, though "
-                            "nothing takes any: {} damps in steps as long as these; take shorter ones or a method of "
-                            "higher order, {}",
-                            system_->name, fall, 100.0 * share, method().integrator,
-                            in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
-    } else if (totals.damped > visible_share * guard_->scale(totals, totals.largest_step)) {
+        const std::string of =
+            fmt::format("system \"{}\": the energy fell by {:.3g} J, {:.0f} % of what can have moved, ", system_->name,
+                        loss, 100.0 * loss / scale);
+        sentences.push_back(
+            system_->system->has_unilateral()
+                ? of + fmt::format("beyond what contacts and dry friction take: the steps are long for {}; take "
+                                   "shorter ones, or an \"accuracy\"",
+                                   method().integrator)
+                : of + fmt::format("though nothing takes any: {} damps in steps as long as these; take shorter ones "
+                                   "or a method of higher order, {}",
+                                   method().integrator,
+                                   in_trees ? "such as rk4 with \"coordinates: joint\"" : "such as generalized_alpha"));
+    } else if (totals.damped > visible_share * scale) {
         sentences.push_back(
             fmt::format("system \"{}\": {} took {:.3g} J, {:.0f} % of what can have moved, from vibrations that are "
                         "too fast for its steps; shorter ones follow them",
-                        system_->name, method().integrator, totals.damped,
-                        100.0 * totals.damped / guard_->scale(totals, totals.largest_step)));
+                        system_->name, method().integrator, totals.damped, 100.0 * totals.damped / scale));
     }
-    if (const auto& totals = now_.totals; totals.most_inverted > 0)
+    if (totals.most_inverted > 0)
         sentences.push_back(fmt::format(
             "{}: solid elements are turned inside out, up to {} at once, which no material can be: it is hit too hard "
             "for its stiffness, or needs smaller elements or shorter steps",
             totals.first_inverted, totals.most_inverted));
-    if (const auto& totals = now_.totals; totals.method_changes > 0)
+    if (totals.method_changes > 0)
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, totals.last_change));
-    if (const auto& totals = now_.totals; totals.failed_solves > 0)
+    if (totals.failed_solves > 0)
         sentences.push_back(
             fmt::format("system \"{}\": solver {} failed in {} solves, which auto repeated; the first time: {}",
                         system_->name, system_->solver.name, totals.failed_solves, totals.first_failure));
     if (overlaps_ && !overlaps_->at_start().empty())
         sentences.push_back(fmt::format("system \"{}\": {}", system_->name, overlaps_->at_start()));
     if (!beyond_stops_.empty()) sentences.push_back(fmt::format("system \"{}\": {}", system_->name, beyond_stops_));
-    if (const auto& totals = now_.totals; method().by_accuracy && totals.inexact_steps > 0)
+    if (method().by_accuracy && totals.inexact_steps > 0)
         sentences.push_back(fmt::format(
             "system \"{}\": {} of {} steps are less exact than accuracy: {:.3g} asks, however short their parts: what "
             "touches there comes and goes by rounding",
             system_->name, totals.inexact_steps, now_.step, system_->accuracy));
-    if (const auto& totals = now_.totals; totals.deep_steps > 0)
+    if (totals.deep_steps > 0)
         sentences.push_back(fmt::format(
             "system \"{}\": {} of {} steps leave bodies in one another by more than \"accuracy\" allows; the "
             "first: {}",

@@ -89,7 +89,7 @@ struct TotalColumn {
     const char* report = nullptr;  ///< JSON pointer to its place in a system's part of report.json; null: not there
 };
 
-inline constexpr std::array<TotalColumn, 48> total_columns = {{
+inline constexpr std::array<TotalColumn, 49> total_columns = {{
     {"rejected", "1", "trials of the step control that were thrown away", &SimulationTotals::rejected, "/rejected"},
     {"impacts", "1", "short steps for contacts that closed", &SimulationTotals::impacts, "/impacts"},
     {"smallest_step", "s", "of those taken, impacts apart", &SimulationTotals::smallest_step, "/smallest_step"},
@@ -100,6 +100,7 @@ inline constexpr std::array<TotalColumn, 48> total_columns = {{
      &SimulationTotals::start_overlap},
     {"credit", "J", "rise of the energy while the overlaps of the start shrank", &SimulationTotals::credit},
     {"lowest", "J", "least energy up to now but for what was recovered", &SimulationTotals::lowest},
+    {"lowest_before", "J", "the same before the last step", &SimulationTotals::lowest_before},
     {"growth", "J", "largest rise of the energy, above its start and that credit or above the lowest",
      &SimulationTotals::growth, "/energy/growth"},
     {"growth_share", "1", "the largest, of what energy there can have been to move", &SimulationTotals::growth_share,

@@ -16,8 +16,8 @@ public:
 
     /// The step, of size h, begins.
     virtual void begin(const State& state, double h) = 0;
-    /// It is tried in so many equal substeps.
-    virtual void begin_trial(std::int64_t substeps) = 0;
+    /// It is tried in so many equal substeps. again: with the step before.
+    virtual void begin_trial(std::int64_t substeps, bool again) = 0;
     /// After one of size h that led to `state`. last: it ends the step. Throws StepTooLong if it must not count.
     virtual void judge(const State& state, double h, const StepReport& report, bool last) = 0;
     /// The whole step, which led to `state`, failed so: whether it may do better if it is tried again as a whole.

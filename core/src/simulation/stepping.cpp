@@ -86,7 +86,7 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
     report.h = step.h;
     report.error = 0.0;
     report.rejected = 0;
-    report.impact = report.refined = false;
+    report.impact = report.refined = report.again = false;
     if (ahead_) {
         step_ahead(state, step.end, solver, report);
     } else if (control_) {
@@ -153,7 +153,7 @@ void Stepping::try_substeps(std::int64_t substeps, State& state, StepSolver& sol
     // Where rounding makes more of the linear model's error than this, nobody knows whether substeps are short enough.
     constexpr double most_rounding = 0.1;
     const double begin = state.t, part = report.h / static_cast<double>(substeps);
-    if (watch) watch->begin_trial(substeps);
+    if (watch) watch->begin_trial(substeps, false);
     report.step.clear();
     report.error = 0.0;
     bool whole = true;  // parts that are not cut are of one size to the last digit, as methods compare sizes
@@ -319,13 +319,14 @@ void Stepping::take_refined(double looser, State& state, double end, const StepE
     report.step.energy.add(counted, -1.0);
     if (!report.step.solved) throw StepFailure("solves of the substeps missed their tolerance");
     report.refined = true;
+    report.again = older_.whole;
     work_ -= work_of(report.step, solver.effort().iterations - before);
     if (state.t < end) throw StepFailure("the substeps take more work than there is");
     if (watch) judge(state, report, *watch);
 }
 
 void Stepping::judge(const State& state, const AdaptiveStepReport& report, StepWatch& watch) {
-    watch.begin_trial(1);
+    watch.begin_trial(1, report.again);
     watch.judge(state, report.h, report.step, true);
 }
 

@@ -18,9 +18,9 @@ void WatchedStep::begin(const State& state, double h) {
     if (watched_.overlaps) watched_.overlaps->begin(bodies_at(state), h, solver_.team());
 }
 
-void WatchedStep::begin_trial(std::int64_t substeps) {
+void WatchedStep::begin_trial(std::int64_t substeps, bool again) {
     if (closes_) solver_.solve_to(1.0 / static_cast<double>(substeps));
-    if (watched_.energy) watched_.energy->begin_trial();
+    if (watched_.energy) watched_.energy->begin_trial(again);
 }
 
 void WatchedStep::judge(const State& state, double h, const StepReport& report, bool last) {

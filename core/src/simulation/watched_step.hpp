@@ -34,7 +34,7 @@ public:
     ~WatchedStep() override;
 
     void begin(const State& state, double h) override;
-    void begin_trial(std::int64_t substeps) override;
+    void begin_trial(std::int64_t substeps, bool again) override;
     void judge(const State& state, double h, const StepReport& report, bool last) override;
     [[nodiscard]] bool mend(const StepTooLong& failure, const StepReport& report, const State& state) override;
     void begin_substeps(const StepTooLong& failure) override;
