@@ -68,6 +68,8 @@ public:
 
     [[nodiscard]] int order() const override { return 2; }
     [[nodiscard]] bool estimates_error() const override { return true; }
+    /// What is supplied in flight is not known.
+    [[nodiscard]] bool accounts() const override { return !system_.is_driven(); }
     void choose_steps(double tolerance) override {
         limit_ = std::isfinite(tolerance) ? tolerance : given_limit_;
         if (!control_) return;
