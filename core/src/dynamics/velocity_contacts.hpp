@@ -141,7 +141,7 @@ public:
         double turnover = 0.0;  ///< the same, absolute values of each row
         double doubt = 0.0;     ///< by how much of it `supplied` may be off
     };
-    /// Both, at the mean velocities of the step, n, or those of impacts within it. solution: as of work().
+    /// At the mean velocities of the step, n, or those of impacts within it. solution: as of work().
     [[nodiscard]] Account account(const Problem& problem, const Solution& solution, std::span<const double> mean);
     /// After append_to(), of contacts without restitution: none strikes at its time, and rows stay as they are in the
     /// middle of the step. Such contacts take energy only.
