@@ -251,7 +251,7 @@ class Trajectory:
     drift: np.ndarray  #: (K,), largest |C| of joints and motors, m or rad
     natural: np.ndarray  #: (K,), largest natural error of the solves of the step that ends there
     contacts: dict = field(repr=False)  #: a row for each contact of each state: Simulation.contacts() with 'state' (k)
-    status: str = "finished"  #: or 'unsolved' (a solve missed its tolerance), 'diverged', 'failed'
+    status: str = "finished"  #: or 'unsolved' (a solve missed its tolerance), 'failed'
     message: str = ""  #: what a person should know; '' where the run finished
     steps: int = 0  #: steps taken
     records: list = field(default_factory=list, repr=False)  #: K StepRecords
@@ -338,9 +338,7 @@ def simulate(scene: Union[Scene, DynamicalSystem, Simulation, Path, Mapping[str,
         status, message = "failed", str(failure)
     if not recorded:
         record()
-    if status == "finished" and not all(np.isfinite(frames[-1][k]).all() for k in (1, 2)):
-        status, message = "diverged", f"the state at t = {frames[-1][0]} s is not finite"
-    elif status == "finished" and not solved:
+    if status == "finished" and not solved:
         status, message = "unsolved", "; ".join(simulation.warnings()) or "a solve missed its tolerance"
     if status != "finished":
         warnings.warn(f"the simulation ended as {status}: {message}", RuntimeWarning, stacklevel=2)

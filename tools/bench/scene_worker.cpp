@@ -98,8 +98,6 @@ std::string status_of(RunStatus status) {
             return "finished";
         case RunStatus::Unsolved:
             return "unsolved";
-        case RunStatus::Diverged:
-            return "diverged";
         case RunStatus::Interrupted:
             return "cancelled";
         case RunStatus::TimeLimit:

@@ -33,6 +33,14 @@ inline double coupling(const SparseMatrix& D, const std::vector<double>& diagona
     return sum;
 }
 
+/// The diagonal entry of D diag(H)⁻¹ Dᵀ at a row. diagonal: of H.
+inline double mobility_of(const SparseMatrix& D, const std::vector<double>& diagonal, std::size_t row) {
+    double sum = 0.0;
+    for_each_entry(D, row, 1,
+                   [&](std::size_t, std::size_t column, double value) { sum += value * value / diagonal[column]; });
+    return sum;
+}
+
 /// The speed of a row at velocities v, n, with the rates that prescribed motions have at the state of the rows itself.
 inline double speed_now(const UnilateralRows& rows, std::size_t row, const double* v) {
     return rows.speed(row, v) - rows.rows()[row].rate + rows.rows()[row].rate_now;

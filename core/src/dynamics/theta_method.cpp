@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "dynamics/row_entries.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -480,14 +481,9 @@ void ThetaMethod::set_b_of_contacts(int iteration, const StepReport& report) {
 // Right-hand sides in √mass · speed: a by the diagonal of H, b by that of D diag(H)⁻¹ Dᵀ.
 void ThetaMethod::scale() {
     diagonal_of(problem_.H, diagonal_);
-    row_scale_.setZero(problem_.m());
-    const auto& D = problem_.D;
+    row_scale_.resize(problem_.m());
     for (std::int32_t j = 0; j < problem_.m(); ++j)
-        for (auto e = D.row_start[static_cast<std::size_t>(j)]; e < D.row_start[static_cast<std::size_t>(j) + 1]; ++e) {
-            const double value = D.value[static_cast<std::size_t>(e)];
-            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
-            row_scale_[j] += value * value / diagonal_[column];
-        }
+        row_scale_[j] = mobility_of(problem_.D, diagonal_, static_cast<std::size_t>(j));
 }
 
 /// Whether the right-hand sides differ from those of the last solve by a negligible share.

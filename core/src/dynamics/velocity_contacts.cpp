@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/row_entries.hpp"
 #include "problem/copy_cone.hpp"
 
 namespace delassus {
@@ -478,13 +479,8 @@ void VelocityContacts::drop_negligible(const Problem& problem, Solution& solutio
         Contact& contact = contacts_[k];
         if (!contact.along_normal) continue;
         const std::size_t first = first_row_ + contact.row;
-        double speed = 0.0, mobility = 0.0;
-        for (auto e = D.row_start[first]; e < D.row_start[first + 1]; ++e) {
-            const double value = D.value[static_cast<std::size_t>(e)];
-            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
-            speed += value * solution.x[column];
-            mobility += value * value / diagonal_[column];
-        }
+        const double speed = D.row_times(static_cast<std::int32_t>(first), solution.x.data());
+        const double mobility = mobility_of(D, diagonal_, first);
         const double opening = speed + problem.b[first] - std::max(contact.sliding, 0.0);
         double* impulse = solution.lambda.data() + first;
         contact.end_speed = speed + rows_.rows()[contact.row].rate;

@@ -36,7 +36,7 @@ double VelocityContacts::sliding_speed(std::size_t block) const {
 
 bool VelocityContacts::slides(const Problem& problem, std::size_t block, double speed) const {
     const std::size_t row = first_row_ + contacts_[block].row;
-    return std::abs(speed) > faint_impulse(problem, block) * coupling(problem.D, diagonal_, row, row);
+    return std::abs(speed) > faint_impulse(problem, block) * mobility_of(problem.D, diagonal_, row);
 }
 
 double VelocityContacts::faint_impulse(const Problem& problem, std::size_t block) const {
@@ -69,7 +69,7 @@ void VelocityContacts::let_slide_on(Problem& problem) const {
 
 void VelocityContacts::time_turns(Problem& problem, std::span<const double> sliding, double last_h) {
     const auto slides_back = [&](std::size_t row, double change, double both) {
-        return change > both * coupling(problem.D, diagonal_, first_row_ + row, first_row_ + row);
+        return change > both * mobility_of(problem.D, diagonal_, first_row_ + row);
     };
     axes_.turn(sliding, h_, theta_, in_begin_, in_middle_);
     for (std::size_t k = 0; k < contacts_.size(); ++k) {

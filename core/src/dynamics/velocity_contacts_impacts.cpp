@@ -364,7 +364,7 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
     constexpr double faint = 1e-2, least_part = 1e-6;
     const auto is_loaded = [&](std::size_t row) {
         constexpr double share = 1e-6;
-        const double own = coupling(problem.D, diagonal_, row, row);
+        const double own = mobility_of(problem.D, diagonal_, row);
         return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
             const std::size_t number = first_row_ + other.row;
             return other.along_normal && other.pushed && !other.impact && number != row &&

@@ -23,7 +23,7 @@ void VelocityContacts::find_passing(const Problem& problem, const Solution& solu
         for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double) {
             fastest[column] = std::max(fastest[column], change);
         });
-        contact.passes_on = change < mostly * coupling(D, diagonal_, row, row) * solution.lambda[row];
+        contact.passes_on = change < mostly * mobility_of(D, diagonal_, row) * solution.lambda[row];
         any = any || contact.passes_on;
     }
     if (!any) return;

@@ -58,7 +58,6 @@ std::string_view status_word(RunStatus status) {
         case RunStatus::Interrupted:
         case RunStatus::TimeLimit:
             return "interrupted";
-        case RunStatus::Diverged:
         case RunStatus::Failed:
         case RunStatus::Unsupported:
             return "failed";

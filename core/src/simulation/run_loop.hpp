@@ -16,7 +16,6 @@ namespace delassus {
 enum class RunStatus {
     Finished,     ///< every system reached its end, and every solve its tolerance
     Unsolved,     ///< every system reached its end, but a solve missed its tolerance
-    Diverged,     ///< every system reached its end, but a state is not finite
     Failed,       ///< a step failed
     Unsupported,  ///< a solver or a timestepper cannot take what a step needs
     Interrupted,
