@@ -140,7 +140,6 @@ TEST(PlainMotion, WhatTurnsPastAFloorDoesNotTouchIt) {
         }
 }
 
-// Walls that are large and far away change nothing about what is near: a heavy box rests on a light can.
 // A can stands on a slope up to tan α = radius / half its height, whichever way it is turned about its axis: its cap is
 // round, though it touches by some points of its rim.
 TEST(PlainMotion, ACanStandsOnASlopeUpToItsRim) {
@@ -197,6 +196,7 @@ TEST(PlainMotion, APlateRestsOnACanUpToItsRim) {
             }
 }
 
+// Walls that are large and far away change nothing about what is near: a heavy box rests on a light can.
 TEST(PlainMotion, AHeavyBoxRestsInARoom) {
     std::string room =
         "step: 0.002\nend: 1\nmaterials: {m: {friction: 0.5}}\nbodies:\n"

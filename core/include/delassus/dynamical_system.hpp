@@ -288,8 +288,7 @@ public:
     /// Default: false.
     [[nodiscard]] virtual bool is_driven() const { return false; }
     /// The power of loads and actuators, and of springs, dampers and beams at bodies with a given motion, that changes
-    /// energy(), W; NaN where it is not known. What rows with a given rate do is not in it: λ times that rate, taken
-    /// away. Default: 0.
+    /// energy(), W; NaN where it is not known. What rows with a given rate supply is not in it. Default: 0.
     [[nodiscard]] virtual double supplied_power(const State&) const { return 0.0; }
 };
 

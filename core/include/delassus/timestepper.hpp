@@ -124,7 +124,7 @@ public:
     [[nodiscard]] virtual EmbeddedError embedded_error() const { return {}; }
     /// Whether StepReport::error says what a step errs by, which costs no solve. Default: no.
     [[nodiscard]] virtual bool estimates_error() const { return false; }
-    /// Whether StepReport::supplied and work say what changed the energy. Default: no.
+    /// Whether StepReport::energy says what the step was supplied with, and what contacts took. Default: no.
     [[nodiscard]] virtual bool accounts() const { return false; }
     /// The tolerance, as StepControl::absolute, by which steps of a fixed size are to be taken in parts, or several at
     /// once where the method has an extension. Infinity by default: every step is one.

@@ -212,6 +212,7 @@ private:
         bool rubs_on = false;               ///< its friction goes on through the impact
         std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
 
+        [[nodiscard]] double known_impulse(std::size_t i) const { return i < known.size() ? known[i] : 0.0; }
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
         [[nodiscard]] bool forced() const { return approach <= 0.25 * change; }

@@ -14,7 +14,7 @@ double VelocityContacts::work_of_block(std::size_t block, const Problem& problem
     double sum = 0.0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(rows_.blocks()[block].cone.rows); ++i) {
         const std::size_t row = contact.row + i;
-        const double known = i < contact.known.size() ? contact.known[i] : 0.0;
+        const double known = contact.known_impulse(i);
         const double rest = solution.lambda[first_row_ + row], impulse = known + rest;
         if (known == 0.0 && rest == 0.0) continue;
         const auto row_of_problem = static_cast<std::int32_t>(first_row_ + row);
@@ -58,10 +58,15 @@ VelocityContacts::Account VelocityContacts::account(const Problem& problem, cons
                                                     std::span<const double> mean) {
     Account account;
     if (contacts_.empty()) return account;
-    axes_.turn(solution.x, h_, theta_, in_begin_, in_middle_);
+    const bool driven = system_.is_driven();
+    if (driven) axes_.turn(solution.x, h_, theta_, in_begin_, in_middle_);
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         const double work = work_of_block(k, problem, solution, mean);
+        if (!driven) {
+            account.work += work;
+            continue;
+        }
         if (contact.servo) {
             account.supplied += work;
             account.turnover += std::abs(work);
@@ -71,8 +76,7 @@ VelocityContacts::Account VelocityContacts::account(const Problem& problem, cons
         double of_rates = 0.0, of_slide = 0.0, doubt = 0.0;
         for (std::size_t i = 0; i < static_cast<std::size_t>(rows_.blocks()[k].cone.rows); ++i) {
             const std::size_t row = contact.row + i, before = contact.before + i;
-            const double impulse =
-                solution.lambda[first_row_ + row] + (i < contact.known.size() ? contact.known[i] : 0.0);
+            const double impulse = solution.lambda[first_row_ + row] + contact.known_impulse(i);
             const double by_rate = impulse * mean_rate(contact, i);
             of_rates += by_rate;
             account.turnover += std::abs(by_rate);

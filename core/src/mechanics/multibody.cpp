@@ -405,6 +405,7 @@ void MultibodySystem::finish() {
     self.place_of_row.assign(static_cast<std::size_t>(rows), 0);
     self.number_rows();
     self.make_metric();
+    self.driven = self.find_driven();
     self.finished = true;
     self.find_bodies_alone(*this);
     self.make_detector();

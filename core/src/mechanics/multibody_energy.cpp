@@ -110,13 +110,16 @@ double MultibodySystem::energy(const State& state) const {
 }
 
 bool MultibodySystem::is_driven() const {
-    const auto& self = *implementation_;
+    return implementation_->driven;
+}
+
+bool MultibodySystem::Implementation::find_driven() const {
     const auto is_motor = [](const mechanics::Joint& joint) {
         return std::ranges::any_of(joint.rows, [](const mechanics::Row& row) { return row.drive != nullptr; });
     };
-    return !self.loads.empty() || !self.prescribed.empty() || !self.bounded_motors.empty() ||
-           !self.bounded_actuators.empty() || std::ranges::any_of(self.joints, is_motor) ||
-           std::ranges::any_of(self.springs, [](const auto& spring) { return !spring.potential || spring.row.drive; });
+    return !loads.empty() || !prescribed.empty() || !bounded_motors.empty() || !bounded_actuators.empty() ||
+           std::ranges::any_of(joints, is_motor) ||
+           std::ranges::any_of(springs, [](const auto& spring) { return !spring.potential || spring.row.drive; });
 }
 
 std::int64_t MultibodySystem::inverted_solids(const State& state) const {

@@ -74,6 +74,7 @@ struct MultibodySystem::Implementation {
     std::optional<std::vector<mechanics::Linkage>> beside_held;  // likewise, where hold_rows() has been called
     std::vector<mechanics::MovingBody> moving;
     std::vector<BodyIndex> prescribed;  // bodies that move as they are told
+    bool driven = false;                // MultibodySystem::is_driven()
     std::vector<BodyIndex> uneven;      // of these, those whose turning moves their surface
     bool gyroscopic = false;            // a moving body whose moments differ
     double load_factor = 1.0;           // of weight and loads
@@ -165,6 +166,7 @@ struct MultibodySystem::Implementation {
         for (const auto& beam : beams) visit(beam, mechanics::Beam::Ends{at[beam.bodies()[0]], at[beam.bodies()[1]]});
     }
 
+    [[nodiscard]] bool find_driven() const;
     /// result (n) += factor · the forces of loads at this time; after place().
     void add_loads(double t, double factor, double* result) const;
 

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -25,6 +27,9 @@ constexpr double work_of_a_step = 300.0, most_saved_work = 3e4, iterations_of_a_
 // Nothing is begun that cannot be ended: as a rule a step that errs by e times too much takes √e substeps of three
 // solves, twice as many with the trials that are thrown away, and to locate an impact takes so many solves.
 constexpr double solves_of_a_substep = 6.0, solves_of_an_impact = 120.0;
+
+/// StepEnergy, as a checkpoint keeps it.
+using EnergyNumbers = std::array<double, sizeof(StepEnergy) / sizeof(double)>;
 
 /// A method whose steps follow from a tolerance until its end: AdaptiveStepping says from which.
 class ChosenSteps {
@@ -392,9 +397,8 @@ SteppingMemory Stepping::save() const {
         memory.control = {work_};
         if (last_.whole) {
             memory.control.push_back(last_.state.t);
-            for (const double energy : {last_.energy.recovered, last_.energy.damped, last_.energy.supplied,
-                                        last_.energy.turnover, last_.energy.doubt, last_.energy.work})
-                memory.control.push_back(energy);
+            const auto energy = std::bit_cast<EnergyNumbers>(last_.energy);
+            memory.control.insert(memory.control.end(), energy.begin(), energy.end());
             for (const auto* values : {&last_.state.q, &last_.state.v, &last_.method})
                 memory.control.insert(memory.control.end(), values->begin(), values->end());
         }
@@ -408,13 +412,15 @@ void Stepping::load(const SteppingMemory& memory, const State& state) {
     if (control_) control_->load(memory.control);
     if (settings_.refines) {
         const auto& control = memory.control;
-        const std::size_t of_state = 8 + state.q.size() + state.v.size();
+        const std::size_t of_state = 2 + EnergyNumbers().size() + state.q.size() + state.v.size();
         if (control.size() != 1 && control.size() < of_state)
             throw InputError("the memory of divided steps has not the size of the system");
         work_ = control.front();
         last_ = {};
         if (control.size() > 1) {
-            auto next = control.begin() + 8;
+            auto next = control.begin() + 2;
+            EnergyNumbers energy{};
+            for (double& number : energy) number = *next++;
             const auto take = [&](std::vector<double>& values, std::size_t count) {
                 values.assign(next, next + static_cast<std::ptrdiff_t>(count));
                 next += static_cast<std::ptrdiff_t>(count);
@@ -422,7 +428,7 @@ void Stepping::load(const SteppingMemory& memory, const State& state) {
             last_ = {.state = {control[1], {}, {}},
                      .method = {},
                      .whole = true,
-                     .energy = {control[2], control[3], control[4], control[5], control[6], control[7]}};
+                     .energy = std::bit_cast<StepEnergy>(energy)};
             take(last_.state.q, state.q.size());
             take(last_.state.v, state.v.size());
             take(last_.method, control.size() - of_state);
