@@ -66,6 +66,26 @@ TEST(EnergyAccount, ARiderOnATurntableTakesNoneWhileItStays) {
     EXPECT_TRUE(run.simulation.warnings().empty());
 }
 
+TEST(EnergyAccount, ABallThatRollsOnATurntableLosesNothing) {
+    // Its centre goes round in a circle at 2/7 of the table's rate, and has the speed of the start again after each
+    // round: a contact passes along the table, whose speed there changes by more than the table turns.
+    for (const double h : {0.007, 0.03}) {
+        Running run = finished(fmt::format(
+            "step: {}\nend: 4.2\nmaterials: {{m: {{friction: 1.4}}}}\nbodies:\n"
+            "  - {{name: table, motion: {{rotation: {{angle: {{linear: {{rate: 1.7}}}}}}}}, position: [0, 0, -0.05],\n"
+            "     shapes: [{{cylinder: {{radius: 4, length: 0.1}}, material: m}}]}}\n"
+            "  - {{name: b, mass: 0.7, position: [0.6, 0.2, 0.11], velocity: [0.3, -0.25, 0],\n"
+            "     angular_velocity: [11.5454545454545454, 5.8181818181818182, 0.9],\n"
+            "     shapes: [{{sphere: {{radius: 0.11}}, material: m}}]}}\n",
+            h));
+        const SimulationTotals& totals = run.simulation.totals();
+        EXPECT_NEAR(totals.supplied, change_of_energy(run), 1e-3) << h;
+        EXPECT_NEAR(totals.work, 0.0, 1e-3) << h;
+        EXPECT_LT(totals.growth_share, 1e-3) << h;
+        EXPECT_TRUE(run.simulation.warnings().empty()) << h;
+    }
+}
+
 TEST(EnergyAccount, BouncesTakeTheirShare) {
     // From 1 m with e = ½: what is left after every bounce is a quarter.
     Running run = finished(

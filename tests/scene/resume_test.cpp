@@ -118,7 +118,7 @@ TEST(Checkpoint, DamagedFilesAreRefused) {
               "the checkpoint cannot be used: it was written by another version of Delassus");
     EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 8}"),
               "the checkpoint cannot be used: it was written by another version of Delassus");
-    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 19, \"scene\": \"\", \"systems\": []}"),
+    EXPECT_EQ(told("{\"format\": \"delassus-checkpoint\", \"version\": 20, \"scene\": \"\", \"systems\": []}"),
               "the checkpoint cannot be used: it is damaged: its checksum is not that of its content");
 }
 

@@ -258,6 +258,8 @@ public:
     [[nodiscard]] virtual double next_jump(double t) const;
     /// The longest step from t on, s, that resolves what time prescribes; infinity: any does.
     [[nodiscard]] virtual double longest_step(double t) const;
+    /// Whether forces, constraints or gaps at a state ever depend on its time. Default: true, as nobody knows.
+    [[nodiscard]] virtual bool depends_on_time() const { return true; }
 
     // ---- Contacts, stops, bounded motors; nothing by default ----
 

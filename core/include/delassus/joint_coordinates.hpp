@@ -115,6 +115,7 @@ public:
     [[nodiscard]] bool has_unilateral() const override;
     [[nodiscard]] double next_jump(double t) const override;
     [[nodiscard]] double longest_step(double t) const override;
+    [[nodiscard]] bool depends_on_time() const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
     [[nodiscard]] std::optional<Vector3> prescribed_velocity(const ContactPoint& contact, double begin,
                                                              double t) const override;

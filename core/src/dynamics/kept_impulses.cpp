@@ -27,10 +27,11 @@ KeptImpulses::Start KeptImpulses::start(const UnilateralRows::Block& block, cons
         return {};
     }
     const double* impulse = impulses_.data() + entries_[next_].first;
-    if (contact && rows == 3) {
+    const Vector3& normal = entries_[next_].normal;
+    if (contact && rows == 3 && contact->normal != normal) {
         Eigen::Map<Eigen::Vector3d>(lambda.data()) =
             contact_frame(Eigen::Vector3d(contact->normal.data())).transpose() *
-            Eigen::Map<const Eigen::Vector3d>(impulse);
+            (contact_frame(Eigen::Vector3d(normal.data())) * Eigen::Map<const Eigen::Vector3d>(impulse));
     } else {
         std::copy_n(impulse, rows, lambda.data());
     }
@@ -45,11 +46,9 @@ void KeptImpulses::keep(std::span<const UnilateralRows::Block> blocks, std::span
     std::int32_t row = 0;
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         const std::int32_t rows = blocks[k].cone.rows;
-        if (k >= first_contact && rows == 3) {
-            Eigen::Map<Eigen::Vector3d> impulse(impulses_.data() + row);
-            impulse = (contact_frame(Eigen::Vector3d(contacts[k - first_contact].normal.data())) * impulse).eval();
-        }
-        entries_.push_back({blocks[k].key, row, rows, !impulsive.empty() && impulsive[k] != 0});
+        const bool turns = k >= first_contact && rows == 3;
+        entries_.push_back({blocks[k].key, row, rows, !impulsive.empty() && impulsive[k] != 0,
+                            turns ? contacts[k - first_contact].normal : Vector3{}});
         row += rows;
     }
     sort();
@@ -71,9 +70,10 @@ void KeptImpulses::drop_zeros() {
 }
 
 void KeptImpulses::append_to(std::vector<double>& memory) const {
-    for (const auto& [key, first, rows, impulsive] : entries_) {
-        memory.insert(memory.end(), {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU),
-                                     impulsive ? 1.0 : 0.0, static_cast<double>(rows)});
+    for (const auto& [key, first, rows, impulsive, normal] : entries_) {
+        memory.insert(memory.end(),
+                      {static_cast<double>(key >> 32U), static_cast<double>(key & 0xffffffffU), impulsive ? 1.0 : 0.0,
+                       normal[0], normal[1], normal[2], static_cast<double>(rows)});
         memory.insert(memory.end(), impulses_.begin() + first, impulses_.begin() + first + rows);
     }
 }
@@ -81,14 +81,17 @@ void KeptImpulses::append_to(std::vector<double>& memory) const {
 void KeptImpulses::load(std::span<const double> memory) {
     clear();
     while (!memory.empty()) {
-        constexpr std::size_t head = 4;
-        const auto rows = memory.size() < head ? -1.0 : memory[3];
+        constexpr std::size_t head = 7;
+        const auto rows = memory.size() < head ? -1.0 : memory[head - 1];
         if (!(rows >= 0.0) || static_cast<double>(memory.size() - head) < rows)
             throw InputError("the impulses kept from step to step end within a block");
         const auto key = (static_cast<std::uint64_t>(memory[0]) << 32U) | static_cast<std::uint64_t>(memory[1]);
         const auto count = static_cast<std::size_t>(rows);
-        entries_.push_back(
-            {key, static_cast<std::int32_t>(impulses_.size()), static_cast<std::int32_t>(count), memory[2] != 0.0});
+        entries_.push_back({key,
+                            static_cast<std::int32_t>(impulses_.size()),
+                            static_cast<std::int32_t>(count),
+                            memory[2] != 0.0,
+                            {memory[3], memory[4], memory[5]}});
         memory = memory.subspan(head);
         impulses_.insert(impulses_.end(), memory.begin(), memory.begin() + static_cast<std::ptrdiff_t>(count));
         memory = memory.subspan(count);

@@ -12,8 +12,9 @@
 namespace delassus {
 
 /// What acted in each unilateral block of the last step, found again by the block's key: the start of the next solve.
-/// The impulse of a contact is kept as a vector in space, since the tangents of its rows may turn. An impulsive block
-/// got part of its impulse from impacts or corrections of gaps: over the size of the step it is no force.
+/// The impulse of a contact is a vector in space, as the tangents of its rows may turn; where they have not, it is the
+/// same to the last digit. An impulsive block got part of its impulse from impacts or corrections of gaps: over the
+/// size of the step it is no force.
 class DELASSUS_API KeptImpulses {
 public:
     void clear();
@@ -35,7 +36,7 @@ public:
               std::span<const double> lambda, std::span<const char> impulsive = {});
 
     /// For checkpoints: of each block its key in two halves, which a double holds exactly, 1 if it is impulsive, its
-    /// number of rows and its impulses.
+    /// normal, its number of rows and its impulses.
     void append_to(std::vector<double>& memory) const;
     /// Forgets the blocks without an impulse: a start without one is the same as one that is not found.
     void drop_zeros();
@@ -47,6 +48,7 @@ private:
         std::uint64_t key;
         std::int32_t first, rows;  ///< in impulses_
         bool impulsive;
+        Vector3 normal;  ///< of a contact with three rows; else 0
     };
     void sort();
 

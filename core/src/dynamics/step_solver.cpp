@@ -394,6 +394,10 @@ bool StepSolver::interrupted() const {
 void StepSolver::let_rest(RestingParts* parts) {
     implementation_->resting = parts;
 }
+bool StepSolver::may_skip_solves() const {
+    const Implementation& self = *implementation_;
+    return self.leaves_out && !self.look && !self.resting && !self.shared;
+}
 void StepSolver::share(SharedSteps* steps) {
     implementation_->shared = steps;
 }

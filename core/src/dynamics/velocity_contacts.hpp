@@ -228,6 +228,9 @@ private:
     [[nodiscard]] double work_of_block(std::size_t block, const Problem& problem, const Solution& solution,
                                        std::span<const double> mean) const;
     [[nodiscard]] double mean_rate(const Contact& contact, std::size_t i) const;
+    /// What slides there at both ends, where v⁺ is in the axes of the middle.
+    [[nodiscard]] std::array<double, 2> speeds_at_ends(const Problem& problem, std::size_t row,
+                                                       std::size_t before) const;
     [[nodiscard]] double restitution_of(std::size_t block) const {
         return restitution_ * rows_.blocks()[block].restitution;
     }

@@ -50,6 +50,17 @@ double VelocityContacts::work(const Problem& problem, const Solution& solution, 
     return sum;
 }
 
+// By the rates of the beginning and of q̄, at (1 − θ) h: means over the step are those of a point of the other body, and
+// what rolls passes along it. Where q̄ is the beginning, the mean says how they change.
+std::array<double, 2> VelocityContacts::speeds_at_ends(const Problem& problem, std::size_t row,
+                                                       std::size_t before) const {
+    const auto& [gap, mean, rate] = before_.rows()[before];
+    const double change = theta_ < 1.0 ? (rows_.rows()[row].rate_now - rate) / (1.0 - theta_) : 2.0 * (mean - rate);
+    const auto of_problem = static_cast<std::int32_t>(first_row_ + row);
+    return {before_.speed(before, begin_speeds_) - mean + rate,
+            problem.D.row_times(of_problem, in_middle_.data()) + rate + change};
+}
+
 // What touches a body with a given motion and goes on has u_n = 0, and slides at u_t = (u⁻ + u⁺)/2 in the mean. P·u is
 // what it takes, and the rest of P·D v̄ is supplied. The speeds of both ends are extrapolated; what u⁺ differs by from
 // D v⁺ + b, the speed of the law, is what nobody knows of u. At an instant P·r is supplied, and nobody knows by how
@@ -84,10 +95,10 @@ VelocityContacts::Account VelocityContacts::account(const Problem& problem, cons
                 if (contact.was_there)
                     doubt += std::abs(impulse * (rows_.rows()[row].rate_now - before_.rows()[before].rate_now));
             } else if (!contact.along_normal || i > 0) {
-                const double end = speed_at_end(problem, row, before, in_middle_.data());
+                const auto [begin, end] = speeds_at_ends(problem, row, before);
                 const auto of_problem = static_cast<std::int32_t>(first_row_ + row);
                 const double by_law = problem.D.row_times(of_problem, solution.x.data()) + problem.b[first_row_ + row];
-                of_slide += 0.5 * impulse * (speed_at_begin(row, before) + end);
+                of_slide += 0.5 * impulse * (begin + end);
                 doubt += std::abs(impulse * (end - by_law));
             }
         }

@@ -699,6 +699,9 @@ double JointCoordinates::next_jump(double t) const {
 double JointCoordinates::longest_step(double t) const {
     return implementation_->bodies.longest_step(t);
 }
+bool JointCoordinates::depends_on_time() const {
+    return implementation_->bodies.depends_on_time();
+}
 
 void JointCoordinates::collect_unilateral(const State& state, double h, UnilateralRows& rows) {
     auto& self = *implementation_;

@@ -53,6 +53,7 @@ void MotionCorners::Times::add(std::vector<double> times, double period) {
 void MotionCorners::add(const Motion& motion) {
     if (!motion.value) return;
     if (!motion.foreseeable) unknown_ = true;
+    if (!motion.is_constant) varies_ = true;
     if (motion.oscillation_period > 0.0)
         shortest_oscillation_ = std::min(shortest_oscillation_, motion.oscillation_period);
     all_.add(motion.corners, motion.period);

@@ -25,6 +25,8 @@ public:
     [[nodiscard]] double shortest_oscillation() const { return shortest_oscillation_; }
     /// Whether there is a motion of which nothing is known.
     [[nodiscard]] bool unknown() const { return unknown_; }
+    /// Whether something changes with time.
+    [[nodiscard]] bool varies() const { return varies_; }
 
 private:
     struct Repeated {
@@ -40,7 +42,7 @@ private:
     };
     Times all_, jumps_;
     double shortest_oscillation_ = std::numeric_limits<double>::infinity();
-    bool unknown_ = false;
+    bool unknown_ = false, varies_ = false;
 };
 
 }  // namespace delassus::mechanics

@@ -26,8 +26,10 @@ Motion smooth(std::function<double(double)> value, std::function<double(double)>
 }  // namespace
 
 Motion Motion::constant(double value) {
-    return smooth([=](double) { return value; }, [](double) { return 0.0; }, [](double) { return 0.0; },
-                  [=](double t) { return value * t; });
+    Motion motion = smooth([=](double) { return value; }, [](double) { return 0.0; }, [](double) { return 0.0; },
+                           [=](double t) { return value * t; });
+    motion.is_constant = true;
+    return motion;
 }
 
 Motion Motion::linear(double start, double slope) {

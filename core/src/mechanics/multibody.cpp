@@ -565,6 +565,9 @@ double MultibodySystem::longest_step(double t) const {
             longest, largest_turn / std::abs(self.bodies[static_cast<std::size_t>(index)].prescribed->turning_rate(t)));
     return longest;
 }
+bool MultibodySystem::depends_on_time() const {
+    return implementation_->motion_corners.varies();
+}
 bool MultibodySystem::foreseeable() const {
     return !implementation_->motion_corners.unknown();
 }

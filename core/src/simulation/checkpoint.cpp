@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view format = "delassus-checkpoint";
-constexpr int version = 19;
+constexpr int version = 20;
 constexpr std::size_t digits = 16;
 
 /// How a checkpoint of this text ends.

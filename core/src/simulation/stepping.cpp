@@ -47,7 +47,11 @@ private:
 
 Stepping::Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timestepper, SteppingSettings settings,
                    SharedRun* shared)
-    : system_(system), settings_(std::move(settings)), shared_(shared), timestepper_(std::move(timestepper)) {
+    : system_(system),
+      settings_(std::move(settings)),
+      shared_(shared),
+      timestepper_(std::move(timestepper)),
+      unchanged_(system) {
     if (settings_.restitutes) cuts_ = std::make_unique<ImpactCuts>(system);
     if (shared) return;
     if (settings_.chosen) {
@@ -100,11 +104,17 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
         step_fixed(state, solver, report, watch);
         last_.whole = report.substeps == 1 && !report.refined;
         last_.energy = report.step.energy;
+        if (last_.whole && solver.may_skip_solves()) {
+            unchanged_.note(last_.state, last_.method, state, step.h, *timestepper_, report.step);
+        } else {
+            unchanged_.forget();
+        }
     }
     state.t = step.end;
 }
 
 void Stepping::undo() {
+    unchanged_.forget();
     if (!reads_) timestepper_->load(last_.method);
     last_ = std::exchange(older_, std::exchange(oldest_, {}));
     if (reads_) return;
@@ -122,6 +132,10 @@ void Stepping::go_back(State& state) {
 
 void Stepping::take(State& state, double h, StepSolver& solver, StepReport& report) {
     solver.forget_misses();
+    if (unchanged_.repeat(state, h, report)) {
+        if (solver.interrupted()) throw StepInterrupted("the step was interrupted");
+        return;
+    }
     if (shared_) {
         shared_->step(state, h, *timestepper_, solver, report);
     } else if (cuts_) {
@@ -383,6 +397,7 @@ void Stepping::show_ahead(State& state, double end, StepSolver& solver, Adaptive
 void Stepping::begin_anew(const State& state) {
     if (ahead_) ahead_->begin(state);
     timestepper_->forces_jumped();
+    unchanged_.forget();
     last_.whole = false;
 }
 
@@ -409,6 +424,7 @@ SteppingMemory Stepping::save() const {
 
 void Stepping::load(const SteppingMemory& memory, const State& state) {
     timestepper_->load(memory.method);
+    unchanged_.forget();
     if (control_) control_->load(memory.control);
     if (settings_.refines) {
         const auto& control = memory.control;

@@ -18,6 +18,7 @@
 #include "simulation/fixed_step.hpp"
 #include "simulation/look_ahead.hpp"
 #include "simulation/step_watch.hpp"
+#include "simulation/unchanged_step.hpp"
 
 namespace delassus {
 
@@ -39,6 +40,7 @@ struct SteppingSettings {
 //
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
+//     as the last one                 UnchangedStep, where that changed nothing
 //     cut by what time prescribes     where it jumps, or oscillates within the step
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
 //     again, by their error           where it errs by more than the accuracy, and that costs little
@@ -120,7 +122,8 @@ private:
     SteppingSettings settings_;
     SharedRun* shared_;
     std::unique_ptr<Timestepper> timestepper_;
-    std::unique_ptr<ImpactCuts> cuts_;           // or empty
+    std::unique_ptr<ImpactCuts> cuts_;  // or empty
+    UnchangedStep unchanged_;
     std::unique_ptr<AdaptiveStepping> control_;  // of chosen steps, or of the substeps of fixed ones; or empty
     double work_ = 0.0;                          // that may be spent now on fixed steps that err by too much
     std::unique_ptr<LookAhead> ahead_;           // empty where no step is longer than those shown
