@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string_view>
+#include <variant>
 
 #include "delassus/step_solver.hpp"
+#include "simulation/step_columns.hpp"
 #include "simulation/stepping.hpp"
 #include "support/scenes.hpp"
 
@@ -34,7 +37,6 @@ TEST(UnchangedSteps, RestTakesNoSolves) {
     run.finish();
     EXPECT_GT(solves, 0);
     EXPECT_EQ(run.simulation.totals().plugin_solves, solves);
-    EXPECT_EQ(run.simulation.record().newton_iterations, 0);
     EXPECT_EQ(run.simulation.state().q, rest.q);
     EXPECT_EQ(run.simulation.record().contacts, 8);
     EXPECT_EQ(run.simulation.contacts().size(), 8U);
@@ -50,14 +52,16 @@ TEST(UnchangedSteps, AreTheStepsThatWouldBeTaken) {
             again.simulation.step();
             ASSERT_EQ(again.simulation.state().q, whole.simulation.state().q) << i;
             ASSERT_EQ(again.simulation.state().v, whole.simulation.state().v) << i;
+            for (const StepColumn& column : step_columns)
+                std::visit(
+                    [&](auto member) {
+                        if (std::string_view(column.name) == "seconds") return;
+                        EXPECT_EQ(again.simulation.record().*member, whole.simulation.record().*member) << column.name;
+                    },
+                    column.value);
         }
         EXPECT_EQ(again.simulation.save().stepping.method, whole.simulation.save().stepping.method);
-        EXPECT_EQ(whole.simulation.record().newton_iterations, 0);
-        // What both know of themselves differs in nothing but the solves.
-        EXPECT_EQ(again.simulation.totals().energy, whole.simulation.totals().energy);
-        EXPECT_EQ(again.simulation.record().contacts, whole.simulation.record().contacts);
-        EXPECT_EQ(again.simulation.record().penetration, whole.simulation.record().penetration);
-        EXPECT_GT(again.simulation.record().newton_iterations, 0);
+        EXPECT_GT(again.simulation.totals().plugin_solves, whole.simulation.totals().plugin_solves + 100);
     }
 }
 
@@ -71,7 +75,6 @@ TEST(UnchangedSteps, EndWhereALoadSetsIn) {
 TEST(UnchangedSteps, EndWhereGravityChanges) {
     Running run = read(stack());
     while (run.simulation.state().t < 2.0) run.simulation.step();
-    EXPECT_EQ(run.simulation.record().newton_iterations, 0);
     run.scene.systems[0].system->set_gravity({0.0, 0.0, 1.0});
     run.finish();
     EXPECT_NEAR(run.pose("b").position[2], 0.3 + 0.5, 0.01);
@@ -93,10 +96,12 @@ TEST(UnchangedSteps, ABrakeHoldsAndAMotorTurns) {
                              "joints: [{{name: j, kind: revolute, second: a, axis: [0, 1, 0], point: [0, 0, 0]}}]\n"
                              "motors: [{{name: m, joint: j, speed: true, motion: {}}}]\n",
                              speed));
+        while (run.simulation.state().t < 0.5) run.simulation.step();
+        const std::int64_t solves = run.simulation.totals().plugin_solves;
         run.finish();
         EXPECT_NEAR(run.velocities("a")[1][1], speed, 1e-9);
         EXPECT_NEAR(run.pose("a").position[0], 0.3 * std::cos(speed), 1e-3);
-        EXPECT_EQ(run.simulation.record().newton_iterations == 0, speed == 0.0);
+        EXPECT_EQ(run.simulation.totals().plugin_solves == solves, speed == 0.0);
     }
 }
 

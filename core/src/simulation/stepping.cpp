@@ -105,7 +105,7 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
         last_.whole = report.substeps == 1 && !report.refined;
         last_.energy = report.step.energy;
         if (last_.whole && solver.may_skip_solves()) {
-            unchanged_.note(last_.state, last_.method, state, step.h, *timestepper_, report.step);
+            unchanged_.note(last_.state, last_.method, state, step.h, *timestepper_, report.step, solver.effort());
         } else {
             unchanged_.forget();
         }
@@ -461,7 +461,8 @@ double Stepping::allowed() const {
     return by_accuracy ? control->absolute / control->unit : std::numeric_limits<double>::quiet_NaN();
 }
 
-void Stepping::describe(const AdaptiveStepReport& taken, const SolverEffort& effort, StepRecord& record) const {
+void Stepping::describe(const AdaptiveStepReport& taken, const SolverEffort& spent, StepRecord& record) const {
+    const SolverEffort& effort = unchanged_.repeated() ? *unchanged_.repeated() : spent;
     record.h = taken.h;
     record.substeps = taken.substeps;
     record.rejected = taken.rejected;

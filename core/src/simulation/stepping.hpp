@@ -78,7 +78,7 @@ public:
     [[nodiscard]] LookAhead* ahead() { return ahead_.get(); }
     void look_ahead(std::unique_ptr<LookAhead> ahead) { ahead_ = std::move(ahead); }
     /// record ← what is known of a step that advance() took, but for what states and clocks say.
-    void describe(const AdaptiveStepReport& taken, const SolverEffort& effort, StepRecord& record) const;
+    void describe(const AdaptiveStepReport& taken, const SolverEffort& spent, StepRecord& record) const;
     /// Whether fixed steps are divided by their error.
     [[nodiscard]] bool has_limit() const { return control_ && !settings_.chosen; }
 
