@@ -12,7 +12,7 @@
 #include "dynamics/linear_problem.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/step_memory.hpp"
-#include "dynamics/untouched_spins.hpp"
+#include "dynamics/turning_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "dynamics/velocity_error.hpp"
 #include "problem/copy_cone.hpp"
@@ -34,7 +34,7 @@ namespace {
 //
 // The gyroscopic torque is not taken from f: a body that spins by itself is turned by the midpoint rule, which keeps
 // its energy and its momentum (DynamicalSystem::free_spins), and its impulse J (ω⁺ − ω) stands on the right-hand side.
-// A body that nothing touches in the step also turns by the rule's angle, θ + h (v⁺ − ω⁺) in place of h v⁺.
+// A body that no row of the step acts on also turns by the rule's angle, θ + h (v⁺ − ω⁺) in place of h v⁺.
 //
 // Constraints at the end of the step, again to first order, C(q⁺, t⁺) ≈ C(q, t⁺) + h C_q v⁺ = 0, divided by h, are rows
 // with b = C(q, t⁺)/h. A gap Φ ≥ 0 likewise:
@@ -138,7 +138,7 @@ private:
                                   .method_error = note_velocity_error(state, h),
                                   .error_of_solves = velocity_error_.of_solver(),
                                   .bodies = bodies_};
-        untouched_.find(spins_, problem_.D, n_);
+        turning_spins_.find(spins_, problem_.D, problem_.D.rows);
         report.unilateral_blocks = static_cast<std::int32_t>(rows_.blocks().size());
         solution_.x = state.v;
         double scale = 0.0;
@@ -147,7 +147,7 @@ private:
         note_left(solve(state, h, solver, request, report));
         drop_negligible(scale);
         for (std::int32_t i = 0; i < n_; ++i) delta_[i] = h * solution_.x[i];
-        for (const FreeSpin* spin : untouched_)
+        for (const FreeSpin* spin : turning_spins_)
             for (std::int32_t i = 0; i < 3; ++i) delta_[spin->column + i] += spin->turn[i] - h * spin->speed[i];
         system_.increment(state.q.data(), delta_.data(), end_.q.data());
         end_.v = solution_.x;
@@ -538,7 +538,7 @@ private:
     std::vector<Sliding> sliding_;
     std::vector<Bounce> bounces_;
     std::vector<FreeSpin> spins_, end_spins_;
-    UntouchedSpins untouched_;
+    TurningSpins turning_spins_;
     std::vector<Penetrating> penetrating_;
     std::vector<std::int32_t> penetrating_column_;
     std::vector<double> penetrating_value_;

@@ -43,6 +43,8 @@ namespace delassus {
 //
 // Gyroscopic torques: a body that spins by itself turns by a rule that keeps its energy and momentum
 // (DynamicalSystem::free_spins), and what the other motions of the step add to its torque is taken beside its impulse.
+// Where no joint holds it, it turns by the way of that rule, and by θ h (v⁺ − ω⁺) more: h v_θ would be off by O(h³ ω³),
+// whatever acts on it.
 
 namespace {
 
@@ -217,8 +219,11 @@ void ThetaMethod::move(const State& begin, double h, const Vector& last, double 
     mean = (1.0 - theta_) * v + theta_ * last;
     delta_ = part * h * mean;
     if (part == 1.0)
-        for (const FreeSpin* spin : untouched_)
-            for (std::int32_t i = 0; i < 3; ++i) delta_[spin->column + i] = spin->turn[static_cast<std::size_t>(i)];
+        for (const FreeSpin* spin : turning_spins_)
+            for (std::size_t i = 0; i < 3; ++i) {
+                const Eigen::Index column = spin->column + static_cast<Eigen::Index>(i);
+                delta_[column] += spin->turn[i] - h * ((1.0 - theta_) * v[column] + theta_ * spin->speed[i]);
+            }
     to.q.resize(begin.q.size());
     system_.increment(begin.q.data(), delta_.data(), to.q.data());
     to.t = begin.t + part * h;
@@ -340,7 +345,7 @@ void ThetaMethod::resolve_up_to(double h) {
 void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     problem_.name = "step";
     problem_.law = Law::Associated;
-    untouched_.clear();
+    turning_spins_.clear();
     move(begin, h, guess_, theta_, at_theta_);
     H_.begin(n_, n_);
     system_.add_mass(at_theta_, 1.0, H_);
@@ -362,7 +367,7 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     for (std::size_t i = 0; i < multipliers_.size(); ++i) solution_.lambda[i] = last_h_ * multipliers_[i];
     solution_.x.assign(guess_.begin(), guess_.end());
     contacts_.append_to(problem_, solution_.lambda, coulomb);
-    untouched_.find(spins_, problem_.D, n_);
+    turning_spins_.find(spins_, problem_.D, m_);
 }
 
 /// a and the b of constraints for the guess; the impulse of its forces stays in force_.

@@ -18,7 +18,7 @@
 #include "dynamics/row_ways.hpp"
 #include "dynamics/step_memory.hpp"
 #include "dynamics/struck_spins.hpp"
-#include "dynamics/untouched_spins.hpp"
+#include "dynamics/turning_spins.hpp"
 #include "dynamics/velocity_contacts.hpp"
 #include "dynamics/velocity_error.hpp"
 
@@ -124,7 +124,7 @@ private:
     double longest_h_ = 0.0;
     std::vector<double> tensions_, tensions_at_theta_;
     std::vector<FreeSpin> spins_, theta_spins_;
-    UntouchedSpins untouched_;
+    TurningSpins turning_spins_;
     StruckSpins struck_spins_;
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
     /// implicit.
