@@ -558,6 +558,25 @@ TEST(PlainMotion, OverlapsOfTheStartAreNamed) {
         << deep[0];
 }
 
+// Boxes that touch, one of which spins: what the first step gains is no gift of an overlap.
+TEST(PlainMotion, WhatTouchesAtTheStartDoesNotOverlap) {
+    auto run = run_of(
+        "step: 0.005\nend: 0.02\ngravity: [2.347442, 2.496109, 0.872679]\n"
+        "materials: {m0: {friction: 1.5, restitution: 1}, m2: {friction: 0.1, restitution: 0.3}}\nbodies:\n"
+        "- {name: ground, fixed: true, position: [0, 0, -0.2], shapes: [{box: {size: [4, 4, 0.4]}}]}\n"
+        "- {name: b0, mass: 50, position: [-0.5, 0, 0.2], inertia: {xx: 0.36, yy: 0.63, zz: 0.57},\n"
+        "   shapes: [{box: {size: [0.4, 0.4, 0.4]}, material: m0}]}\n"
+        "- {name: b1, density: 7800, position: [-0.5, 0, 0.55], orientation: {axis: [0, 0, 1], angle: 341},\n"
+        "   angular_velocity: [5.121164, 17.128919, -11.42974], shapes: [{box: {size: [0.3, 0.3, 0.3]}, material: "
+        "m2}]}\n"
+        "- {name: b2, mass: 1, position: [-0.5, 0, 0.85], inertia: {xx: 0.023, yy: 0.022, zz: 0.021},\n"
+        "   shapes: [{box: {size: [0.36, 0.36, 0.3]}, material: m2}]}\n");
+    run.simulation.step();
+    EXPECT_GT(run.simulation.record().penetration, 1e-9);
+    EXPECT_EQ(run.simulation.totals().start_overlap, 0.0);
+    EXPECT_EQ(run.simulation.totals().credit, 0.0);
+}
+
 TEST(PlainMotion, OverlapsThatGrowAreNamed) {
     auto scene = parse_scene(
         "step: 0.01\nend: 1\nbodies:\n"

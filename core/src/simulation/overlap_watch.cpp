@@ -43,6 +43,10 @@ OverlapWatch::OverlapWatch(MultibodySystem& system, double accuracy, const State
         others == 0 ? "" : fmt::format(" ({} other pairs less)", others));
 }
 
+bool OverlapWatch::any_at_start() const {
+    return std::ranges::any_of(start_, [this](const auto& pair) { return pair.depth > system_.gap_resolution(); });
+}
+
 double OverlapWatch::allowed(const BodyOverlap& pair) const {
     constexpr double share_of_thickness = 0.1;
     return std::min(accuracy_ * pair.extent, share_of_thickness * pair.thickness);

@@ -43,6 +43,9 @@ public:
     /// What overlaps at the start by more than the accuracy allows, as a sentence with what to do; empty: nothing.
     [[nodiscard]] const std::string& at_start() const { return at_start_; }
 
+    /// Whether anything does by more than rounding.
+    [[nodiscard]] bool any_at_start() const;
+
     /// Notes the overlaps at the beginning of a step of size h, of the bodies.
     void begin(const State& state, double h, const sdk::Team& team = {}) {
         system_.collect_overlaps(state, h, team, before_);

@@ -314,7 +314,8 @@ void Simulation::judge(const AdaptiveStepReport& taken, SimulationTotals& totals
     totals.potential_drop = std::max(totals.potential_drop, start_potential - (record_.energy - record_.kinetic));
     totals.recovered += taken.step.energy.recovered;
     const double left = record_.penetration;
-    totals.start_overlap = now_.step == 0 || left < totals.start_overlap ? left : 0.0;
+    const bool overlapped = now_.step == 0 && (!overlaps_ || overlaps_->any_at_start());
+    totals.start_overlap = overlapped || left < totals.start_overlap ? left : 0.0;
     if (totals.start_overlap > 0.0) {
         totals.credit = std::max(totals.credit, energy - totals.start_energy);
         totals.lowest = energy - totals.recovered;
