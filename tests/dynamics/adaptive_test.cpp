@@ -7,6 +7,7 @@
 #include "support/order.hpp"
 #include "support/systems/linear_oscillators.hpp"
 #include "support/systems/planar_pendulum.hpp"
+#include "support/systems/sudden_load.hpp"
 
 namespace delassus::tests::adaptive_test {
 namespace {
@@ -91,20 +92,6 @@ INSTANTIATE_TEST_SUITE_P(Methods, Tolerance,
                          testing::Values(Method{"euler_implicit_linearized", {}}, Method{"euler_implicit", {}},
                                          Method{"generalized_alpha", {}}, Method{"hht", {}}),
                          [](const auto& chosen) { return chosen.param.name; });
-
-/// A unit mass at rest that a force of 100 N pushes from t = 1 on.
-class SuddenLoad : public DynamicalSystem {
-public:
-    [[nodiscard]] std::int32_t n() const override { return 1; }
-    [[nodiscard]] State initial_state() const override { return {0.0, {0.0}, {0.0}}; }
-    void add_mass(const State&, double factor, MatrixAssembler& M) const override { M.add(0, 0, factor); }
-    void multiply_mass(const State&, double factor, const double* x, double* result) const override {
-        result[0] += factor * x[0];
-    }
-    void add_force(const State& state, double factor, double* result) const override {
-        if (state.t >= 1.0) result[0] += factor * 100.0;
-    }
-};
 
 TEST(AdaptiveStepping, RejectsStepsOverASuddenLoad) {
     for (const char* method : {"generalized_alpha", "euler_implicit", "euler_implicit_linearized", "hht"}) {
