@@ -66,6 +66,18 @@ TEST(UnchangedSteps, AreTheStepsThatWouldBeTaken) {
     }
 }
 
+TEST(UnchangedSteps, AreTakenOnceWhereAnAccuracyChoosesSubsteps) {
+    Running run = read(stack("accuracy: 1.0e-4\n"));
+    while (run.simulation.state().t < 1.5) run.simulation.step();
+    const SimulationTotals totals = run.simulation.totals();
+    const State rest = run.simulation.state();
+    run.finish();
+    EXPECT_GT(totals.plugin_solves, 0);
+    EXPECT_EQ(run.simulation.totals().plugin_solves, totals.plugin_solves);
+    EXPECT_EQ(run.simulation.totals().solver_iterations, totals.solver_iterations);
+    EXPECT_EQ(run.simulation.state().q, rest.q);
+}
+
 TEST(UnchangedSteps, EndWhereALoadSetsIn) {
     Running run =
         read(stack("loads: [{name: l, body: b, force: [{table: {times: [2, 2.001], values: [0, 30]}}, 0, 0]}]\n"));

@@ -81,7 +81,9 @@ bool RunStep::try_to_take() {
 void RunStep::add_to_totals(const std::string& place) {
     SimulationTotals& totals = run_.now.totals;
     const AdaptiveStepReport& taken = run_.memory;
-    add_step(run_.record, totals);
+    StepRecord counted = run_.record;
+    if (run_.stepping->repeated()) counted.newton_iterations = counted.solver_iterations = 0;
+    add_step(counted, totals);
     if (taken.refined) {
         ++totals.refined_steps;
     } else if (taken.substeps > 1) {

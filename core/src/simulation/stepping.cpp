@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -47,11 +48,7 @@ private:
 
 Stepping::Stepping(DynamicalSystem& system, std::unique_ptr<Timestepper> timestepper, SteppingSettings settings,
                    SharedRun* shared)
-    : system_(system),
-      settings_(std::move(settings)),
-      shared_(shared),
-      timestepper_(std::move(timestepper)),
-      unchanged_(system) {
+    : system_(system), settings_(std::move(settings)), shared_(shared), timestepper_(std::move(timestepper)) {
     if (settings_.restitutes) cuts_ = std::make_unique<ImpactCuts>(system);
     if (shared) return;
     if (settings_.chosen) {
@@ -96,21 +93,31 @@ void Stepping::advance(State& state, StepSolver& solver, AdaptiveStepReport& rep
     report.error = 0.0;
     report.rejected = 0;
     report.impact = report.refined = report.again = false;
-    if (ahead_) {
+    const bool repeats = unchanged_.repeat(step.h, report);
+    if (repeats) {
+        if (solver.interrupted()) throw StepInterrupted("the step was interrupted");
+    } else if (ahead_) {
         step_ahead(state, step.end, solver, report);
     } else if (control_) {
         step_within_error(*control_, state, step.end, solver, report);
     } else {
         step_fixed(state, solver, report, watch);
+    }
+    if (!ahead_ && !control_) {
         last_.whole = report.substeps == 1 && !report.refined;
         last_.energy = report.step.energy;
-        if (last_.whole && solver.may_skip_solves()) {
-            unchanged_.note(last_.state, last_.method, state, step.h, *timestepper_, report.step, solver.effort());
-        } else {
-            unchanged_.forget();
-        }
     }
+    if (!repeats && changed_nothing(state, report.step, solver)) unchanged_.note(report, solver.effort());
     state.t = step.end;
+}
+
+bool Stepping::changed_nothing(const State& end, const StepReport& report, const StepSolver& solver) const {
+    const auto same = [](const std::vector<double>& a, const std::vector<double>& b) {
+        return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0);
+    };
+    if (!same(last_.state.v, end.v) || !same(last_.state.q, end.q) || !report.solved || ahead_) return false;
+    return solver.may_skip_solves() && !system_.depends_on_time() && work_ == work_before_ &&
+           same(last_.method, timestepper_->save()) && (!control_ || same(control_before_, control_->save()));
 }
 
 void Stepping::undo() {
@@ -132,10 +139,6 @@ void Stepping::go_back(State& state) {
 
 void Stepping::take(State& state, double h, StepSolver& solver, StepReport& report) {
     solver.forget_misses();
-    if (unchanged_.repeat(state, h, report)) {
-        if (solver.interrupted()) throw StepInterrupted("the step was interrupted");
-        return;
-    }
     if (shared_) {
         shared_->step(state, h, *timestepper_, solver, report);
     } else if (cuts_) {

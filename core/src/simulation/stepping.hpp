@@ -40,13 +40,14 @@ struct SteppingSettings {
 //
 //     a step of the method            Timestepper; of several processes, SharedRun
 //     cut between impacts             ImpactCuts, where there is restitution
-//     as the last one                 UnchangedStep, where that changed nothing
 //     cut by what time prescribes     where it jumps, or oscillates within the step
 //     in 2, 4, … equal substeps       where the method or the watch calls it too long
 //     again, by their error           where it errs by more than the accuracy, and that costs little
 //   or
 //     in substeps by their error      AdaptiveStepping, where there is an error limit, an accuracy or a tolerance
 //     longer than what is shown       LookAhead, where the method knows the way of its steps
+//   or
+//     as the last one                 UnchangedStep, where that changed nothing
 //
 /// The layers around the step of a method.
 class DELASSUS_API Stepping {
@@ -77,6 +78,8 @@ public:
     /// Shows states by steps that are longer; null: there are none such.
     [[nodiscard]] LookAhead* ahead() { return ahead_.get(); }
     void look_ahead(std::unique_ptr<LookAhead> ahead) { ahead_ = std::move(ahead); }
+    /// Whether the last step was that before it, without another solve.
+    [[nodiscard]] bool repeated() const { return unchanged_.repeated() != nullptr; }
     /// record ← what is known of a step that advance() took, but for what states and clocks say.
     void describe(const AdaptiveStepReport& taken, const SolverEffort& spent, StepRecord& record) const;
     /// Whether fixed steps are divided by their error.
@@ -89,6 +92,8 @@ public:
 
 private:
     void take(State& state, double h, StepSolver& solver, StepReport& report);
+    /// Whether the step that advance() took left everything as it was, so that the next one will.
+    [[nodiscard]] bool changed_nothing(const State& end, const StepReport& report, const StepSolver& solver) const;
     /// Where a step from t on to `end` ends, so that what time prescribes is smooth and slow in it.
     [[nodiscard]] double cut(double t, double end) const;
     /// The method forgets what acted before, if something that time prescribes jumps at the state.
