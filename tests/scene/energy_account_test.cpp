@@ -67,8 +67,8 @@ TEST(EnergyAccount, ARiderOnATurntableTakesNoneWhileItStays) {
 }
 
 TEST(EnergyAccount, ABallThatRollsOnATurntableLosesNothing) {
-    // Its centre goes round in a circle at 2/7 of the table's rate, and has the speed of the start again after each
-    // round: a contact passes along the table, whose speed there changes by more than the table turns.
+    // Its centre goes round in a circle at 2/7 of the table's rate. The contact moves along the table: the speed of the
+    // table there does not change as that of a point of the table does.
     for (const double h : {0.007, 0.03}) {
         Running run = finished(fmt::format(
             "step: {}\nend: 4.2\nmaterials: {{m: {{friction: 1.4}}}}\nbodies:\n"

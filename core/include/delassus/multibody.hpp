@@ -56,7 +56,7 @@ struct Motion {
     /// are. Where a motion is not, no step looks ahead of what is shown.
     bool foreseeable = false;
     double oscillation_period = 0.0;  ///< s; 0: the functions do not oscillate
-    bool is_constant = false;         ///< the value; made by constant()
+    bool is_constant = false;         ///< the value never changes; of constant() alone
     DELASSUS_API static Motion constant(double value);
     DELASSUS_API static Motion linear(double start, double rate);
     /// offset + amplitude sin(2π frequency t + phase)
@@ -479,7 +479,8 @@ public:
     /// A quarter of the shortest period of a motion that oscillates; and 1 rad of a body whose shapes are not round
     /// about the axis about which it turns by its motion.
     [[nodiscard]] double longest_step(double t) const override;
-    /// Whether a motion is not Motion::is_constant. What follows a constant speed moves.
+    /// Whether a motion of a motor, actuator, load or body is not Motion::is_constant. A motor of constant speed does
+    /// not count: as long as it turns its joint, states differ.
     [[nodiscard]] bool depends_on_time() const override;
     /// Whether all these motions are Motion::foreseeable.
     [[nodiscard]] bool foreseeable() const;

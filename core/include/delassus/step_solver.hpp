@@ -164,8 +164,8 @@ public:
     /// Who decides which parts of a problem need no solver; null: all of them are solved. Not owned.
     DELASSUS_API void let_rest(RestingParts* parts);
 
-    /// Whether nobody asks for solves whose answers are known, to look at them or to let parts rest, and nobody else
-    /// takes part in them.
+    /// Whether a solve whose answer is known may be left out: no one watches problems, lets parts rest or shares the
+    /// steps, and leave_nothing_out() was not called.
     [[nodiscard]] DELASSUS_API bool may_skip_solves() const;
 
     /// The processes that step the rest of the system, where there are several: problems are solved with them, and

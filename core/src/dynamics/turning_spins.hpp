@@ -11,9 +11,9 @@
 
 namespace delassus {
 
-/// Of the free spins of a step those of bodies that none of some rows acts on. They turn by FreeSpin::turn, and beside
-/// it by what else changes their velocities: the rule's way differs from that of the mean velocity by O(h³ ω³), and
-/// rows that have to hold at the end of the step are about the latter. The memory serves again.
+/// Of the free spins of a step those of bodies that no row of a given set acts on. They turn by FreeSpin::turn and by
+/// what else changes their velocities. That differs by O(h³ ω³) from a turn by the mean velocity, on which rows that
+/// have to hold at the end of the step rely. The memory serves again.
 class TurningSpins {
 public:
     void clear() { spins_.clear(); }

@@ -228,7 +228,7 @@ private:
     [[nodiscard]] double work_of_block(std::size_t block, const Problem& problem, const Solution& solution,
                                        std::span<const double> mean) const;
     [[nodiscard]] double mean_rate(const Contact& contact, std::size_t i) const;
-    /// What slides there at both ends, where v⁺ is in the axes of the middle.
+    /// The speeds of a row at both ends of the step by the rates at these instants; of in_middle_.
     [[nodiscard]] std::array<double, 2> speeds_at_ends(const Problem& problem, std::size_t row,
                                                        std::size_t before) const;
     [[nodiscard]] double restitution_of(std::size_t block) const {
@@ -237,7 +237,7 @@ private:
     [[nodiscard]] bool acts(const Contact& contact, const Solution& solution) const;
     void find_passing(const Problem& problem, const Solution& solution);
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
-    /// Of rows in rows_ and before_, with the rates of these times, m/s or rad/s.
+    /// Of rows in rows_ and before_, with means of the rates about these times, m/s or rad/s.
     [[nodiscard]] double speed_at_begin(std::size_t row, std::size_t before) const;
     [[nodiscard]] double speed_at_end(const Problem& problem, std::size_t row, std::size_t before,
                                       const double* v) const;
