@@ -2,6 +2,7 @@
 // Steps whose size follows from a tolerance: any timestepper, with rejection, and with cuts where contacts close.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -89,7 +90,8 @@ private:
         /// Whether a contact closed in it that the method did not know of, or closed by what another impact did: the
         /// whole and its halves may err alike.
         [[nodiscard]] bool missed() const {
-            return closes_in < 0.0 || whole.cut > 0.0 || first.cut > 0.0 || second.cut > 0.0;
+            return closes_in < 0.0 ||
+                   std::max({whole.second_impact_speed, first.second_impact_speed, second.second_impact_speed}) > slow;
         }
     };
     [[nodiscard]] Trial take(const State& begin, double h, StepSolver& solver);

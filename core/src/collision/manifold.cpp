@@ -308,7 +308,8 @@ void Manifold::beside_edges(const Placed& a, const Placed& b, const Vector3d& of
     const double least = apart * std::min(a.solid->reach, b.solid->reach);
     for (const CorePoint& point : beside_) {
         const bool repeats = std::any_of(points.begin(), points.end(), [&](const CorePoint& other) {
-            return other.feature == point.feature || (other.point_a - point.point_a).norm() < least;
+            return other.feature == point.feature || (other.point_a - point.point_a).norm() < least ||
+                   (other.point_b - point.point_b).norm() < least;
         });
         if (!repeats && point.distance > nearest.distance) points.push_back(point);
     }

@@ -2,6 +2,7 @@
 #include "dynamics/impact_cuts.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <utility>
 
@@ -13,7 +14,16 @@ void ImpactCuts::step(Timestepper& stepper, State& state, double h, StepSolver& 
     const State begin = state;
     std::vector<double> memory = stepper.save();
     stepper.step(state, h, solver, report);
-    if (report.cut == 0.0) return;
+    if (report.cut > 0.0) try_cuts(stepper, begin, std::move(memory), h, most_substeps, false, state, solver, report);
+}
+
+bool ImpactCuts::cut(Timestepper& stepper, const State& begin, std::vector<double> memory, double h, std::int64_t most,
+                     State& state, StepSolver& solver, StepReport& report) {
+    return try_cuts(stepper, begin, std::move(memory), h, std::min(most, most_substeps), true, state, solver, report);
+}
+
+bool ImpactCuts::try_cuts(Timestepper& stepper, const State& begin, std::vector<double> memory, double h,
+                          std::int64_t most, bool all, State& state, StepSolver& solver, StepReport& report) {
     constexpr double rounding = 1e-6;
     State whole = std::move(state);
     StepReport of_whole = std::move(report);
@@ -21,21 +31,26 @@ void ImpactCuts::step(Timestepper& stepper, State& state, double h, StepSolver& 
     state = begin;
     bool kept = false;
     try {
-        step_in_cuts(stepper, state, h, of_whole.cut, std::move(memory), solver, report);
-        const double most = rounding * kinetic(begin);
-        kept = gain(begin, state) <= most || gain(whole, state) <= most;
+        step_in_cuts(stepper, state, h, all ? of_whole.second_impact_cut : of_whole.cut, std::move(memory), most, all,
+                     solver, report);
+        const double faint = rounding * kinetic(begin);
+        kept = gain(begin, state) <= faint || gain(whole, state) <= faint;
     } catch (const StepFailure&) {
         // The whole step could be taken.
     }
     stepper.follow_impacts(false);
-    if (kept) return;
+    if (kept) {
+        report.cut = report.second_impact_cut = 0.0;
+        return true;
+    }
     state = std::move(whole);
     report = std::move(of_whole);
     stepper.load(after);
+    return false;
 }
 
 void ImpactCuts::step_in_cuts(Timestepper& stepper, State& state, double h, double first, std::vector<double> memory,
-                              StepSolver& solver, StepReport& report) {
+                              std::int64_t most, bool all, StepSolver& solver, StepReport& report) {
     const double end = state.t + h;
     double part = first;
     StepReport before;
@@ -44,13 +59,16 @@ void ImpactCuts::step_in_cuts(Timestepper& stepper, State& state, double h, doub
         const State begin = state;
         stepper.load(memory);
         stepper.step(state, part, solver, report);
-        if (report.cut > 0.0 && cuts < most_substeps) {
+        if (const double cut = all ? report.second_impact_cut : report.cut; cut > 0.0 && cuts < most) {
             ++cuts;
-            part = report.cut;
+            part = cut;
             state = begin;
             continue;
         }
         memory = stepper.save();
+        if (!before.error.empty()) report.error.resize(before.error.size(), 0.0);
+        std::transform(before.error.begin(), before.error.end(), report.error.begin(), report.error.begin(),
+                       std::plus<>());
         report.follow(before);
         before = report;
         part = end - state.t;

@@ -166,10 +166,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
 
     move(state, h, result_, 1.0, end_);
     const bool struck = timed_ && contacts_.find_impacts(problem_, solution_);
-    if (struck) {
-        move_late(state, h, acting);
-        report.cut = contacts_.cut_between_impacts(problem_, solution_);
-    }
+    if (struck) move_late(state, h, acting);
     end_.v = solution_.x;
     if (struck)
         for (const StruckSpins::Spin& spin : struck_spins_.spins())
@@ -189,6 +186,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     result_ -= free_;
     if (position_error_.note({h, last_h_, result_, struck_, timed_, contacts_.all_bounce()}, report))
         contacts_.add_error(problem_, solution_, last_h_, report.error);
+    if (struck) contacts_.note_impacts(problem_, solution_, report);
     if (const auto moved = projection_.moved(); projected && !moved.empty()) {
         report.error.resize(moved.size(), 0.0);
         for (std::size_t i = 0; i < moved.size(); ++i) report.error[i] += std::abs(moved[i]);
@@ -272,9 +270,9 @@ void ThetaMethod::extrapolate(double h) {
 
 // What positions lack by impacts (VelocityContacts::find_impacts()), added to the way of the step. Turns do not
 // commute: the way until τ comes first and the rest after it, or the axes of a body, and so its momentum, would be off
-// by O(h²). Of what moves after an impact in the step before, the guess ṽ may not know what holds it since; v is what
-// it would be then. The nearer one to v⁺ counts, by which nothing moves too far. Not in the parts of a step that is cut
-// between impacts, each of which follows one.
+// by O(h²). Of what moves after an impact in the step before, the guess ṽ may not know what holds it since, unless
+// impacts alone act on it; v is what it would be then. The nearer one to v⁺ counts, by which nothing moves too far. Not
+// in the parts of a step that is cut between impacts, each of which follows one.
 //
 // What friction and forces between bounds change after a bounce, from v⁺ of the bounce alone, comes in the course of
 // the rest r of the step: in the share a of it that they act, after which what they stop is at rest. Positions go less
@@ -284,12 +282,12 @@ void ThetaMethod::move_late(const State& begin, double h, double acting) {
     until_impact_.setZero(n_);
     for_each_vector([&](std::int32_t first, std::int32_t size) {
         const auto k = static_cast<std::size_t>(first);
-        const double share = contacts_.on_velocities()[k].share, late = contacts_.on_velocities()[k].late;
+        const auto& [share, late, alone] = contacts_.on_velocities()[k];
         if (!(share > 0.0)) return;
         Vector change = result_.segment(first, size) - smooth_.segment(first, size);
         const auto held = result_.segment(first, size) - free_.segment(first, size);
-        if (settings_.linearly_implicit && !contacts_.follows_impacts() && !struck_.empty() && struck_[k] > mostly &&
-            held.squaredNorm() < change.squaredNorm())
+        if (settings_.linearly_implicit && !alone && !contacts_.follows_impacts() && !struck_.empty() &&
+            struck_[k] > mostly && held.squaredNorm() < change.squaredNorm())
             change = held;
         const double part = 1.0 - theta_ - late / share;  // τ/h
         auto until = until_impact_.segment(first, size);
@@ -316,18 +314,21 @@ void ThetaMethod::mark_struck(bool struck) {
     for (std::size_t k = 0; k < struck_.size(); ++k) struck_[k] = std::max(contacts_.on_velocities()[k].share, 0.0);
 }
 
-// What an impact changes at once is no acceleration: there the last ones stay.
+// What an impact changes at once is no acceleration: there the last ones stay, or where there are none, those without
+// impacts count.
 void ThetaMethod::remember_change(const Vector& result, double h) {
     const auto n = static_cast<std::size_t>(n_);
     std::vector<double>& last = changes_[0];
     std::vector<double>& before = changes_[1];
-    if (!last.empty()) before.resize(n);
+    const bool first = last.empty();
+    if (before.empty()) before = last;
     last.resize(n);
     for (std::int32_t i = 0; i < n_; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        if (struck_[k] > mostly) continue;
+        const bool struck = struck_[k] > mostly;
+        if (struck && !first) continue;
         if (!before.empty()) before[k] = last[k];
-        last[k] = (result[i] - free_[i]) / h;
+        last[k] = ((struck ? smooth_[i] : result[i]) - free_[i]) / h;
     }
 }
 

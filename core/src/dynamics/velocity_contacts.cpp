@@ -112,6 +112,10 @@ constexpr double settled_share = 1e-6;
 /// After so many iterations they only fall.
 constexpr int patience = 15;
 
+bool in_order_of_shapes(const ContactPoint& one, const ContactPoint& other) {
+    return std::pair(one.shape_a, one.shape_b) < std::pair(other.shape_a, other.shape_b);
+}
+
 }  // namespace
 
 void diagonal_of(const SparseMatrix& H, std::vector<double>& diagonal) {
@@ -200,20 +204,16 @@ void VelocityContacts::require_same_side(const State& begin, double h) const {
     const auto& contacts = before_.contacts();
     const auto& later = rows_.contacts();
     const std::size_t first = before_.blocks().size() - contacts.size();
-    const auto shapes = [](const ContactPoint& contact) { return std::pair(contact.shape_a, contact.shape_b); };
     for (std::size_t k = 0; k < contacts.size(); ++k) {
         const ContactPoint& contact = contacts[k];
         const double speed = before_.blocks()[first + k].speed;
         if (!(contact.gap > -shallow && contact.gap + theta_ * h * speed < -shallow)) continue;
-        auto same = std::lower_bound(
-            later.begin(), later.end(), contact,
-            [&](const ContactPoint& one, const ContactPoint& other) { return shapes(one) < shapes(other); });
-        bool found = false;
-        for (; same != later.end() && shapes(*same) == shapes(contact) && !found; ++same) {
+        const auto [same, others] = std::equal_range(later.begin(), later.end(), contact, in_order_of_shapes);
+        const bool found = std::any_of(same, others, [&](const ContactPoint& one) {
             double cosine = 0.0;
-            for (std::size_t i = 0; i < 3; ++i) cosine += contact.normal[i] * same->normal[i];
-            found = cosine > least_cosine;
-        }
+            for (std::size_t i = 0; i < 3; ++i) cosine += contact.normal[i] * one.normal[i];
+            return cosine > least_cosine;
+        });
         const auto goes_on = [&](const ContactPoint& one) {
             const bool of_a = one.shape_a == contact.shape_a || one.shape_b == contact.shape_a;
             if (!of_a && one.shape_a != contact.shape_b && one.shape_b != contact.shape_b) return false;
@@ -316,7 +316,14 @@ void VelocityContacts::set_normal(const UnilateralRows::Block& block, Contact& c
     }
 }
 
+// Shapes of which no contact was known at the beginning were apart there, whatever their speed in the middle says: one
+// of them has gone round the other.
 void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, bool coulomb) {
+    constexpr double open = 2.0;  // of the resolution of a gap
+    const auto was_near = [&](const ContactPoint& point) {
+        const auto& contacts = before_.contacts();
+        return std::binary_search(contacts.begin(), contacts.end(), point, in_order_of_shapes);
+    };
     first_row_ = problem.b.size();
     coulomb_ = coulomb;
     settled_ = true;
@@ -380,6 +387,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
         const auto entries = static_cast<std::size_t>(rows_.row_start()[row + 1]) - entry;
         contact.resolution =
             point ? resolution_.of(std::span(rows_.column()).subspan(entry, entries), h_) : resolution_.least();
+        if (point && !was_near(*point)) contact.gap = std::max(contact.gap, open * contact.resolution);
         if (contact.along_normal) set_normal(block, contact, block.speed);
         if (block.compliance > 0.0) contact.servo = find_servo(block.key, before, contact);
         compliances_.push_back(contact.servo ? contact.servo->compliance(contact.struck) : 0.0);
@@ -495,8 +503,8 @@ bool VelocityContacts::make_persistent(const Solution& solution) {
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
         const UnilateralRows::Block& block = rows_.blocks()[k];
-        if (!contact.along_normal || contact.pushed || contact.left || contact.impact || !contact.nearly_as_before ||
-            !(solution.lambda[first_row_ + contact.row] > 0.0))
+        if (!contact.along_normal || contact.pushed || contact.left || contact.impact || contact.struck <= h_ ||
+            !contact.nearly_as_before || !(solution.lambda[first_row_ + contact.row] > 0.0))
             continue;
         const double turn = h_ * std::abs(block.speed + contact.approach) / theta_;
         if (contact.resolved_gap() > turn || h_ * std::abs(contact.approach) > turn + contact.resolution) continue;
@@ -533,28 +541,25 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
 // With the mean forces F of the step and F₋ of the one before, of size h₋, a force changes at the rate
 // r = 2 (F − F₋)/(h + h₋), and is F + ½ h r at the end. Where that is negative nothing pulls in its place: the step
 // takes E²/(2 |r|) too little of impulse with E = −F − ½ h r, and so gives a speed that is wrong for as long as the
-// motion goes on: it counts as if it were wrong over all of the step. So does an impulse along rows that are off.
+// motion goes on: it counts as if it were wrong over all of the step.
 void VelocityContacts::add_error(const Problem& problem, const Solution& solution, double last_h,
                                  std::vector<double>& error) const {
     const auto& D = problem.D;
     for (const Contact& contact : contacts_) {
         const std::size_t row = first_row_ + contact.row;
         if (!contact.along_normal || !(solution.lambda[row] > 0.0)) continue;
-        double impulse = 0.0;
-        if (contact.impact) {
-            impulse = contact.row_error * solution.lambda[row];
-        } else if (contact.last[0] > 0.0) {
-            const double force = solution.lambda[row] / h_,
-                         rate = 2.0 * (force - contact.last[0] / last_h) / (h_ + last_h);
-            const double pulls = -force - 0.5 * h_ * rate;
-            if (pulls > 0.0) impulse = 0.5 * pulls * pulls / -rate;
-        }
-        if (impulse == 0.0) continue;
-        for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e) {
-            const auto column = static_cast<std::size_t>(D.column[static_cast<std::size_t>(e)]);
-            error[column] += h_ * std::abs(D.value[static_cast<std::size_t>(e)]) * impulse / diagonal_[column];
-        }
+        if (contact.impact || !(contact.last[0] > 0.0)) continue;
+        const double force = solution.lambda[row] / h_, rate = 2.0 * (force - contact.last[0] / last_h) / (h_ + last_h);
+        const double pulls = -force - 0.5 * h_ * rate;
+        if (pulls > 0.0) add_error_of(0.5 * pulls * pulls / -rate, D, row, error);
     }
+}
+
+void VelocityContacts::add_error_of(double impulse, const SparseMatrix& D, std::size_t row,
+                                    std::vector<double>& error) const {
+    for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double value) {
+        error[column] += h_ * std::abs(value) * impulse / diagonal_[column];
+    });
 }
 
 bool VelocityContacts::landed(const Solution& solution) const {

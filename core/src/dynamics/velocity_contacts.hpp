@@ -127,9 +127,9 @@ public:
     /// had pushed before: what lies on something when a run begins, or goes over an edge. Returns whether the answer
     /// changes by that.
     [[nodiscard]] bool make_persistent(const Solution& solution);
-    /// StepReport::cut, where more than a hundredth of the kinetic energy is to be given back. solution: of the whole
-    /// problem.
-    [[nodiscard]] double cut_between_impacts(const Problem& problem, const Solution& solution) const;
+    /// report.second_impact_speed and report.cut; and in report.error, unless that is empty, what these impacts make
+    /// the step err by, and rows of impacts that are not known at their time. solution: of the whole problem.
+    void note_impacts(const Problem& problem, const Solution& solution, StepReport& report) const;
 
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.
     /// solution: of the whole problem.
@@ -148,8 +148,7 @@ public:
     void only_take();
 
     /// error += what the step errs by in positions, n, because contacts and stops that push until its end let go within
-    /// it, as their forces in this step and in the one before, of size last_h, show, and because rows of impacts are
-    /// not known at their time. solution: of the whole problem.
+    /// it, as their forces in this step and in the one before, of size last_h, show. solution: of the whole problem.
     void add_error(const Problem& problem, const Solution& solution, double last_h, std::vector<double>& error) const;
 
     /// result += D_Aᵀ P of what pushed steadily: not of impacts. P: impulses, `lambda` of the whole problem; n.
@@ -225,6 +224,17 @@ private:
         [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 
+    /// A bounce of bodies that another impact of the step strikes before it.
+    struct SecondImpact {
+        double after, meets;  ///< when they are struck, and when this one comes, after the beginning of the step, s
+        double leaves;        ///< speed with which the contact leaves it
+        double mobility;      ///< change of that speed by an impulse, 1/kg
+    };
+    [[nodiscard]] std::optional<SecondImpact> second_impact(const Problem& problem, const Solution& solution,
+                                                            std::size_t block) const;
+    /// error += what an impulse along a row that should not be there, or lacks, makes of positions, n.
+    void add_error_of(double impulse, const SparseMatrix& D, std::size_t row, std::vector<double>& error) const;
+    [[nodiscard]] double turn_error(const SparseMatrix& D, const Contact& contact, bool known, double time) const;
     [[nodiscard]] double work_of_block(std::size_t block, const Problem& problem, const Solution& solution,
                                        std::span<const double> mean) const;
     [[nodiscard]] double mean_rate(const Contact& contact, std::size_t i) const;

@@ -203,7 +203,9 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         const double time = meeting ? meeting->meets : h_;
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
         std::optional<Impact> impact;
-        if (take_rows_at(time, k, problem)) {
+        const bool known = take_rows_at(time, k, problem);
+        contact.row_error += turn_error(problem.D, contact, known, time);
+        if (known) {
             speed = speed_of(begin_speeds_);
             gap = left - (speed + 0.5 * acceleration() * time) * time;
             if (meeting) impact = meeting_from(std::max(gap, 0.0), speed, 0.0);
@@ -224,6 +226,28 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         }
     }
     find_struck(problem, last_h);
+}
+
+// As a share of the size of its rows. Bodies are taken to spin as they do at the beginning: by ½ |ω̇| τ² they are turned
+// otherwise after the time τ. Rows that are those of the middle instead are off by all of the turn in between.
+double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contact, bool known, double time) const {
+    const std::size_t row = first_row_ + contact.row;
+    const auto end = static_cast<std::size_t>(D.row_start[row + 1]);
+    double change = 0.0, size = 0.0;
+    for (auto e = static_cast<std::size_t>(D.row_start[row]); e < end; ++e) {
+        const auto column = static_cast<std::size_t>(D.column[e]);
+        size += D.value[e] * D.value[e] / diagonal_[column];
+        if (!axes_.at(D.column, e, end)) continue;
+        using Vector = Eigen::Map<const Eigen::Vector3d>;
+        const Vector begin(begin_speeds_ + column), smooth(smooth_ + column), arm(&D.value[e]), H(&diagonal_[column]);
+        const double angle = 0.5 * time * time * (smooth - begin).norm() / h_ +
+                             (known ? 0.0 : std::abs(time - theta_ * h_) * begin.norm());
+        const double square = arm.cwiseAbs2().cwiseQuotient(H).sum();
+        change += angle * angle * square;
+        size += square - D.value[e] * D.value[e] / diagonal_[column];
+        e += 2;
+    }
+    return size > 0.0 ? std::sqrt(change / size) : 0.0;
 }
 
 double VelocityContacts::smooth_acceleration(const Problem& problem, std::size_t row) const {
@@ -360,17 +384,39 @@ bool VelocityContacts::any_bounce(const Solution& solution) const {
 // impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s. Or it has an impact
 // of its own, after one on another contact of its bodies, and counts on a speed that it will not have. Bodies that rest
 // on others are not among them: there impacts have no order.
-double VelocityContacts::cut_between_impacts(const Problem& problem, const Solution& solution) const {
-    constexpr double faint = 1e-2, least_part = 1e-6;
-    const auto is_loaded = [&](std::size_t row) {
-        constexpr double share = 1e-6;
-        const double own = mobility_of(problem.D, diagonal_, row);
-        return std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
-            const std::size_t number = first_row_ + other.row;
-            return other.along_normal && other.pushed && !other.impact && number != row &&
-                   solution.lambda[number] > 0.0 && std::abs(coupling(problem.D, diagonal_, row, number)) > share * own;
-        });
-    };
+std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(const Problem& problem,
+                                                                              const Solution& solution,
+                                                                              std::size_t block) const {
+    constexpr double least_part = 1e-6;
+    const Contact& contact = contacts_[block];
+    const std::size_t row = first_row_ + contact.row;
+    double struck = contact.struck;
+    if (contact.impact && !struck_.empty())
+        for_each_entry(problem.D, row, 1,
+                       [&](std::size_t, std::size_t column, double) { struck = std::min(struck, struck_[column]); });
+    const double closing = contact.impact ? contact.impact->closing : contact.change - contact.end_speed;
+    if (contact.pushed || !(struck < h_) || restitution_of(block) == 0.0 || !(solution.lambda[row] > 0.0) ||
+        !(closing > 0.0))
+        return std::nullopt;
+    const double meets = contact.impact
+                             ? contact.impact->meets
+                             : struck + std::max(contact.resolved_gap() - contact.approach * struck, 0.0) / closing;
+    if (!(meets < h_) || meets - struck < least_part * h_) return std::nullopt;
+    constexpr double share = 1e-6;
+    const double own = mobility_of(problem.D, diagonal_, row);
+    const bool is_loaded = std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
+        const std::size_t number = first_row_ + other.row;
+        return other.along_normal && other.pushed && !other.impact && number != row && solution.lambda[number] > 0.0 &&
+               std::abs(coupling(problem.D, diagonal_, row, number)) > share * own;
+    });
+    if (is_loaded) return std::nullopt;
+    return SecondImpact{struck, meets, restitution_of(block) * closing, contact.change / solution.lambda[row]};
+}
+
+// A step that stays whole may lack the bounce: it is off by the speed of that, and in positions as if all through it.
+// So does an impulse along rows that are off.
+void VelocityContacts::note_impacts(const Problem& problem, const Solution& solution, StepReport& report) const {
+    constexpr double faint = 1e-2;
     std::optional<double> known;
     const auto kinetic = [&] {
         if (!known) {
@@ -380,31 +426,19 @@ double VelocityContacts::cut_between_impacts(const Problem& problem, const Solut
         }
         return *known;
     };
-    const auto first_strike = [&](const Contact& contact) {
-        double first = contact.struck;
-        if (contact.impact && !struck_.empty())
-            for_each_entry(problem.D, first_row_ + contact.row, 1,
-                           [&](std::size_t, std::size_t column, double) { first = std::min(first, struck_[column]); });
-        return first;
-    };
-    double cut = 0.0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const Contact& contact = contacts_[k];
-        const std::size_t row = first_row_ + contact.row;
-        const double gap = contact.resolved_gap(), struck = first_strike(contact);
-        const double closing = contact.impact ? contact.impact->closing : contact.change - contact.end_speed;
-        if (contact.pushed || !(struck < h_) || restitution_of(k) == 0.0 || !(solution.lambda[row] > 0.0) ||
-            !(closing > 0.0))
-            continue;
-        const double e = restitution_of(k), mobility = contact.change / solution.lambda[row];
-        if (0.5 * e * e * closing * closing <= faint * mobility * kinetic() || is_loaded(row)) continue;
-        const double meets =
-            contact.impact ? contact.impact->meets : struck + std::max(gap - contact.approach * struck, 0.0) / closing;
-        if (!(meets < h_) || meets - struck < least_part * h_) continue;
-        const double between = 0.5 * (struck + meets);
-        if (cut == 0.0 || between < cut) cut = between;
+        const std::size_t row = first_row_ + contacts_[k].row;
+        if (acts(contacts_[k], solution) && !report.error.empty())
+            add_error_of(contacts_[k].row_error * solution.lambda[row], problem.D, row, report.error);
+        const auto second = second_impact(problem, solution, k);
+        if (!second) continue;
+        report.second_impact_speed = std::max(report.second_impact_speed, second->leaves);
+        const double impulse = second->leaves / second->mobility, between = 0.5 * (second->after + second->meets);
+        const auto cut_there = [between](double& cut) { cut = cut == 0.0 ? between : std::min(cut, between); };
+        cut_there(report.second_impact_cut);
+        if (0.5 * impulse * second->leaves > faint * kinetic()) cut_there(report.cut);
+        if (!report.error.empty()) add_error_of(impulse, problem.D, row, report.error);
     }
-    return cut;
 }
 
 // A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.

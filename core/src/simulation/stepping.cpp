@@ -295,10 +295,46 @@ double Stepping::error_of(const StepReport& report, double h) const {
     return largest / (h * allowed());
 }
 
+// What an impact leads to within a step costs but a step for each, where it is all that the step errs by.
+bool Stepping::cut_between_impacts(double looser, State& state, StepSolver& solver, AdaptiveStepReport& report,
+                                   StepWatch* watch) {
+    const double end = last_.state.t + report.h;
+    const bool whole_step = report.substeps == 1 && cut(last_.state.t, end) == end;
+    if (!cuts_ || !whole_step || report.step.second_impact_cut == 0.0) return false;
+    constexpr double steps_of_a_cut = 2.0;  // one that is thrown away, as it has to be cut again
+    const double cost = work_of(report.step, solver.effort().iterations);
+    const auto most = static_cast<std::int64_t>(work_ / (steps_of_a_cut * cost)) - 1;
+    if (most < 1) return false;
+    const State whole = state;
+    AdaptiveStepReport of_whole = report;
+    const std::vector<double> after = timestepper_->save();
+    const std::int64_t before = solver.effort().iterations;
+    bool better = false;
+    try {
+        if (cuts_->cut(*timestepper_, last_.state, last_.method, report.h, most, state, solver, report.step)) {
+            work_ -= work_of(report.step, solver.effort().iterations - before);
+            report.error = error_of(report.step, report.h);
+            report.refined = true;
+            better = report.error < of_whole.error;
+            if (better && watch) judge(state, report, *watch);
+        } else {
+            work_ -= steps_of_a_cut * cost;
+        }
+    } catch (const StepFailure&) {
+        better = false;
+    }
+    if (better) return report.error <= looser;
+    state = whole;
+    report = std::move(of_whole);
+    timestepper_->load(after);
+    if (watch) judge(state, report, *watch);
+    return false;
+}
+
 void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
     work_ = std::clamp(work_ + work_of_a_step, work_of_a_step, most_saved_work);
     const double looser = std::pow(most_saved_work / work_, 2);
-    if (!(report.error > looser)) return;
+    if (!(report.error > looser) || cut_between_impacts(looser, state, solver, report, watch)) return;
     const double solves = std::min(solves_of_a_substep * std::sqrt(report.error / looser), solves_of_an_impact);
     const double usual = work_of(report.step, solver.effort().iterations) * solves;
     if (usual > work_) return;

@@ -115,6 +115,9 @@ private:
     /// What a step of size h errs by, over what is allowed; NaN where it is not known.
     [[nodiscard]] double error_of(const StepReport& report, double h) const;
     void refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch);
+    /// Of a step that was taken, as far as there is work for it. Returns whether it errs by no more than `looser` then.
+    bool cut_between_impacts(double looser, State& state, StepSolver& solver, AdaptiveStepReport& report,
+                             StepWatch* watch);
     /// counted: of the step before, if it is taken again.
     void take_refined(double looser, State& state, double end, const StepEnergy& counted, StepSolver& solver,
                       AdaptiveStepReport& report, StepWatch* watch);
