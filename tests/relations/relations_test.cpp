@@ -169,6 +169,21 @@ TEST(Relations, HoldForAPendulum) {
     EXPECT_EQ(outcomes.at("refusal").verdict, Verdict::NotJudged);
 }
 
+TEST(Relations, SayWhatStepsErrByWhereBodiesMeet) {
+    const auto outcomes = judged(scene_of(R"(
+step: 0.01
+end: 0.41
+gravity: [0, 0, -9.81]
+materials:
+  m: {friction: 0.3, restitution: 0.7}
+bodies:
+  - {name: ground, position: [0, 0, 0], fixed: true, shapes: [{plane: {}, material: m}]}
+  - {name: b, density: 700, position: [0, 0, 0.3], velocity: [0.7, -0.3, 0], shapes: [{sphere: {radius: 0.1}, material: m}]}
+)"));
+    EXPECT_EQ(outcomes.at("told").verdict, Verdict::Held) << outcomes.at("told").detail;
+    EXPECT_EQ(outcomes.at("refined").verdict, Verdict::NotJudged);
+}
+
 TEST(Relations, SeeEnergyFromNothingThatNoWarningSays) {
     // The explicit method multiplies the energy by 1 + (h ω)² in each step: 50 steps with h ω = 0.02 make 2 %.
     const auto outcomes = judged(scene_of(R"(

@@ -78,6 +78,7 @@ public:
         motion_.t.push_back(record.t);
         motion_.poses.push_back(std::move(poses));
         motion_.natural.push_back(record.natural);
+        motion_.said.push_back((motion_.said.empty() ? 0.0 : motion_.said.back()) + record.error);
         if (motion_.t.size() == 1) {
             start_ = record.energy;
             start_kinetic_ = record.kinetic;

@@ -35,6 +35,7 @@ struct Motion {
     std::vector<double> t;                   ///< s; the start, then each step
     std::vector<std::vector<double>> poses;  ///< at these: position, unit quaternion w x y z of each body, one by one
     std::vector<double> natural;             ///< at these: the largest natural error that a solve of the step left
+    std::vector<double> said;  ///< at these: the error that the steps so far say they have, of what moves, or rad
     bool finite = true;
     bool driven = false;     ///< motors, servos, loads or kinematic bodies supply energy
     bool acted = false;      ///< a contact, a stop or a limited motor was in some step's problem

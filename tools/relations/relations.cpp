@@ -51,6 +51,11 @@ namespace {
 // With an error limit, d(A, H) ≤ (N_A + N_H) ℓ G / size. Without one a method of order p ≥ 1 is nearer the truth with a
 // quarter of the step, Q, than with half of it: d(H, Q) ≤ d(A, H) + 10 d(A, P), where order p has d(A, H)/2ᵖ.
 //
+// *Half the step, whatever acts* (told), where fixed steps are divided by their error: each run is right to the
+// accuracy of 1e-3 a second, or says by how much it is not, e. That is the error that its steps add, which the motion
+// then grows: d(A, H)/10 ≤ d(A, P) + G (2e-3 t + e_A + e_H), up to a tenth. A state may be shown before its step is
+// taken again with the one after it: of two states in a row the nearer one counts.
+//
 // *Another solver.* Both are asked for the natural error τ = 1e-10. Velocities are then known to √τ of those that
 // reactions correct where nothing better is known (docs/stability.md, "What a tolerance promises"), in each of N steps
 // of h = T/N, at speeds of about size/T: d(A, B)/10 ≤ √τ N G h/T = √τ G.
@@ -59,7 +64,7 @@ namespace {
 //
 // Joints that contradict one another by less than is noticed: which rows hold is a choice that any change may turn.
 // What the others miss by is the drift, which the run reports; it is added where rows were left out.
-constexpr double disturbance = 1e-10, chaos = 1e-6, useless = 1e-2, direction_factor = 10.0;
+constexpr double disturbance = 1e-10, chaos = 1e-6, useless = 1e-2, told_useless = 0.1, direction_factor = 10.0;
 constexpr double accuracy = 1e-3, small_limit = 1e-7, solver_tolerance = 1e-10;
 constexpr double gap_resolution = 1e-9;
 
@@ -190,6 +195,24 @@ public:
         std::vector<double> finer = distances(half, quarter, {}, size_, 2), shown;
         for (std::size_t k = 0; k < finer.size(); k += 2) shown.push_back(finer[k]);
         return verdict(half, quarter, judge(whole, shown, allowed, 1.0));
+    }
+
+    Judgement told() {
+        if (const auto gone = not_comparable(base_)) return *gone;
+        if (!base_.divides || !base_.acted) return {};
+        Json scene = scene_;
+        scene["step"] = 0.5 * scene_["step"].get<double>();
+        const Motion half = motion(scene, {2.0 * order_.run_limit, {}});
+        if (half.end == End::Refused && !half.began) return only_one(base_, half);
+        if (half.integrator != base_.integrator || half.coordinates != base_.coordinates) return {};
+        std::vector<double> allowed = sensitivity();
+        for (std::size_t k = 0; k < allowed.size() && 2 * k < half.said.size(); ++k) {
+            const double errors = 2.0 * accuracy * base_.t[k] + base_.said[k] + half.said[2 * k];
+            allowed[k] = direction_factor * (allowed[k] + errors * growth(allowed[k]));
+        }
+        std::vector<double> distance = distances(base_, half, {}, size_, 2);
+        for (std::size_t k = 0; k + 1 < distance.size(); ++k) distance[k] = std::min(distance[k], distance[k + 1]);
+        return verdict(base_, half, judge(base_, distance, allowed, told_useless));
     }
 
     Judgement other_coordinates() {
@@ -419,7 +442,7 @@ private:
 }  // namespace
 
 std::string_view meaning_of(std::string_view relation) {
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 11> meanings = {{
+    static constexpr std::array<std::pair<std::string_view, std::string_view>, 12> meanings = {{
         {"sound",
          "no crash, no state that is not finite, no energy from nothing, no shape inside another, unless said"},
         {"refusal", "a refusal is one sentence that names what it is about"},
@@ -429,6 +452,7 @@ std::string_view meaning_of(std::string_view relation) {
         {"order", "bodies, joints and all else in another order move alike"},
         {"pieces", "a run that is stopped, written, read and gone on with has the same bits"},
         {"refined", "smooth motion with half the step is as near as the method promises"},
+        {"told", "with half the step the motion is as near as both runs say"},
         {"coordinates", "in joint and in maximal coordinates the motion is the same within the method's error"},
         {"cut", "a body as two welded halves moves alike within the method's error"},
         {"solver", "with another solver the motion is the same within what a tolerance promises"},
@@ -446,7 +470,7 @@ std::string_view name_of(Verdict verdict) {
 
 std::vector<Outcome> judge_scene(const Json& scene, const Registry& registry, const JudgeOrder& order) {
     using Member = Judgement (*)(Judge&);
-    static constexpr std::array<Member, 11> members = {
+    static constexpr std::array<Member, 12> members = {
         [](Judge& judge) { return judge.sound(); },
         [](Judge& judge) { return judge.refusal(); },
         [](Judge& judge) { return judge.placed_elsewhere(); },
@@ -455,6 +479,7 @@ std::vector<Outcome> judge_scene(const Json& scene, const Registry& registry, co
         [](Judge& judge) { return judge.other_order(); },
         [](Judge& judge) { return judge.in_pieces(); },
         [](Judge& judge) { return judge.refined(); },
+        [](Judge& judge) { return judge.told(); },
         [](Judge& judge) { return judge.other_coordinates(); },
         [](Judge& judge) { return judge.welded_halves(); },
         [](Judge& judge) { return judge.other_solver(); },

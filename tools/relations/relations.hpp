@@ -16,8 +16,9 @@
 namespace delassus::relations {
 
 /// In the order in which they are judged and shown.
-inline constexpr std::array<std::string_view, 11> relation_names = {
-    "sound", "refusal", "placed", "mirrored", "units", "order", "pieces", "refined", "coordinates", "cut", "solver"};
+inline constexpr std::array<std::string_view, 12> relation_names = {"sound", "refusal",     "placed", "mirrored",
+                                                                    "units", "order",       "pieces", "refined",
+                                                                    "told",  "coordinates", "cut",    "solver"};
 
 /// A sentence on the relation of that name.
 [[nodiscard]] std::string_view meaning_of(std::string_view relation);

@@ -224,10 +224,10 @@ private:
         [[nodiscard]] double resolved_gap() const { return gap - std::clamp(gap, -resolution, resolution); }
     };
 
-    /// A bounce of bodies that another impact of the step strikes before it.
+    /// An impact of bodies that another impact of the step strikes before it.
     struct SecondImpact {
         double after, meets;  ///< when they are struck, and when this one comes, after the beginning of the step, s
-        double leaves;        ///< speed with which the contact leaves it
+        double speed;         ///< by which the contact may be wrong after it
         double mobility;      ///< change of that speed by an impulse, 1/kg
     };
     [[nodiscard]] std::optional<SecondImpact> second_impact(const Problem& problem, const Solution& solution,

@@ -395,22 +395,22 @@ std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(co
         for_each_entry(problem.D, row, 1,
                        [&](std::size_t, std::size_t column, double) { struck = std::min(struck, struck_[column]); });
     const double closing = contact.impact ? contact.impact->closing : contact.change - contact.end_speed;
-    if (contact.pushed || !(struck < h_) || restitution_of(block) == 0.0 || !(solution.lambda[row] > 0.0) ||
-        !(closing > 0.0))
+    const double share = contact.impact ? 1.0 : restitution_of(block);
+    if (contact.pushed || !(struck < h_) || share == 0.0 || !(solution.lambda[row] > 0.0) || !(closing > 0.0))
         return std::nullopt;
     const double meets = contact.impact
                              ? contact.impact->meets
                              : struck + std::max(contact.resolved_gap() - contact.approach * struck, 0.0) / closing;
     if (!(meets < h_) || meets - struck < least_part * h_) return std::nullopt;
-    constexpr double share = 1e-6;
+    constexpr double faint = 1e-6;
     const double own = mobility_of(problem.D, diagonal_, row);
     const bool is_loaded = std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
         const std::size_t number = first_row_ + other.row;
         return other.along_normal && other.pushed && !other.impact && number != row && solution.lambda[number] > 0.0 &&
-               std::abs(coupling(problem.D, diagonal_, row, number)) > share * own;
+               std::abs(coupling(problem.D, diagonal_, row, number)) > faint * own;
     });
     if (is_loaded) return std::nullopt;
-    return SecondImpact{struck, meets, restitution_of(block) * closing, contact.change / solution.lambda[row]};
+    return SecondImpact{struck, meets, share * closing, contact.change / solution.lambda[row]};
 }
 
 // A step that stays whole may lack the bounce: it is off by the speed of that, and in positions as if all through it.
@@ -432,11 +432,11 @@ void VelocityContacts::note_impacts(const Problem& problem, const Solution& solu
             add_error_of(contacts_[k].row_error * solution.lambda[row], problem.D, row, report.error);
         const auto second = second_impact(problem, solution, k);
         if (!second) continue;
-        report.second_impact_speed = std::max(report.second_impact_speed, second->leaves);
-        const double impulse = second->leaves / second->mobility, between = 0.5 * (second->after + second->meets);
+        report.second_impact_speed = std::max(report.second_impact_speed, second->speed);
+        const double impulse = second->speed / second->mobility, between = 0.5 * (second->after + second->meets);
         const auto cut_there = [between](double& cut) { cut = cut == 0.0 ? between : std::min(cut, between); };
         cut_there(report.second_impact_cut);
-        if (0.5 * impulse * second->leaves > faint * kinetic()) cut_there(report.cut);
+        if (0.5 * impulse * second->speed > faint * kinetic()) cut_there(report.cut);
         if (!report.error.empty()) add_error_of(impulse, problem.D, row, report.error);
     }
 }
