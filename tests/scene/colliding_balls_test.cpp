@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,17 +14,15 @@
 #include <string>
 #include <vector>
 
+#include "support/rooms.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::colliding_balls_test {
 namespace {
 
 using Eigen::Vector3d;
+using tests::list;
 using tests::Running;
-
-std::string list(const Vector3d& v) {
-    return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", v[0], v[1], v[2]);
-}
 
 struct Ball {
     double mass, radius;
@@ -111,16 +109,7 @@ struct Box {
         std::string text = fmt::format(
             "step: {:.17g}\nend: {}\ngravity: {}\nmaterials: {{m: {{friction: {}, restitution: {}}}}}\nbodies:\n", h,
             end, list(gravity), friction, restitution);
-        for (int axis = 0; axis < 3; ++axis)
-            for (const double side : {1.0, -1.0}) {
-                const Vector3d n = side * Vector3d::Unit(axis);
-                const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), n);
-                text += fmt::format(
-                    "- {{name: wall{}{}, fixed: true, position: {}, orientation: [{:.17g}, {:.17g}, {:.17g}, {:.17g}], "
-                    "shapes: [{{plane: {{}}, material: m}}]}}\n",
-                    axis, side > 0.0 ? "low" : "high", list(side > 0.0 ? Vector3d::Zero() : Vector3d(-n)), q.w(), q.x(),
-                    q.y(), q.z());
-            }
+        text += tests::walls_of_cube(1.0);
         for (std::size_t i = 0; i < balls.size(); ++i)
             text += fmt::format(
                 "- {{name: b{}, mass: {:.17g}, position: {}, velocity: {}, angular_velocity: {}, shapes: [{{sphere: "

@@ -10,12 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "support/rooms.hpp"
 #include "support/scenes.hpp"
 
 namespace delassus::spinning_bounces_test {
 namespace {
 
 using Eigen::Vector3d;
+using tests::list;
 using tests::Running;
 
 Running run_of(const std::string& text) {
@@ -24,10 +26,6 @@ Running run_of(const std::string& text) {
 
 Vector3d vector(const Vector3& v) {
     return {v[0], v[1], v[2]};
-}
-
-std::string list(const Vector3d& v) {
-    return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", v[0], v[1], v[2]);
 }
 
 struct Ball {
@@ -165,7 +163,7 @@ TEST(SpinningBounces, WhatABounceLeadsToWithinAStepIsAtItsTime) {
     }
 }
 
-/// A body in a room, its shape's size or points, and until when it is looked at.
+/// A body in a room, and until when it is looked at, s.
 struct Thrown {
     const char* name;
     double friction, restitution, end;
@@ -199,16 +197,7 @@ Vector3d thrown_to(const Thrown& it, double h) {
         "step: {:.17g}\nend: {}\ngravity: {}\nmaterials: {{m: {{friction: {}, restitution: {}}}}}\nbodies:\n"
         "- {{name: a, {}}}\n",
         h, it.end, it.gravity, it.friction, it.restitution, it.body);
-    for (int axis = 0; axis < 3; ++axis)
-        for (const double side : {1.0, -1.0}) {
-            const Vector3d n = side * Vector3d::Unit(axis);
-            const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), n);
-            text += fmt::format(
-                "- {{name: wall{}{}, fixed: true, position: {}, orientation: [{:.17g}, {:.17g}, {:.17g}, {:.17g}], "
-                "shapes: [{{plane: {{}}, material: m}}]}}\n",
-                axis, side > 0.0 ? "low" : "high", list(side > 0.0 ? Vector3d::Zero() : Vector3d(-1.2 * n)), q.w(),
-                q.x(), q.y(), q.z());
-        }
+    text += tests::walls_of_cube(1.2);
     auto run = run_of(text);
     run.finish();
     return vector(run.pose("a").position);

@@ -50,12 +50,12 @@ struct StepReport {
     // Of the fastest contact or stop that closed, that is, one that pushed in this step and not in the one before:
     double impact_speed = 0.0;  ///< with which it closed, in its unit a second; 0: none
     double impact_time = 0.0;   ///< when, after the beginning of the step
-    /// The largest speed with which a contact with restitution would leave an impact that follows another one on its
-    /// bodies within the step; 0: there is none. The method knew of no such meeting, or of one at another speed.
+    /// Where an impact follows another one on its bodies within the step, of which the method knew no meeting, or one
+    /// at another speed: the largest speed by which a contact may be wrong after it; 0: there is none.
     double second_impact_speed = 0.0;
-    double second_impact_cut =
-        0.0;  ///< when, after the beginning, to cut the step before the first of them; 0: no such
-    /// The same before the first that has more than a hundredth of the kinetic energy.
+    /// When, after the beginning, to cut the step between the first such impact and the one before it; 0: nowhere.
+    double second_impact_cut = 0.0;
+    /// The same for the first that has more than a hundredth of the kinetic energy.
     double cut = 0.0;
     /// The error of a linearised method's forces at the end of the step, as a share of the velocities
     /// (docs/integrators.md); 0 where forces are linear, or where it is not measured.

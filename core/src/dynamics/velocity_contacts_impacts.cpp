@@ -387,7 +387,7 @@ bool VelocityContacts::any_bounce(const Solution& solution) const {
 std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(const Problem& problem,
                                                                               const Solution& solution,
                                                                               std::size_t block) const {
-    constexpr double least_part = 1e-6;
+    constexpr double least_part = 1e-6, faint = 1e-6;
     const Contact& contact = contacts_[block];
     const std::size_t row = first_row_ + contact.row;
     double struck = contact.struck;
@@ -402,7 +402,6 @@ std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(co
                              ? contact.impact->meets
                              : struck + std::max(contact.resolved_gap() - contact.approach * struck, 0.0) / closing;
     if (!(meets < h_) || meets - struck < least_part * h_) return std::nullopt;
-    constexpr double faint = 1e-6;
     const double own = mobility_of(problem.D, diagonal_, row);
     const bool is_loaded = std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
         const std::size_t number = first_row_ + other.row;
@@ -413,8 +412,8 @@ std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(co
     return SecondImpact{struck, meets, share * closing, contact.change / solution.lambda[row]};
 }
 
-// A step that stays whole may lack the bounce: it is off by the speed of that, and in positions as if all through it.
-// So does an impulse along rows that are off.
+// A step that stays whole is off by such a speed, and in positions as if all through it. So it is where the rows of an
+// impulse are.
 void VelocityContacts::note_impacts(const Problem& problem, const Solution& solution, StepReport& report) const {
     constexpr double faint = 1e-2;
     std::optional<double> known;

@@ -298,10 +298,10 @@ double Stepping::error_of(const StepReport& report, double h) const {
 // What an impact leads to within a step costs but a step for each, where it is all that the step errs by.
 bool Stepping::cut_between_impacts(double looser, State& state, StepSolver& solver, AdaptiveStepReport& report,
                                    StepWatch* watch) {
-    const double end = last_.state.t + report.h;
-    const bool whole_step = report.substeps == 1 && cut(last_.state.t, end) == end;
-    if (!cuts_ || !whole_step || report.step.second_impact_cut == 0.0) return false;
     constexpr double steps_of_a_cut = 2.0;  // one that is thrown away, as it has to be cut again
+    const double end = last_.state.t + report.h;
+    if (!cuts_ || report.step.second_impact_cut == 0.0 || report.substeps > 1 || cut(last_.state.t, end) != end)
+        return false;
     const double cost = work_of(report.step, solver.effort().iterations);
     const auto most = static_cast<std::int64_t>(work_ / (steps_of_a_cut * cost)) - 1;
     if (most < 1) return false;
@@ -324,11 +324,16 @@ bool Stepping::cut_between_impacts(double looser, State& state, StepSolver& solv
         better = false;
     }
     if (better) return report.error <= looser;
+    take_back(whole, std::move(of_whole), after, state, report, watch);
+    return false;
+}
+
+void Stepping::take_back(const State& whole, AdaptiveStepReport of_whole, const std::vector<double>& after,
+                         State& state, AdaptiveStepReport& report, StepWatch* watch) {
     state = whole;
     report = std::move(of_whole);
     timestepper_->load(after);
     if (watch) judge(state, report, *watch);
-    return false;
 }
 
 void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& report, StepWatch* watch) {
@@ -358,11 +363,7 @@ void Stepping::refine(State& state, StepSolver& solver, AdaptiveStepReport& repo
     } catch (const StepFailure&) {
         work_ -= usual;
     }
-    if (better) return;
-    state = whole;
-    report = std::move(of_whole);
-    timestepper_->load(after);
-    if (watch) judge(state, report, *watch);
+    if (!better) take_back(whole, std::move(of_whole), after, state, report, watch);
 }
 
 void Stepping::take_refined(double looser, State& state, double end, const StepEnergy& counted, StepSolver& solver,

@@ -118,6 +118,9 @@ private:
     /// Of a step that was taken, as far as there is work for it. Returns whether it errs by no more than `looser` then.
     bool cut_between_impacts(double looser, State& state, StepSolver& solver, AdaptiveStepReport& report,
                              StepWatch* watch);
+    /// state, report and the method's memory ← those of a step that was taken before.
+    void take_back(const State& whole, AdaptiveStepReport of_whole, const std::vector<double>& after, State& state,
+                   AdaptiveStepReport& report, StepWatch* watch);
     /// counted: of the step before, if it is taken again.
     void take_refined(double looser, State& state, double end, const StepEnergy& counted, StepSolver& solver,
                       AdaptiveStepReport& report, StepWatch* watch);
