@@ -183,7 +183,7 @@ TEST(CollidingBalls, ManyAreRightOrTold) {
     EXPECT_GT(right, 0.8 * all);
 }
 
-// The share of the kinetic energy that is at stake is that of these balls, not of all that moves.
+// What a step errs by is not weighed against all that moves.
 TEST(CollidingBalls, AHeavyBodyFarAwayChangesNothing) {
     const std::string heavy =
         "- {name: heavy, mass: 1.0e+6, position: [0.5, 50, 50], velocity: [0, 10, 20], shapes: [{sphere: {radius: "

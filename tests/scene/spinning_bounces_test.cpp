@@ -179,9 +179,8 @@ constexpr Thrown thrown[] = {
     // A corner that was 1 mm off the wall strikes it after another one did.
     {"box", 0.3, 0.8, 0.6, "[1.85, -1.95, 9.43]",
      "density: 1636, position: [0.2132, 0.8506, 0.9302], orientation: [-0.53284, -0.1263, -0.0855, -0.83236], "
-     "velocity: "
-     "[0.3303, -1.5144, -0.3138], angular_velocity: [-0.7961, 2.7042, 1.0733], shapes: [{box: {size: [0.1364, 0.1438, "
-     "0.1326]}, material: m}]"},
+     "velocity: [0.3303, -1.5144, -0.3138], angular_velocity: [-0.7961, 2.7042, 1.0733], shapes: [{box: {size: "
+     "[0.1364, 0.1438, 0.1326]}, material: m}]"},
     // It turns by up to 0.6 rad a step, and its spin changes by a tenth of that.
     {"hull", 0.3, 0.8, 0.3, "[2.68, -7.4, -5.85]",
      "density: 58.6, position: [0.2735, 0.6801, 0.7828], orientation: [0.957, 0.0983, 0.2624, 0.0749], velocity: "
@@ -203,7 +202,7 @@ Vector3d thrown_to(const Thrown& it, double h) {
     return vector(run.pose("a").position);
 }
 
-// Each was 2 to 40 cm off in steps of 1/60 s, and said nothing of it.
+// What corners do one after the other is not what they would do at once.
 TEST(SpinningBounces, CornersStrikeOneAfterTheOther) {
     for (const Thrown& it : thrown) {
         const Vector3d right = thrown_to(it, 5e-5);

@@ -14,16 +14,18 @@ void ImpactCuts::step(Timestepper& stepper, State& state, double h, StepSolver& 
     const State begin = state;
     std::vector<double> memory = stepper.save();
     stepper.step(state, h, solver, report);
-    if (report.cut > 0.0) try_cuts(stepper, begin, std::move(memory), h, most_substeps, false, state, solver, report);
+    if (report.cut > 0.0)
+        try_cuts(stepper, begin, std::move(memory), h, most_substeps, &StepReport::cut, state, solver, report);
 }
 
 bool ImpactCuts::cut(Timestepper& stepper, const State& begin, std::vector<double> memory, double h, std::int64_t most,
                      State& state, StepSolver& solver, StepReport& report) {
-    return try_cuts(stepper, begin, std::move(memory), h, std::min(most, most_substeps), true, state, solver, report);
+    return try_cuts(stepper, begin, std::move(memory), h, std::min(most, most_substeps), &StepReport::second_impact_cut,
+                    state, solver, report);
 }
 
 bool ImpactCuts::try_cuts(Timestepper& stepper, const State& begin, std::vector<double> memory, double h,
-                          std::int64_t most, bool all, State& state, StepSolver& solver, StepReport& report) {
+                          std::int64_t most, Cut cut, State& state, StepSolver& solver, StepReport& report) {
     constexpr double rounding = 1e-6;
     State whole = std::move(state);
     StepReport of_whole = std::move(report);
@@ -31,8 +33,7 @@ bool ImpactCuts::try_cuts(Timestepper& stepper, const State& begin, std::vector<
     state = begin;
     bool kept = false;
     try {
-        step_in_cuts(stepper, state, h, all ? of_whole.second_impact_cut : of_whole.cut, std::move(memory), most, all,
-                     solver, report);
+        step_in_cuts(stepper, state, h, of_whole.*cut, std::move(memory), most, cut, solver, report);
         const double faint = rounding * kinetic(begin);
         kept = gain(begin, state) <= faint || gain(whole, state) <= faint;
     } catch (const StepFailure&) {
@@ -50,7 +51,7 @@ bool ImpactCuts::try_cuts(Timestepper& stepper, const State& begin, std::vector<
 }
 
 void ImpactCuts::step_in_cuts(Timestepper& stepper, State& state, double h, double first, std::vector<double> memory,
-                              std::int64_t most, bool all, StepSolver& solver, StepReport& report) {
+                              std::int64_t most, Cut cut, StepSolver& solver, StepReport& report) {
     const double end = state.t + h;
     double part = first;
     StepReport before;
@@ -59,9 +60,9 @@ void ImpactCuts::step_in_cuts(Timestepper& stepper, State& state, double h, doub
         const State begin = state;
         stepper.load(memory);
         stepper.step(state, part, solver, report);
-        if (const double cut = all ? report.second_impact_cut : report.cut; cut > 0.0 && cuts < most) {
+        if (report.*cut > 0.0 && cuts < most) {
             ++cuts;
-            part = cut;
+            part = report.*cut;
             state = begin;
             continue;
         }

@@ -204,7 +204,6 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
         std::optional<Impact> impact;
         const bool known = take_rows_at(time, k, problem);
-        contact.row_error += turn_error(problem.D, contact, known, time);
         if (known) {
             speed = speed_of(begin_speeds_);
             gap = left - (speed + 0.5 * acceleration() * time) * time;
@@ -216,6 +215,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         const double drift = (1.0 - theta_) * h_ * speed;
         if (impact && (bounces ? impact->closing > slowest : strikes())) {
             contact.impact = impact;
+            contact.row_error += turn_error(problem.D, contact, known, time);
             contact.strikes = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;
             contact.normal = -impact->end_speed;

@@ -295,7 +295,7 @@ double Stepping::error_of(const StepReport& report, double h) const {
     return largest / (h * allowed());
 }
 
-// What an impact leads to within a step costs but a step for each, where it is all that the step errs by.
+// To cut between impacts costs a step a cut. That may be all that the step errs by.
 bool Stepping::cut_between_impacts(double looser, State& state, StepSolver& solver, AdaptiveStepReport& report,
                                    StepWatch* watch) {
     constexpr double steps_of_a_cut = 2.0;  // one that is thrown away, as it has to be cut again
@@ -309,17 +309,18 @@ bool Stepping::cut_between_impacts(double looser, State& state, StepSolver& solv
     AdaptiveStepReport of_whole = report;
     const std::vector<double> after = timestepper_->save();
     const std::int64_t before = solver.effort().iterations;
-    bool better = false;
+    solver.forget_misses();
+    if (!cuts_->cut(*timestepper_, last_.state, last_.method, report.h, most, state, solver, report.step)) {
+        work_ -= steps_of_a_cut * cost;
+        return false;
+    }
+    work_ -= work_of(report.step, solver.effort().iterations - before);
+    report.error = error_of(report.step, report.h);
+    report.refined = true;
+    bool better = report.step.solved && report.error < of_whole.error;
     try {
-        if (cuts_->cut(*timestepper_, last_.state, last_.method, report.h, most, state, solver, report.step)) {
-            work_ -= work_of(report.step, solver.effort().iterations - before);
-            report.error = error_of(report.step, report.h);
-            report.refined = true;
-            better = report.error < of_whole.error;
-            if (better && watch) judge(state, report, *watch);
-        } else {
-            work_ -= steps_of_a_cut * cost;
-        }
+        solver.require_usable();
+        if (better && watch) judge(state, report, *watch);
     } catch (const StepFailure&) {
         better = false;
     }
