@@ -19,6 +19,42 @@ std::string refusal(const CollisionSetup& setup) {
     return "accepted";
 }
 
+// Of boxes and hulls that touch in several ways, and lie flush beside one another.
+TEST(CollisionDetector, FindsOfAPairAloneWhatItFindsAmongAll) {
+    std::vector<Shape> shapes = {
+        shape(ShapeKind::Box, {1.0, 1.0, 0.1}, 0),      shape(ShapeKind::Box, {1.0, 1.0, 0.1}, 1),
+        shape(ShapeKind::Box, {0.3, 0.2, 0.1}, 2),      convex(tetrahedron_mesh(), 3),
+        shape(ShapeKind::Cylinder, {0.2, 0.3, 0.0}, 4), shape(ShapeKind::Plane, {}, -1)};
+    shapes[2].pose.position = {0.05, 0.0, 0.02};
+    const auto make = [&] { return make_collision_detector({shapes, {true, true, false, false, false}, {}}); };
+    std::vector<Pose> poses = {pose({0.0, 0.0, -0.1}), pose({2.0, 0.0, -0.1}), pose({1.0, 0.1, 0.07}),
+                               pose({1.1, -0.2, 0.45}, turn(0.4, {1.0, 0.3, 0.0})),
+                               pose({0.9, 0.6, 0.19}, turn(1.55, {1.0, 0.1, 0.0}))};
+    const std::vector<Pose> elsewhere = {poses[0], poses[1], pose({0.3, 0.1, 0.2}), pose({-0.4, 0.0, 0.9}),
+                                         pose({0.2, -0.5, 0.4})};
+    const auto whole = make(), alone = make();
+    std::vector<ContactPoint> all, others;
+    whole->detect(poses, 0.05, all);
+    alone->detect(elsewhere, 0.05, others);
+    std::vector<ContactPoint> pairs;
+    for (std::int32_t a = 0; a < 6; ++a)
+        for (std::int32_t b = a + 1; b < 6; ++b) {
+            const auto body = [&](std::int32_t k) { return shapes[static_cast<std::size_t>(k)].body; };
+            if (b == 1 || (a < 2 && b == 5)) continue;
+            alone->detect_pair(a, b, poses[static_cast<std::size_t>(body(a))],
+                               body(b) < 0 ? Pose{} : poses[static_cast<std::size_t>(body(b))], 0.05, pairs);
+        }
+    ASSERT_GT(all.size(), 6U);
+    ASSERT_EQ(pairs.size(), all.size());
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        EXPECT_EQ(std::tuple(pairs[k].shape_a, pairs[k].shape_b, pairs[k].feature),
+                  std::tuple(all[k].shape_a, all[k].shape_b, all[k].feature));
+        EXPECT_NEAR(pairs[k].gap, all[k].gap, 1e-14);
+        EXPECT_LT((vector(pairs[k].normal) - vector(all[k].normal)).norm(), 1e-14);
+        EXPECT_LT((vector(pairs[k].point_a) - vector(all[k].point_a)).norm(), 1e-14);
+    }
+}
+
 TEST(CollisionSetup, BadOnesAreRefused) {
     const auto one = [](const Shape& bad) { return refusal({{bad}, {false}, {}}); };
     const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };

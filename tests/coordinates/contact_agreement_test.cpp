@@ -188,5 +188,64 @@ TEST(ContactAgreement, OfWhatMovesInTouchIsOfOrderTwo) {
     }
 }
 
+/// What a contact alone has at a time of a smooth motion is what all have at the state of that time. Returns how many.
+int compare_each_alone(DynamicalSystem& system, State begin) {
+    constexpr double h = 0.01, time = 0.007;
+    const auto n = static_cast<std::size_t>(system.n());
+    std::vector<double> end(n), curve(n), way(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double phase = static_cast<double>(i);
+        begin.v[i] += 0.05 * std::sin(phase);
+        end[i] = begin.v[i] + 0.1 * std::cos(2.0 * phase);
+        curve[i] = 100.0 * std::sin(3.0 * phase);
+    }
+    const SmoothMotion motion{begin, end.data(), curve, h};
+    for (std::size_t i = 0; i < n; ++i) way[i] = motion.way(i, time);
+    State then = begin;
+    system.increment(begin.q.data(), way.data(), then.q.data());
+    then.t += time;
+    UnilateralRows all, alone;
+    system.collect_unilateral(begin, h, all);
+    system.collect_unilateral(then, 1e-9, all);
+    const std::size_t first = all.blocks().size() - all.contacts().size();
+    std::size_t row = 0;
+    for (std::size_t k = 0; k < first; ++k) row += static_cast<std::size_t>(all.blocks()[k].cone.rows);
+    for (std::size_t k = 0; k < all.contacts().size(); ++k) {
+        EXPECT_TRUE(system.collect_contact(motion, time, all.contacts()[k], alone));
+        EXPECT_EQ(alone.blocks().size(), 1U);
+        EXPECT_EQ(alone.blocks()[0].key, all.blocks()[first + k].key);
+        EXPECT_NEAR(alone.rows()[0].gap, all.rows()[row].gap, 1e-13);
+        const auto rows = static_cast<std::size_t>(all.blocks()[first + k].cone.rows);
+        const auto begins = static_cast<std::size_t>(all.row_start()[row]),
+                   ends = static_cast<std::size_t>(all.row_start()[row + rows]);
+        EXPECT_EQ(alone.column().size(), ends - begins);
+        for (std::size_t e = begins; e < ends && alone.column().size() == ends - begins; ++e) {
+            EXPECT_EQ(alone.column()[e - begins], all.column()[e]);
+            EXPECT_NEAR(alone.value()[e - begins], all.value()[e], 1e-12);
+        }
+        row += rows;
+    }
+    return static_cast<int>(all.contacts().size());
+}
+
+TEST(ContactAgreement, RowsOfAContactAloneAreThoseOfAllAtItsTime) {
+    const Scene scene = parse_scene(
+        "step: 0.01\nend: 1\nmaterials: {m: {friction: 0.4, restitution: 0.3}}\nbodies:\n"
+        "  - {name: ground, fixed: true, shapes: [{plane: {}, material: m}]}\n"
+        "  - {name: table, position: [1, 0, 0.1], motion: {rotation: {axis: [0, 0, 1], angle: {polynomial: [0, 2]}}}, "
+        "shapes: [{box: {size: [1, 1, 0.2]}, material: m}]}\n"
+        "  - {name: rider, density: 500, position: [1.2, 0.1, 0.2506], orientation: {axis: [1, 2, 0], angle: 0.2}, "
+        "shapes: [{box: {size: [0.2, 0.3, 0.1]}, material: m}]}\n"
+        "  - {name: a, density: 500, position: [-0.3, 0, 0.0506], orientation: {axis: [1, 2, 0], angle: 0.2}, shapes: "
+        "[{box: {size: [0.2, 0.3, 0.1]}, material: m}]}\n"
+        "  - {name: b, density: 500, position: [-0.7, 0, 0.1], shapes: [{sphere: {radius: 0.1}, material: m}]}\n"
+        "joints:\n  - {name: i, kind: spherical, first: a, second: b, point: [-0.5, 0, 0.1]}\n",
+        "test.yaml");
+    auto& system = *scene.systems[0].system;
+    EXPECT_GE(compare_each_alone(system, system.initial_state()), 4);
+    JointCoordinates joints(system);
+    EXPECT_GE(compare_each_alone(joints, joints.initial_state()), 4);
+}
+
 }  // namespace
 }  // namespace delassus::tests::contact_agreement_test

@@ -53,6 +53,29 @@ TEST(Impact, EndsWhereTheMotionThroughAllOfThemEnds) {
     }
 }
 
+// The gap of a corner that spins is that of its row and ½ α t² more from when it meets.
+TEST(Impact, MeetsAgainAsItsGapMovesAndNotItsRow) {
+    const double h = 0.01;
+    struct Case {
+        double acceleration, turning, restitution;
+        int bounces;
+    };
+    for (const Case& one : {Case{-9.81, -300.0, 0.7, 4}, Case{-600.0, 500.0, 0.6, 1}, Case{-9.81, 60.0, 0.5, 1}}) {
+        SCOPED_TRACE(fmt::format("{} and {}", one.acceleration, one.turning));
+        const auto impact =
+            impact_within(h, {0.0, -1.0, one.acceleration}, one.acceleration, one.restitution, one.turning);
+        ASSERT_TRUE(impact);
+        const End end = followed(h, 0.0, -1.0, one.acceleration + one.turning, one.restitution);
+        EXPECT_EQ(end.bounces, one.bounces);
+        EXPECT_NEAR(impact->end_speed + one.turning * h, end.speed, 1e-3);
+        const double alone = (-1.0 + 0.5 * one.acceleration * h) * h;
+        EXPECT_NEAR(alone + (h - impact->acts) * impact->change + 0.5 * one.turning * h * h, end.gap, 1e-5);
+    }
+    const auto rests = impact_within(h, {0.0, -1.0, -9.81}, -9.81, 0.3, -2000.0);
+    ASSERT_TRUE(rests);
+    EXPECT_NEAR(rests->end_speed - 2000.0 * h, 0.0, 1e-12);
+}
+
 TEST(Impact, ComesToRestWhereAllFlightsAreOver) {
     const auto impact = impact_within(0.1, {0.001, -0.1, -9.81}, -9.81, 0.3);
     ASSERT_TRUE(impact);

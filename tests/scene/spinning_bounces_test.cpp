@@ -136,6 +136,35 @@ TEST(SpinningBounces, ATumblingBoxBouncesAsInShortSteps) {
     }
 }
 
+// One impact of a body that turns by 0.2 rad in a step: with the rows, the gap and the spin of its time, what the step
+// errs by falls as h³.
+TEST(SpinningBounces, AnImpactErrsByTheCubeOfTheStep) {
+    const auto velocities_after = [](const std::string& shape, double h) {
+        auto run = run_of(fmt::format(
+            "step: {:.17g}\nend: 0.24\nmaterials: {{m: {{friction: 0.3, restitution: 0.8}}}}\nbodies:\n"
+            "- {{name: ground, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+            "- {{name: a, density: 700, position: [0, 0, 0.3], velocity: [0.7, -0.3, 0], angular_velocity: [12, 9, "
+            "-14], shapes: [{{{}, material: m}}]}}\n",
+            h, shape));
+        run.finish();
+        const auto [v, omega] = run.velocities("a");
+        return std::pair(vector(v), vector(omega));
+    };
+    for (const std::string shape : {"box: {size: [0.15, 0.1, 0.05]}", "cylinder: {radius: 0.04, length: 0.15}",
+                                    "convex: {points: [[0.09, 0.01, 0], [-0.09, -0.01, 0], [0, 0.05, 0.02], [0, -0.05, "
+                                    "-0.02], [0.01, 0, 0.04], [-0.01, "
+                                    "0, -0.04]]}"}) {
+        SCOPED_TRACE(shape);
+        const auto [v, omega] = velocities_after(shape, 1e-4);
+        for (const double h : {0.012, 0.008, 0.004}) {
+            SCOPED_TRACE(h);
+            const auto [v_h, omega_h] = velocities_after(shape, h);
+            EXPECT_LT((v_h - v).norm(), 1e3 * h * h * h * v.norm());
+            EXPECT_LT((omega_h - omega).norm(), 1e3 * h * h * h * omega.norm());
+        }
+    }
+}
+
 // The upper ball follows the lower one, which bounces back at it: they were not nearing each other when the step began.
 TEST(SpinningBounces, WhatABounceLeadsToWithinAStepIsAtItsTime) {
     const double g = 9.81, e = 0.7, R = 0.1, r = 0.05, low = 0.5, high = 0.68, aside = 0.013, end = 0.45;

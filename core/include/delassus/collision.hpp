@@ -77,6 +77,11 @@ public:
     /// what the points have to go along it (docs/mechanics.md).
     virtual void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
                         const sdk::Team& team = {}, std::span<const BodyDisplacement> displacements = {}) = 0;
+
+    /// Appends the points of two shapes alone, nearer than envelope, whose bodies have these poses (of the world: any),
+    /// while all others are where the last detection had them.
+    virtual void detect_pair(std::int32_t shape_a, std::int32_t shape_b, const Pose& pose_a, const Pose& pose_b,
+                             double envelope, std::vector<ContactPoint>& contacts) = 0;
 };
 
 /// What a detector is made of.

@@ -57,6 +57,21 @@ struct FreeSpin {
     std::array<double, 3> turn{};     ///< θ: the orientation becomes that of now ∘ exp(θ)
 };
 
+/// How a system moves in a step of size h where nothing strikes: velocities are v + (v⁺ − v) t/h + c t (t − h), with c
+/// of free spins.
+struct SmoothMotion {
+    const State& begin;
+    const double* end;              ///< v⁺, n
+    std::span<const double> curve;  ///< c, n, or empty: 0
+    double h;
+
+    /// Of a velocity's coordinate until so long after the beginning, along increments.
+    [[nodiscard]] double way(std::size_t velocity, double time) const {
+        const double first = begin.v[velocity], c = curve.empty() ? 0.0 : curve[velocity];
+        return (first + (0.5 / h * (end[velocity] - first) + c * (time / 3.0 - 0.5 * h)) * time) * time;
+    }
+};
+
 /// Unilateral rows and rows with bounded forces, collected block by block. A row is one of D_A with
 ///     u = D_A v + rate (+ gap/h in a step of size h)
 class UnilateralRows {
@@ -267,6 +282,11 @@ public:
     [[nodiscard]] virtual bool has_unilateral() const;
     /// The rows that may become active within a step of size h.
     virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);
+    /// rows ← the block and the point of a contact alone, one of those that collect_unilateral() gave in this step, so
+    /// long after the beginning of such a motion; of rates nothing. False where the system does not know it there, the
+    /// default.
+    virtual bool collect_contact(const SmoothMotion& motion, double time, const ContactPoint& contact,
+                                 UnilateralRows& rows);
     /// The velocity at the time t of the point of a contact's shape_b, as far as it is prescribed, less that of
     /// shape_a, m/s, world frame. contact: where it is at t; one that is met on the way, as collect_unilateral() gave
     /// it at the time `begin`. Nothing where the system does not know: then rates between those of its rows are taken.

@@ -117,6 +117,8 @@ public:
     [[nodiscard]] double longest_step(double t) const override;
     [[nodiscard]] bool depends_on_time() const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
+    bool collect_contact(const SmoothMotion& motion, double time, const ContactPoint& contact,
+                         UnilateralRows& rows) override;
     [[nodiscard]] std::optional<Vector3> prescribed_velocity(const ContactPoint& contact, double begin,
                                                              double t) const override;
     [[nodiscard]] double recovery_speed() const override;

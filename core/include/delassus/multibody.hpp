@@ -655,6 +655,8 @@ public:
                                            MatrixAssembler& H) const override;
     [[nodiscard]] bool has_unilateral() const override;
     void collect_unilateral(const State& state, double h, UnilateralRows& rows) override;
+    bool collect_contact(const SmoothMotion& motion, double time, const ContactPoint& contact,
+                         UnilateralRows& rows) override;
     [[nodiscard]] std::optional<Vector3> prescribed_velocity(const ContactPoint& contact, double begin,
                                                              double t) const override;
     /// A hundredth of √(g s), the speed that a fall through s gives but for a factor, s being the median size of the

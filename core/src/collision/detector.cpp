@@ -160,17 +160,16 @@ void Detector::collect_neighbours(std::int32_t shape, std::int32_t other,
             neighbours.push_back(&placed_[plane]);
 }
 
-void Detector::leave_out_covered(std::int32_t a, std::int32_t b, std::size_t first, Worker& by,
-                                 std::vector<ContactPoint>& contacts) const {
+void Detector::leave_out_covered(std::int32_t a, std::int32_t b, const Placed& placed_a, const Placed& placed_b,
+                                 std::size_t first, Worker& by, std::vector<ContactPoint>& contacts) const {
     if (contacts.size() == first || (has_neighbours_[a] == 0 && has_neighbours_[b] == 0)) return;
     collect_neighbours(a, b, by.of_a);
     collect_neighbours(b, a, by.of_b);
     if (by.of_a.empty() && by.of_b.empty()) return;
-    const Placed &of_a = placed_[a], &of_b = placed_[b];
     const auto covered = [&](const ContactPoint& contact) {
         const Vector3d normal = vector(contact.normal);
-        return is_covered(of_a, by.of_a, vector(contact.point_a), normal, of_b.solid->reach) ||
-               is_covered(of_b, by.of_b, vector(contact.point_b), -normal, of_a.solid->reach);
+        return is_covered(placed_a, by.of_a, vector(contact.point_a), normal, placed_b.solid->reach) ||
+               is_covered(placed_b, by.of_b, vector(contact.point_b), -normal, placed_a.solid->reach);
     };
     contacts.erase(std::remove_if(contacts.begin() + static_cast<std::ptrdiff_t>(first), contacts.end(), covered),
                    contacts.end());
@@ -187,19 +186,40 @@ void Detector::place(std::span<const Pose> poses) {
                 fmt::format("The pose of body {} is not finite or beyond 1e50 m, or its quaternion is zero.",
                             setup_.name_of(static_cast<std::int32_t>(i))));
     }
+    static const Pose origin;
+    static const Matrix3d identity = Matrix3d::Identity();
     for (std::size_t i = 0; i < placed_.size(); ++i) {
-        const Shape& shape = setup_.shapes[i];
-        Placed& placed = placed_[i];
-        placed.rotated = false;
-        if (shape.body < 0) {
-            placed.rotation = local_rotations_[i];
-            placed.position = vector(shape.pose.position);
-        } else {
-            const Matrix3d& rotation = body_rotations_[shape.body];
-            placed.rotation.noalias() = rotation * local_rotations_[i];
-            placed.position = vector(poses[shape.body].position) + rotation * vector(shape.pose.position);
-        }
+        const std::int32_t body = setup_.shapes[i].body;
+        place(static_cast<std::int32_t>(i), body < 0 ? origin : poses[body],
+              body < 0 ? identity : body_rotations_[body], placed_[i]);
     }
+}
+
+void Detector::place(std::int32_t shape, const Pose& pose, const Matrix3d& rotation, Placed& placed) const {
+    const Shape& own = setup_.shapes[shape];
+    placed.rotated = false;
+    if (own.body < 0) {
+        placed.rotation = local_rotations_[shape];
+        placed.position = vector(own.pose.position);
+    } else {
+        placed.rotation.noalias() = rotation * local_rotations_[shape];
+        placed.position = vector(pose.position) + rotation * vector(own.pose.position);
+    }
+}
+
+void Detector::detect_pair(std::int32_t shape_a, std::int32_t shape_b, const Pose& pose_a, const Pose& pose_b,
+                           double envelope, std::vector<ContactPoint>& contacts) {
+    const auto put = [this](std::int32_t shape, const Pose& pose, Placed& placed) {
+        Matrix3d rotation;
+        placed.solid = placed_[shape].solid;
+        placed.body = placed_[shape].body;
+        const bool known = rotation_of(pose.orientation, rotation) && is_measurable(vector(pose.position));
+        place(shape, pose, rotation, placed);
+        return known || setup_.shapes[shape].body < 0;
+    };
+    if (!put(shape_a, pose_a, one_) || !put(shape_b, pose_b, other_)) return;
+    if (workers_.empty()) workers_.resize(1);
+    collide_pair(shape_a, shape_b, one_, other_, {}, {}, envelope, workers_.front(), contacts);
 }
 
 void Detector::sweep(std::span<const Pose> poses, std::span<const BodyDisplacement> displacements) {
@@ -319,13 +339,18 @@ void Detector::collide_pairs(std::size_t first, std::size_t last, double envelop
                              std::vector<ContactPoint>& contacts) {
     for (std::size_t k = first; k < last; ++k) {
         const auto& [a, b] = pairs_[k];
-        const std::size_t before = contacts.size();
-        by.swept.collide(by.still, placed_[a], placed_[b], sweeps_[a], sweeps_[b], near_of(a, b, envelope), contacts);
-        leave_out_covered(a, b, before, by, contacts);
-        for (std::size_t i = before; i < contacts.size(); ++i) {
-            contacts[i].shape_a = a;
-            contacts[i].shape_b = b;
-        }
+        collide_pair(a, b, placed_[a], placed_[b], sweeps_[a], sweeps_[b], envelope, by, contacts);
+    }
+}
+
+void Detector::collide_pair(std::int32_t shape_a, std::int32_t shape_b, Placed& a, Placed& b, const Sweep& of_a,
+                            const Sweep& of_b, double envelope, Worker& by, std::vector<ContactPoint>& contacts) {
+    const std::size_t before = contacts.size();
+    by.swept.collide(by.still, a, b, of_a, of_b, near_of(shape_a, shape_b, envelope), contacts);
+    leave_out_covered(shape_a, shape_b, a, b, before, by, contacts);
+    for (std::size_t i = before; i < contacts.size(); ++i) {
+        contacts[i].shape_a = shape_a;
+        contacts[i].shape_b = shape_b;
     }
 }
 

@@ -12,9 +12,13 @@ public:
     explicit Detector(CollisionSetup setup);
     void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
                 const sdk::Team& team, std::span<const BodyDisplacement> displacements) override;
+    void detect_pair(std::int32_t shape_a, std::int32_t shape_b, const Pose& pose_a, const Pose& pose_b,
+                     double envelope, std::vector<ContactPoint>& contacts) override;
 
 private:
     void place(std::span<const Pose> poses);
+    /// A shape on a body in this pose.
+    void place(std::int32_t shape, const Pose& pose, const Matrix3d& rotation, Placed& placed) const;
     /// sweeps_ ← of the shapes.
     void sweep(std::span<const Pose> poses, std::span<const BodyDisplacement> displacements);
     void collide_pairs(double envelope, std::vector<ContactPoint>& contacts, const sdk::Team& team);
@@ -24,6 +28,9 @@ private:
         SweptPair swept;
         std::vector<const Placed*> of_a, of_b;  ///< neighbours of the pair's shapes
     };
+    /// Appends the contacts of two shapes so placed, which move so.
+    void collide_pair(std::int32_t shape_a, std::int32_t shape_b, Placed& a, Placed& b, const Sweep& of_a,
+                      const Sweep& of_b, double envelope, Worker& by, std::vector<ContactPoint>& contacts);
     /// Appends the contacts of pairs_[first] to pairs_[last − 1].
     void collide_pairs(std::size_t first, std::size_t last, double envelope, Worker& by,
                        std::vector<ContactPoint>& contacts);
@@ -44,13 +51,14 @@ private:
     /// Those of a shape that another one may touch.
     void collect_neighbours(std::int32_t shape, std::int32_t other, std::vector<const Placed*>& neighbours) const;
     /// Leaves out those of a pair's contacts from `first` on that neighbours cover.
-    void leave_out_covered(std::int32_t a, std::int32_t b, std::size_t first, Worker& by,
-                           std::vector<ContactPoint>& contacts) const;
+    void leave_out_covered(std::int32_t a, std::int32_t b, const Placed& placed_a, const Placed& placed_b,
+                           std::size_t first, Worker& by, std::vector<ContactPoint>& contacts) const;
 
     CollisionSetup setup_;
     std::vector<Solid> solids_;
     std::vector<Matrix3d> local_rotations_;
     std::vector<Placed> placed_;
+    Placed one_, other_;  ///< the shapes of detect_pair()
     std::vector<Sweep> sweeps_;
     std::vector<Matrix3d> body_rotations_;
     std::vector<std::int32_t> bounded_;     ///< shapes that are neither planes nor terrains

@@ -170,6 +170,9 @@ bool DynamicalSystem::has_unilateral() const {
     return false;
 }
 
+bool DynamicalSystem::collect_contact(const SmoothMotion&, double, const ContactPoint&, UnilateralRows&) {
+    return false;
+}
 void DynamicalSystem::collect_unilateral(const State&, double, UnilateralRows& rows) {
     rows.clear();
 }

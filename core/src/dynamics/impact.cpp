@@ -15,6 +15,9 @@ namespace delassus {
 // − e). What is left of the step after the last whole flight is t, and then u⁺ = eᵏ w + a' t and g⁺ = eᵏ w t + ½ a' t².
 // All flights together take F/(1 − e): if that is over within the step, the contact is at rest, u⁺ = g⁺ = 0.
 //
+// The corner of a body that spins has the acceleration a' + α, with α = Ḋ v beside that of its row at τ, until the end.
+// It stands in the place of a' above, and the row has α (h − τ) less of u⁺.
+//
 // One impulse that leads there from the motion with a changes the speed by u⁺ − (−s + a (h − τ)), and acts at the time
 // that gives the same g⁺:
 //
@@ -25,7 +28,8 @@ namespace delassus {
 //
 // What is flush meets everywhere at once. Where that is the end of the step, rounding lets one corner meet and not
 // another one, so that times within `rounding` of it count.
-std::optional<Impact> impact_within(double h, const Approach& approach, double after, double restitution) {
+std::optional<Impact> impact_within(double h, const Approach& approach, double after, double restitution,
+                                    double turning) {
     constexpr double rounding = 1e-9;
     const auto& [gap, speed, acceleration] = approach;
     const double square = speed * speed - 2.0 * acceleration * gap;
@@ -43,8 +47,10 @@ std::optional<Impact> impact_within(double h, const Approach& approach, double a
     impact.meets = std::min(impact.meets, h);
     const double rest = h - impact.meets;
     double left = rest, leaves = restitution * impact.closing;
-    if (after < 0.0) {
-        const double flight = 2.0 * leaves / -after;
+    const double curve = after + turning;
+    if (curve < 0.0) {
+        const double flight = 2.0 * leaves / -curve;
+        impact.again = flight < left;
         if (flight <= left * (1.0 - restitution)) {
             leaves = left = 0.0;
         } else if (flight < left) {
@@ -60,8 +66,8 @@ std::optional<Impact> impact_within(double h, const Approach& approach, double a
         }
     }
     impact.flight = left;
-    impact.end_speed = leaves + after * left;
-    const double end_gap = (leaves + 0.5 * after * left) * left;
+    impact.end_speed = leaves + curve * left - turning * rest;
+    const double end_gap = (leaves + 0.5 * curve * left) * left - 0.5 * turning * rest * rest;
     impact.change = impact.end_speed + impact.closing - acceleration * rest;
     const double alone = (-impact.closing + 0.5 * acceleration * rest) * rest;
     impact.acts =

@@ -563,8 +563,24 @@ void ThetaMethod::time_turns(StepSolver& solver, StepReport& report) {
 void ThetaMethod::time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report) {
     smooth_ = guess_;
     if (changes_[0].empty() && contacts_.may_strike()) smooth_ = without_impacts(begin, h, solver, report);
-    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, changes_[0], last_h_);
+    contacts_.time_meetings(problem_, {smooth_.data(), static_cast<std::size_t>(n_)}, curve_of_spins(begin, h),
+                            changes_[0], last_h_);
     timed_ = true;
+}
+
+// Through the speeds ω, ω½ and ω⁺ of a free spin at the beginning, the middle and the end runs the parabola with c = 2
+// (ω − 2 ω½ + ω⁺)/h².
+std::span<const double> ThetaMethod::curve_of_spins(const State& begin, double h) {
+    curve_.clear();
+    if (spins_.empty() || !contacts_.may_strike()) return curve_;
+    system_.free_spins(begin, 0.5 * h, half_spins_);
+    curve_.assign(static_cast<std::size_t>(n_), 0.0);
+    for (std::size_t k = 0; k < spins_.size(); ++k)
+        for (std::size_t i = 0; i < 3 && spins_[k].alone; ++i) {
+            const std::size_t column = static_cast<std::size_t>(spins_[k].column) + i;
+            curve_[column] = 2.0 * (begin.v[column] - 2.0 * half_spins_[k].speed[i] + spins_[k].speed[i]) / (h * h);
+        }
+    return curve_;
 }
 
 // Forces that depend on velocities are not the same before and after an impact. With the derivative −C of what they

@@ -84,6 +84,8 @@ private:
     [[nodiscard]] Vector without_impacts(const State& begin, double h, StepSolver& solver, StepReport& report);
     void time_turns(StepSolver& solver, StepReport& report);
     void time_meetings(const State& begin, double h, StepSolver& solver, StepReport& report);
+    /// SmoothMotion::curve of the step.
+    [[nodiscard]] std::span<const double> curve_of_spins(const State& begin, double h);
     [[nodiscard]] bool revise_impacts(double h);
     [[nodiscard]] bool go_on_after_bounces();
     void solve_once(const State& begin, double h, StepSolver& solver, StepReport& report);
@@ -123,7 +125,7 @@ private:
     std::vector<std::int32_t> stiff_;  ///< forces that the longest step does not resolve
     double longest_h_ = 0.0;
     std::vector<double> tensions_, tensions_at_theta_;
-    std::vector<FreeSpin> spins_, theta_spins_;
+    std::vector<FreeSpin> spins_, theta_spins_, half_spins_;
     TurningSpins turning_spins_;
     StruckSpins struck_spins_;
     /// What the last two steps changed velocities by, besides free spins, m/s² or rad/s²; n or empty. Linearly
@@ -131,6 +133,7 @@ private:
     std::array<std::vector<double>, 2> changes_;
     bool timed_ = false;                         // whether contacts got the times of their meetings in this step
     Vector smooth_;                              // the velocities at the end without impacts
+    std::vector<double> curve_;                  // SmoothMotion::curve of them, or empty
     Vector free_, guess_, force_, rate_;         // v or free spins; ṽ⁺; h f̃ there; C_q ṽ⁺ + C_t at the end
     Vector first_guess_;                         // ṽ⁺ before the first problem
     Vector solved_from_, solved_force_, delta_;  // ṽ⁺ and h f̃ of the last problem

@@ -57,10 +57,16 @@ namespace delassus {
 // parted, tangential rows have a F of u⁺ from forces alone, so that b_t = −a F leaves the law that of u_t at the
 // impact.
 //
-// A body that is struck at τ moves as it did until then, so that its open contacts close by what comes after: g + u⁻ τ
-// + (h − τ) u⁺ ≥ 0. One that is closed by this would bounce with a speed that the step does not know. A step with such
-// a contact is cut between the two impacts (StepReport::cut), and in the second part both bodies have the speeds with
-// which they meet.
+// What strikes gets D and the gap of that time from the system, which takes the bodies along v + (ṽ⁺ − v) t/h + c t (t
+// − h) until then, and τ follows from them (DynamicalSystem::collect_contact()). c is the curve of free spins: by w = c
+// τ (τ − h) a body spins otherwise at τ than the line from v to ṽ⁺ has it, so that u⁻ has D w more and the law is that
+// of D v⁺ − a F + D w. Then an impact errs by O(h³). Contacts that the system does not know by themselves (stops,
+// nodes) get D between those of the beginning and the middle.
+//
+// A body that is struck at τ moves as it did until then, so that its open contacts close by what comes after: g(τ) + (h
+// − τ) u⁺ ≥ 0, with D and the gap of τ. One that is closed by this would bounce with a speed that the step does not
+// know. A step with such a contact is cut between the two impacts (StepReport::cut), and in the second part both bodies
+// have the speeds with which they meet.
 //
 // Without restitution a contact strikes if it is faster at the beginning of the step than the step makes it, u⁻ < −|a|
 // h, with the largest a of the body in this step and the one before and of the surface. What is slower belongs to the
@@ -170,6 +176,7 @@ void VelocityContacts::collect(const State& begin, double h, double theta, doubl
     before_.measure_speeds_at(begin.v.data());
     rows_.measure_speeds_at(begin.v.data(), theta * h);
     system_.collect_unilateral(begin, h, before_);
+    begin_ = &begin;
     begin_speeds_ = begin.v.data();
     axes_.begin(begin_speeds_, theta * h, h);
     std::size_t row = 0;
@@ -435,7 +442,7 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                 b += in_middle - here + (1.0 - theta_) / theta_ * change;
             }
             if (i == 0) continue;
-            if (contact.impact) b -= contact.impact->flight * smooth_acceleration(problem, row);
+            if (contact.impact) b += contact.bow_of(i) - contact.impact->flight * smooth_acceleration(problem, row);
             squares += (here + b) * (here + b);
             if (settings_.once && contact.was_there)
                 along += (here + b) * before_.speed(contact.before + i, begin_speeds_);
@@ -604,13 +611,22 @@ void VelocityContacts::finish(const Problem& problem, const Solution& solution, 
         if (settings_.once && speed <= 0.25 * contact.change) continue;
         note_impact(rows_.blocks()[k], gap, contact.approach, contact.pushed, h_, settings_.restitution_speed, report);
     }
-    // What pushed until an impact alone does not push any more; a force between bounds is that after it.
+    const auto struck_alone = [&](std::size_t block) {
+        bool alone = true;
+        for_each_entry(problem.D, first_row_ + contacts_[block].row, 1,
+                       [&](std::size_t, std::size_t column, double) { alone = alone && on_velocities_[column].alone; });
+        return alone;
+    };
+    // What pushed until an impact alone does not push any more, nor what has bounced and is apart; a force between
+    // bounds is that after an impact.
     ended_.assign(lambda.begin() + static_cast<std::ptrdiff_t>(first_row_), lambda.end());
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const Contact& contact = contacts_[k];
         if (!contact.along_normal && contact.struck <= h_) {
             ended_[contact.row] = (ended_[contact.row] - contact.known[0]) * h_ / rest_after(contact.struck, h_);
-        } else if (contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0]) {
+        } else if ((contact.known[0] > 0.0 && ended_[contact.row] <= contact.known[0]) ||
+                   (acts(contact, solution) && restitution_of(k) > 0.0 && struck_alone(k) &&
+                    contact.impact->flight > 0.0)) {
             std::fill_n(ended_.begin() + static_cast<std::ptrdiff_t>(contact.row), rows_.blocks()[k].cone.rows, 0.0);
         }
     }

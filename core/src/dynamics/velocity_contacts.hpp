@@ -66,10 +66,10 @@ public:
     /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
     void take_out_open(Problem& problem) const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
-    /// the velocities at the end of the step without impacts, n. last_changes: accelerations of the step before, n or
-    /// empty. last_h: as of time_turns().
-    void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> last_changes,
-                       double last_h);
+    /// the velocities at the end of the step without impacts, n. curve: SmoothMotion::curve of them. last_changes:
+    /// accelerations of the step before, n or empty. last_h: as of time_turns(). Both outlive the step.
+    void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> curve,
+                       std::span<const double> last_changes, double last_h);
     /// Whether impacts lead to other speeds than in the first answer: since friction is to go on through them, or
     /// other forces change by `changes` from then on, n, N or N m, or empty. Then the problem is to be solved again.
     [[nodiscard]] bool revise_impacts(Problem& problem, const Solution& solution, std::span<const double> changes);
@@ -203,8 +203,11 @@ private:
         bool strikes = false;               ///< b is that of an impact
         std::optional<Impact> impact;       ///< it strikes at a time within the step
         Approach before_impact;             ///< until then
+        std::array<double, 3> bow{};        ///< what free spins add to the speeds of its rows when it strikes
+        double turning = 0.0;               ///< what the turn of its row adds to the acceleration of its gap
         double row_error = 0.0;             ///< of its rows then, as a share of their size
         double struck = HUGE_VAL;           ///< when an impact first strikes one of its bodies, if it has none itself
+        double gap_when_struck = 0.0;       ///< of an open one, ≥ 0
         std::array<double, 3> last{};       ///< its impulse in the step before, where it pushed
         bool impulsive = false;             ///< that is not of forces alone
         double goes_on = 0.0;               ///< after that impact, if all went on: of `last`
@@ -212,6 +215,7 @@ private:
         std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
 
         [[nodiscard]] double known_impulse(std::size_t i) const { return i < known.size() ? known[i] : 0.0; }
+        [[nodiscard]] double bow_of(std::size_t i) const { return i < bow.size() ? bow[i] : 0.0; }
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
         [[nodiscard]] bool forced() const { return approach <= 0.25 * change; }
@@ -234,7 +238,9 @@ private:
                                                             std::size_t block) const;
     /// error += what an impulse along a row that should not be there, or lacks, makes of positions, n.
     void add_error_of(double impulse, const SparseMatrix& D, std::size_t row, std::vector<double>& error) const;
-    [[nodiscard]] double turn_error(const SparseMatrix& D, const Contact& contact, bool known, double time) const;
+    /// What the rows of an impact are.
+    enum class RowsOf { Meeting, Between, Middle };
+    [[nodiscard]] double turn_error(const SparseMatrix& D, const Contact& contact, RowsOf rows, double time) const;
     [[nodiscard]] double work_of_block(std::size_t block, const Problem& problem, const Solution& solution,
                                        std::span<const double> mean) const;
     [[nodiscard]] double mean_rate(const Contact& contact, std::size_t i) const;
@@ -267,13 +273,17 @@ private:
     [[nodiscard]] LimitedServo find_servo(std::uint64_t key, const Before* before, const Contact& contact) const;
     [[nodiscard]] bool nearly_equal(std::size_t row, std::size_t before, std::int32_t rows) const;
     void take_rates_of_end(const Contact& contact, const UnilateralRows::Block& block);
-    /// Gives a block that is nearly as before the rows and rates that it has so long after the beginning, s; false if
-    /// that cannot be.
+    /// Gives a contact the rows and rates that it has so long after the beginning, s, if nothing strikes until then;
+    /// its gap there, or nothing if the system does not know.
+    [[nodiscard]] std::optional<double> collect_rows_at(double time, std::size_t block, Problem& problem);
+    /// The same by the rows at the beginning and in the middle, if it is nearly as before; false if that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);
-    /// Gives its rows the rates at that time after the beginning, s.
-    void set_rates_at(double time, std::size_t block);
+    /// Gives its rows the rates at that time after the beginning, s. point: where it is, or null.
+    void set_rates_at(double time, std::size_t block, const ContactPoint* point);
     /// Of a row of the problem besides impacts, m/s² or rad/s²; after time_meetings().
     [[nodiscard]] double smooth_acceleration(const Problem& problem, std::size_t row) const;
+    /// What SmoothMotion::curve adds to the speed of a row of the problem at that time after the beginning.
+    [[nodiscard]] double bow_at(const Problem& problem, std::size_t row, double time) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.
@@ -297,6 +307,7 @@ private:
     double h_ = 0.0, theta_ = 0.5, restitution_ = 1.0;
     UnilateralRows before_, rows_;     // at the beginning; at the point where D is taken
     UnilateralRows servos_;            // those of a step of size θ h, if there are any
+    UnilateralRows then_;              // those of a contact that strikes
     std::vector<double> compliances_;  // entries of E; of each block
     std::vector<Before> keys_;         // of before_, ascending
     double deepest_ = 0.0;             // the least gap of before_, ≤ 0
@@ -315,8 +326,10 @@ private:
     std::vector<double> impulsive_changes_;  // by what impulsive contacts change each velocity, by the diagonal of H
     std::vector<char> impulsive_;            // of each block
     KeptImpulses kept_;
-    const double* begin_speeds_ = nullptr;  // of the step; until its end
+    const State* begin_ = nullptr;          // of the step; until its end
+    const double* begin_speeds_ = nullptr;  // there
     const double* smooth_ = nullptr;        // velocities at the end without impacts; from time_meetings() on
+    std::span<const double> curve_;         // of them, SmoothMotion::curve
     std::size_t first_row_ = 0;             // in the problem
     std::vector<double> friction_reach_;
     bool held_through_bounces_ = false;  // friction or forces between bounds, until go_on_after_bounces()

@@ -65,6 +65,25 @@ void VelocityContacts::take_out_open(Problem& problem) const {
     if (compliant) problem.E.columns = problem.E.rows;
 }
 
+std::optional<double> VelocityContacts::collect_rows_at(double time, std::size_t block, Problem& problem) {
+    const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
+    if (block < first_contact ||
+        !system_.collect_contact({*begin_, smooth_, curve_, h_}, time, rows_.contacts()[block - first_contact], then_))
+        return std::nullopt;
+    Contact& contact = contacts_[block];
+    auto& D = problem.D;
+    const std::size_t first = first_row_ + contact.row;
+    const auto begin = static_cast<std::ptrdiff_t>(D.row_start[first]),
+               end = static_cast<std::ptrdiff_t>(
+                   D.row_start[first + static_cast<std::size_t>(rows_.blocks()[block].cone.rows)]);
+    if (!std::equal(D.column.begin() + begin, D.column.begin() + end, then_.column().begin(), then_.column().end()))
+        return std::nullopt;
+    std::copy(then_.value().begin(), then_.value().end(), D.value.begin() + begin);
+    contact.row_error = 0.0;
+    set_rates_at(time, block, &then_.contacts().front());
+    return then_.rows().front().gap;
+}
+
 // In a smooth motion rows change in proportion to time: with w = τ/(θ h) those at τ are (1 − w) D + w D̄, up to O(h²).
 // Beside an angular velocity ω, which has the axes of its body, rows turn with these: exp(−[ω] τ) D and exp([ω] (θ h −
 // τ)) D̄ stand in their place. What shapes meet on their way has rows of the meeting at the beginning. Rows that turn by
@@ -104,16 +123,17 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
         --e;
     }
     if (size > 0.0) contact.row_error = 0.5 * std::abs(share * (1.0 - share)) * change / size;
-    set_rates_at(time, block);
+    set_rates_at(time, block, nullptr);
     return true;
 }
 
 // Impacts are at an instant, whose rates are those of the prescribed motion then, where the contact is then.
-void VelocityContacts::set_rates_at(double time, std::size_t block) {
+void VelocityContacts::set_rates_at(double time, std::size_t block, const ContactPoint* found) {
     const Contact& contact = contacts_[block];
     const auto count = static_cast<std::size_t>(rows_.blocks()[block].cone.rows);
     const std::span rows = std::span(rows_.rows()).subspan(contact.row, count);
-    const std::span then = std::span(before_.rows()).subspan(contact.before, count);
+    const bool before = contact.was_there && (!found || contact.nearly_as_before || contact.met_on_the_way);
+    const std::span then = before ? std::span(before_.rows()).subspan(contact.before, count) : rows;
     const double share = time / (theta_ * h_);
     bool any = false;
     for (std::size_t i = 0; i < count; ++i) {
@@ -123,10 +143,11 @@ void VelocityContacts::set_rates_at(double time, std::size_t block) {
     const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
     if (!any || block < first_contact) return;
     const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
-    ContactPoint point = before_.contacts()[find_before(rows_.blocks()[block].key)->block - first_before];
+    ContactPoint point =
+        found ? *found : before_.contacts()[find_before(rows_.blocks()[block].key)->block - first_before];
     const ContactPoint& later = rows_.contacts()[block - first_contact];
     Eigen::Map<Eigen::Vector3d> normal(point.normal.data());
-    if (!point.on_the_way) {
+    if (!found && !point.on_the_way) {
         for (std::size_t i = 0; i < 3; ++i) {
             point.point_a[i] += share * (later.point_a[i] - point.point_a[i]);
             point.point_b[i] += share * (later.point_b[i] - point.point_b[i]);
@@ -153,10 +174,12 @@ void VelocityContacts::take_rates_of_end(const Contact& contact, const Unilatera
 // The turn of a row on the way to the meeting is an acceleration, too: (D̄ − D) v/(θ h). So is the change of its rate:
 // those of the beginning and of D̄ are θ h apart. The row of the meeting, which stays, meets at the same time from
 // another gap.
-void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth,
+void VelocityContacts::time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> curve,
                                      std::span<const double> last_changes, double last_h) {
-    constexpr double faint = 1e-9;
+    constexpr double faint = 1e-9, settled = 1e-4;
+    constexpr int most_attempts = 3;
     smooth_ = smooth.data();
+    curve_ = curve;
     if (takes_only_) return;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         const UnilateralRows::Block& block = rows_.blocks()[k];
@@ -192,33 +215,51 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         }
         const auto meeting_from = [&](double from, double begin, double turning) {
             contact.before_impact = {from, begin, acceleration() + turning};
-            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, restitution_of(k));
+            return impact_within(h_, contact.before_impact, contact.before_impact.acceleration, restitution_of(k),
+                                 contact.turning);
         };
         const double open = std::max(contact.gap, 0.0);
         const double turning =
             contact.met_on_the_way
                 ? 0.0
                 : pull + (block.speed + contact.approach - later.rate + earlier.rate) / (theta_ * h_);
+        contact.turning = bounces ? turning : 0.0;
         const auto meeting = meeting_from(open, speed, turning);
         const double time = meeting ? meeting->meets : h_;
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
         std::optional<Impact> impact;
-        const bool known = take_rows_at(time, k, problem);
-        if (known) {
-            speed = speed_of(begin_speeds_);
-            gap = left - (speed + 0.5 * acceleration() * time) * time;
+        const auto take_rows = [&](double then, double gap_then) {
+            speed = speed_of(begin_speeds_) + bow_at(problem, first_row_ + contact.row, then);
+            gap = gap_then - (speed + 0.5 * acceleration() * then) * then;
             if (meeting) impact = meeting_from(std::max(gap, 0.0), speed, 0.0);
             contact.turns = false;
-        } else {
-            impact = meeting_from(open, block.speed, 0.0);
+        };
+        auto rows = RowsOf::Middle;
+        double then = time;
+        const bool may_strike = meeting && (bounces ? meeting->closing > slowest : strikes());
+        for (int attempt = 0; may_strike && attempt < most_attempts; ++attempt) {
+            const auto gap_then = collect_rows_at(then, k, problem);
+            if (!gap_then) break;
+            rows = RowsOf::Meeting;
+            take_rows(then, *gap_then);
+            if (!impact || std::abs(impact->meets - then) <= settled * h_) break;
+            then = impact->meets;
         }
+        if (rows == RowsOf::Middle && take_rows_at(time, k, problem)) {
+            rows = RowsOf::Between;
+            take_rows(time, left);
+        }
+        if (rows == RowsOf::Middle) impact = meeting_from(open, block.speed, 0.0);
         const double drift = (1.0 - theta_) * h_ * speed;
         if (impact && (bounces ? impact->closing > slowest : strikes())) {
             contact.impact = impact;
-            contact.row_error += turn_error(problem.D, contact, known, time);
+            contact.row_error += turn_error(problem.D, contact, rows, then);
+            if (impact->again) contact.row_error += std::abs(contact.turning) * (h_ - impact->meets) / impact->change;
             contact.strikes = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;
-            contact.normal = -impact->end_speed;
+            for (std::size_t i = 0; i < std::min<std::size_t>(block.cone.rows, contact.bow.size()); ++i)
+                contact.bow[i] = bow_at(problem, first_row_ + contact.row + i, impact->meets);
+            contact.normal = contact.bow[0] - impact->end_speed;
             contact.recovery = 0.0;
         } else if (gap > 0.0 && (!bounces || strikes())) {
             contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_) - (bounces ? speed : 0.0);
@@ -228,9 +269,10 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
     find_struck(problem, last_h);
 }
 
-// As a share of the size of its rows. Bodies are taken to spin as they do at the beginning: by ½ |ω̇| τ² they are turned
-// otherwise after the time τ. Rows that are those of the middle instead are off by all of the turn in between.
-double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contact, bool known, double time) const {
+// As a share of the size of its rows. Where a body is at the time τ is known but for O(τ³), ¼ h |ω| |ω̇| τ² of its turn.
+// Rows between those of the beginning and the middle take it to spin as it does at the beginning: by ½ |ω̇| τ² it is
+// turned otherwise. Rows that are those of the middle instead are off by all of the turn in between.
+double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contact, RowsOf rows, double time) const {
     const std::size_t row = first_row_ + contact.row;
     const auto end = static_cast<std::size_t>(D.row_start[row + 1]);
     double change = 0.0, size = 0.0;
@@ -240,14 +282,21 @@ double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contac
         if (!axes_.at(D.column, e, end)) continue;
         using Vector = Eigen::Map<const Eigen::Vector3d>;
         const Vector begin(begin_speeds_ + column), smooth(smooth_ + column), arm(&D.value[e]), H(&diagonal_[column]);
-        const double angle = 0.5 * time * time * (smooth - begin).norm() / h_ +
-                             (known ? 0.0 : std::abs(time - theta_ * h_) * begin.norm());
+        const double spin_up = 0.5 * time * time * (smooth - begin).norm() / h_;
+        const double angle = rows == RowsOf::Meeting   ? 0.5 * h_ * begin.norm() * spin_up
+                             : rows == RowsOf::Between ? spin_up
+                                                       : spin_up + std::abs(time - theta_ * h_) * begin.norm();
         const double square = arm.cwiseAbs2().cwiseQuotient(H).sum();
         change += angle * angle * square;
         size += square - D.value[e] * D.value[e] / diagonal_[column];
         e += 2;
     }
     return size > 0.0 ? std::sqrt(change / size) : 0.0;
+}
+
+double VelocityContacts::bow_at(const Problem& problem, std::size_t row, double time) const {
+    if (curve_.empty()) return 0.0;
+    return time * (time - h_) * problem.D.row_times(static_cast<std::int32_t>(row), curve_.data());
 }
 
 double VelocityContacts::smooth_acceleration(const Problem& problem, std::size_t row) const {
@@ -272,9 +321,9 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
                 change += value * changes[column] / diagonal_[column];
             });
         if (!(-change * (h_ - contact.impact->meets) > faint * contact.impact->closing)) continue;
-        contact.impact =
-            impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change, restitution_of(k));
-        contact.normal = -contact.impact->end_speed;
+        contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change,
+                                       restitution_of(k), contact.turning);
+        contact.normal = contact.bow[0] - contact.impact->end_speed;
         any = true;
     }
     if (largest == 0.0) return any;
@@ -295,7 +344,7 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
     return any;
 }
 
-// An open contact of a body that something strikes at τ closes by what that leaves: b = (g + u⁻ τ)/(h − τ), but no less
+// An open contact of a body that something strikes at τ closes by what that leaves: b = g(τ)/(h − τ), but no less
 // than u⁻: where the contact opens at first, its work P (u⁻ + u⁺)/2 would gain energy.
 //
 // One that pushed goes on as it did until τ, whether the impact opens it or not: with the impulse P₋ of the step
@@ -350,8 +399,13 @@ void VelocityContacts::find_struck(Problem& problem, double last_h) {
                         [&](std::size_t column) { contact.struck = std::min(contact.struck, struck_[column]); });
         if (!(contact.struck <= h_)) continue;
         if (!contact.pushed && !between_bounds) {
-            const double then = std::max(gap - contact.approach * contact.struck, 0.0);
-            contact.normal = std::max(then / rest_after(contact.struck, h_), -contact.approach);
+            const auto found = collect_rows_at(contact.struck, k, problem);
+            const double speed =
+                found ? problem.D.row_times(static_cast<std::int32_t>(first_row_ + contact.row), begin_speeds_) +
+                            rows_.rows()[contact.row].rate
+                      : -contact.approach;
+            contact.gap_when_struck = std::max(found.value_or(gap - contact.approach * contact.struck), 0.0);
+            contact.normal = std::max(contact.gap_when_struck / rest_after(contact.struck, h_), speed);
             continue;
         }
         if (between_bounds) {
@@ -398,9 +452,7 @@ std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(co
     const double share = contact.impact ? 1.0 : restitution_of(block);
     if (contact.pushed || !(struck < h_) || share == 0.0 || !(solution.lambda[row] > 0.0) || !(closing > 0.0))
         return std::nullopt;
-    const double meets = contact.impact
-                             ? contact.impact->meets
-                             : struck + std::max(contact.resolved_gap() - contact.approach * struck, 0.0) / closing;
+    const double meets = contact.impact ? contact.impact->meets : struck + contact.gap_when_struck / closing;
     if (!(meets < h_) || meets - struck < least_part * h_) return std::nullopt;
     const double own = mobility_of(problem.D, diagonal_, row);
     const bool is_loaded = std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {

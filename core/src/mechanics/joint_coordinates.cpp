@@ -71,6 +71,8 @@ struct JointCoordinates::Implementation {
     // One for each matrix of the bodies, so that its pattern lasts from call to call.
     MatrixAssembler stiffness, damping, gyroscopic, pull_of_rows, rows, joint_rows;
     UnilateralRows body_rows;
+    State then;  // of collect_contact()
+    std::vector<double> way_then;
     std::vector<FreeSpin> body_spins;
     struct Loaded {
         std::size_t link;
@@ -90,6 +92,25 @@ struct JointCoordinates::Implementation {
     /// A body that a free joint holds and that carries none: its gyroscopic torque is that of free_spins().
     [[nodiscard]] bool spins_alone(std::size_t k) const {
         return tree.links()[k].kind == LinkJoint::Free && tree.links()[k].leaf;
+    }
+
+    /// own ← body_rows in joint coordinates.
+    void project_body_rows(UnilateralRows& own) {
+        own.clear();
+        std::size_t row = 0;
+        for (const auto& block : body_rows.blocks()) {
+            for (std::int32_t i = 0; i < block.cone.rows; ++i, ++row) {
+                const auto begin = static_cast<std::size_t>(body_rows.row_start()[row]),
+                           end = static_cast<std::size_t>(body_rows.row_start()[row + 1]);
+                project_row(body_rows.column().subspan(begin, end - begin),
+                            body_rows.value().subspan(begin, end - begin));
+                for (const auto& [column, value] : entries) own.entry(column, value);
+                const auto& of_bodies = body_rows.rows()[row];
+                own.end_row(of_bodies.gap, of_bodies.rate, of_bodies.rate_now);
+            }
+            own.end_block(block.cone, block.key, block.restitution, block.compliance);
+        }
+        own.contacts() = body_rows.contacts();
     }
 
     void place(const State& at) {
@@ -707,20 +728,22 @@ void JointCoordinates::collect_unilateral(const State& state, double h, Unilater
     auto& self = *implementation_;
     self.place(state);
     self.bodies.collect_unilateral(self.state, h, self.body_rows);
-    rows.clear();
-    const auto& from = self.body_rows;
-    std::size_t row = 0;
-    for (const auto& block : from.blocks()) {
-        for (std::int32_t i = 0; i < block.cone.rows; ++i, ++row) {
-            const auto begin = static_cast<std::size_t>(from.row_start()[row]),
-                       end = static_cast<std::size_t>(from.row_start()[row + 1]);
-            self.project_row(from.column().subspan(begin, end - begin), from.value().subspan(begin, end - begin));
-            for (const auto& [column, value] : self.entries) rows.entry(column, value);
-            rows.end_row(from.rows()[row].gap, from.rows()[row].rate, from.rows()[row].rate_now);
-        }
-        rows.end_block(block.cone, block.key, block.restitution, block.compliance);
-    }
-    rows.contacts() = from.contacts();
+    self.project_body_rows(rows);
+}
+
+bool JointCoordinates::collect_contact(const SmoothMotion& motion, double time, const ContactPoint& contact,
+                                       UnilateralRows& rows) {
+    auto& self = *implementation_;
+    self.then = motion.begin;
+    self.way_then.resize(motion.begin.v.size());
+    for (std::size_t i = 0; i < self.way_then.size(); ++i) self.way_then[i] = motion.way(i, time);
+    increment(motion.begin.q.data(), self.way_then.data(), self.then.q.data());
+    self.then.t += time;
+    self.place(self.then);
+    const SmoothMotion still{self.state, self.state.v.data(), {}, motion.h};
+    if (!self.bodies.collect_contact(still, 0.0, contact, self.body_rows)) return false;
+    self.project_body_rows(rows);
+    return true;
 }
 
 std::optional<Vector3> JointCoordinates::prescribed_velocity(const ContactPoint& contact, double begin,

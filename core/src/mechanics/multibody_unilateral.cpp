@@ -117,6 +117,47 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     if (self.mesh_touching) self.collect_mesh_contacts(state, h, rows);
 }
 
+bool MultibodySystem::collect_contact(const SmoothMotion& motion, double time, const ContactPoint& contact,
+                                      UnilateralRows& rows) {
+    constexpr double same_side = 0.5;  // cosine
+    auto& self = *implementation_;
+    rows.clear();
+    if (!self.detector) return false;
+    const auto place = [&](std::int32_t shape, Pose& pose) {
+        const std::int32_t owner = self.owner_of(shape);
+        if (owner == world_body) return true;
+        if (owner >= static_cast<std::int32_t>(self.bodies.size())) return false;
+        auto& at = self.at[owner];
+        const auto& body = self.bodies[static_cast<std::size_t>(owner)];
+        if (body.column >= 0) {
+            const auto column = static_cast<std::size_t>(body.column);
+            const auto way = [&](std::size_t i) { return motion.way(column + i, time); };
+            const double* q = motion.begin.q.data() + body.position;
+            const mechanics::Quaterniond turned =
+                mechanics::Quaterniond(q[3], q[4], q[5], q[6]) * mechanics::exponential({way(3), way(4), way(5)});
+            at.x = Vector3d(q[0] + way(0), q[1] + way(1), q[2] + way(2));
+            at.A = turned.toRotationMatrix();
+            pose = {mechanics::array(at.x), {turned.w(), turned.x(), turned.y(), turned.z()}};
+        } else if (body.prescribed) {
+            body.prescribed->place(motion.begin.t + time, at);
+            pose = body.prescribed->pose(motion.begin.t + time);
+        } else {
+            pose = body.parameters.pose;
+        }
+        return true;
+    };
+    Pose pose_a, pose_b;
+    if (!place(contact.shape_a, pose_a) || !place(contact.shape_b, pose_b)) return false;
+    auto& points = rows.contacts();
+    self.detector->detect_pair(contact.shape_a, contact.shape_b, pose_a, pose_b, self.envelope, points);
+    std::erase_if(points, [&](const ContactPoint& point) {
+        return point.feature != contact.feature || !(vector(point.normal).dot(vector(contact.normal)) > same_side);
+    });
+    if (points.size() != 1) return false;
+    self.collect_contacts(motion.h, rows);
+    return true;
+}
+
 void MultibodySystem::Implementation::place_for_step(const State& state, double h) {
     place(state);
     if (!prescribed.empty()) at_state = at;
