@@ -269,9 +269,10 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
     find_struck(problem, last_h);
 }
 
-// As a share of the size of its rows. Where a body is at the time τ is known but for O(τ³), ¼ h |ω| |ω̇| τ² of its turn.
-// Rows between those of the beginning and the middle take it to spin as it does at the beginning: by ½ |ω̇| τ² it is
-// turned otherwise. Rows that are those of the middle instead are off by all of the turn in between.
+// As a share of the size of its rows. Where a body is at the time τ and how it spins is known but for O(τ³), ¼ h |ω|
+// |ω̇| τ² of its turn, if it spins by itself. Else its spin is off by as much as where rows between those of the
+// beginning and the middle take it to spin as it does at the beginning: by ½ |ω̇| τ² it is turned otherwise. Rows that
+// are those of the middle instead are off by all of the turn in between.
 double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contact, RowsOf rows, double time) const {
     const std::size_t row = first_row_ + contact.row;
     const auto end = static_cast<std::size_t>(D.row_start[row + 1]);
@@ -283,9 +284,10 @@ double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contac
         using Vector = Eigen::Map<const Eigen::Vector3d>;
         const Vector begin(begin_speeds_ + column), smooth(smooth_ + column), arm(&D.value[e]), H(&diagonal_[column]);
         const double spin_up = 0.5 * time * time * (smooth - begin).norm() / h_;
-        const double angle = rows == RowsOf::Meeting   ? 0.5 * h_ * begin.norm() * spin_up
-                             : rows == RowsOf::Between ? spin_up
-                                                       : spin_up + std::abs(time - theta_ * h_) * begin.norm();
+        const bool curved = !curve_.empty() && !Vector(curve_.data() + column).isZero(0.0);
+        const double angle = rows == RowsOf::Middle              ? spin_up + std::abs(time - theta_ * h_) * begin.norm()
+                             : rows == RowsOf::Meeting && curved ? 0.5 * h_ * begin.norm() * spin_up
+                                                                 : spin_up;
         const double square = arm.cwiseAbs2().cwiseQuotient(H).sum();
         change += angle * angle * square;
         size += square - D.value[e] * D.value[e] / diagonal_[column];
