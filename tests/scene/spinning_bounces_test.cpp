@@ -150,10 +150,10 @@ TEST(SpinningBounces, AnImpactErrsByTheCubeOfTheStep) {
         const auto [v, omega] = run.velocities("a");
         return std::pair(vector(v), vector(omega));
     };
-    for (const std::string shape : {"box: {size: [0.15, 0.1, 0.05]}", "cylinder: {radius: 0.04, length: 0.15}",
-                                    "convex: {points: [[0.09, 0.01, 0], [-0.09, -0.01, 0], [0, 0.05, 0.02], [0, -0.05, "
-                                    "-0.02], [0.01, 0, 0.04], [-0.01, "
-                                    "0, -0.04]]}"}) {
+    for (const std::string shape :
+         {"box: {size: [0.15, 0.1, 0.05]}", "cylinder: {radius: 0.04, length: 0.15}",
+          "convex: {points: [[0.09, 0.01, 0], [-0.09, -0.01, 0], [0, 0.05, 0.02], [0, -0.05, -0.02], "
+          "[0.01, 0, 0.04], [-0.01, 0, -0.04]]}"}) {
         SCOPED_TRACE(shape);
         const auto [v, omega] = velocities_after(shape, 1e-4);
         for (const double h : {0.012, 0.008, 0.004}) {

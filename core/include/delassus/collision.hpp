@@ -78,7 +78,7 @@ public:
     virtual void detect(std::span<const Pose> poses, double envelope, std::vector<ContactPoint>& contacts,
                         const sdk::Team& team = {}, std::span<const BodyDisplacement> displacements = {}) = 0;
 
-    /// Appends the points of two shapes alone, nearer than envelope, whose bodies have these poses (of the world: any),
+    /// Appends the points of two shapes alone, nearer than envelope, whose bodies have these poses (the world: Pose{}),
     /// while all others are where the last detection had them.
     virtual void detect_pair(std::int32_t shape_a, std::int32_t shape_b, const Pose& pose_a, const Pose& pose_b,
                              double envelope, std::vector<ContactPoint>& contacts) = 0;

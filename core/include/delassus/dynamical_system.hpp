@@ -283,8 +283,8 @@ public:
     /// The rows that may become active within a step of size h.
     virtual void collect_unilateral(const State& state, double h, UnilateralRows& rows);
     /// rows ← the block and the point of a contact alone, one of those that collect_unilateral() gave in this step, so
-    /// long after the beginning of such a motion; of rates nothing. False where the system does not know it there, the
-    /// default.
+    /// long after the beginning of such a motion; of rates Row::rate_now counts. False where the system does not know
+    /// it there, the default.
     virtual bool collect_contact(const SmoothMotion& motion, double time, const ContactPoint& contact,
                                  UnilateralRows& rows);
     /// The velocity at the time t of the point of a contact's shape_b, as far as it is prescribed, less that of

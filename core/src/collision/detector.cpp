@@ -186,36 +186,31 @@ void Detector::place(std::span<const Pose> poses) {
                 fmt::format("The pose of body {} is not finite or beyond 1e50 m, or its quaternion is zero.",
                             setup_.name_of(static_cast<std::int32_t>(i))));
     }
-    static const Pose origin;
-    static const Matrix3d identity = Matrix3d::Identity();
     for (std::size_t i = 0; i < placed_.size(); ++i) {
-        const std::int32_t body = setup_.shapes[i].body;
-        place(static_cast<std::int32_t>(i), body < 0 ? origin : poses[body],
-              body < 0 ? identity : body_rotations_[body], placed_[i]);
+        const auto shape = static_cast<std::int32_t>(i);
+        if (const std::int32_t body = setup_.shapes[i].body; body < 0) {
+            place(shape, {}, Matrix3d::Identity(), placed_[i]);
+        } else {
+            place(shape, poses[body], body_rotations_[body], placed_[i]);
+        }
     }
 }
 
 void Detector::place(std::int32_t shape, const Pose& pose, const Matrix3d& rotation, Placed& placed) const {
-    const Shape& own = setup_.shapes[shape];
     placed.rotated = false;
-    if (own.body < 0) {
-        placed.rotation = local_rotations_[shape];
-        placed.position = vector(own.pose.position);
-    } else {
-        placed.rotation.noalias() = rotation * local_rotations_[shape];
-        placed.position = vector(pose.position) + rotation * vector(own.pose.position);
-    }
+    placed.rotation.noalias() = rotation * local_rotations_[shape];
+    placed.position = vector(pose.position) + rotation * vector(setup_.shapes[shape].pose.position);
 }
 
 void Detector::detect_pair(std::int32_t shape_a, std::int32_t shape_b, const Pose& pose_a, const Pose& pose_b,
                            double envelope, std::vector<ContactPoint>& contacts) {
     const auto put = [this](std::int32_t shape, const Pose& pose, Placed& placed) {
         Matrix3d rotation;
+        if (!rotation_of(pose.orientation, rotation) || !is_measurable(vector(pose.position))) return false;
         placed.solid = placed_[shape].solid;
         placed.body = placed_[shape].body;
-        const bool known = rotation_of(pose.orientation, rotation) && is_measurable(vector(pose.position));
         place(shape, pose, rotation, placed);
-        return known || setup_.shapes[shape].body < 0;
+        return true;
     };
     if (!put(shape_a, pose_a, one_) || !put(shape_b, pose_b, other_)) return;
     if (workers_.empty()) workers_.resize(1);

@@ -442,7 +442,8 @@ void VelocityContacts::set_b(Problem& problem, const Solution& solution, std::sp
                 b += in_middle - here + (1.0 - theta_) / theta_ * change;
             }
             if (i == 0) continue;
-            if (contact.impact) b += contact.bow_of(i) - contact.impact->flight * smooth_acceleration(problem, row);
+            if (contact.impact)
+                b += contact.deviation_of(i) - contact.impact->flight * smooth_acceleration(problem, row);
             squares += (here + b) * (here + b);
             if (settings_.once && contact.was_there)
                 along += (here + b) * before_.speed(contact.before + i, begin_speeds_);

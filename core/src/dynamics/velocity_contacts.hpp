@@ -67,7 +67,7 @@ public:
     void take_out_open(Problem& problem) const;
     /// Before set_b(): contacts that meet within the step get the rows of that time, and strike then. smooth:
     /// the velocities at the end of the step without impacts, n. curve: SmoothMotion::curve of them. last_changes:
-    /// accelerations of the step before, n or empty. last_h: as of time_turns(). Both outlive the step.
+    /// accelerations of the step before, n or empty. last_h: as of time_turns(). smooth and curve outlive the step.
     void time_meetings(Problem& problem, std::span<const double> smooth, std::span<const double> curve,
                        std::span<const double> last_changes, double last_h);
     /// Whether impacts lead to other speeds than in the first answer: since friction is to go on through them, or
@@ -203,7 +203,7 @@ private:
         bool strikes = false;               ///< b is that of an impact
         std::optional<Impact> impact;       ///< it strikes at a time within the step
         Approach before_impact;             ///< until then
-        std::array<double, 3> bow{};        ///< what free spins add to the speeds of its rows when it strikes
+        std::array<double, 3> deviation{};  ///< of the speeds of its rows when it strikes: deviation_at()
         double turning = 0.0;               ///< what the turn of its row adds to the acceleration of its gap
         double row_error = 0.0;             ///< of its rows then, as a share of their size
         double struck = HUGE_VAL;           ///< when an impact first strikes one of its bodies, if it has none itself
@@ -215,7 +215,7 @@ private:
         std::array<double, 3> known{};      ///< of this step's, until an impact or until friction turned round
 
         [[nodiscard]] double known_impulse(std::size_t i) const { return i < known.size() ? known[i] : 0.0; }
-        [[nodiscard]] double bow_of(std::size_t i) const { return i < bow.size() ? bow[i] : 0.0; }
+        [[nodiscard]] double deviation_of(std::size_t i) const { return i < deviation.size() ? deviation[i] : 0.0; }
         /// Its impulse comes from forces, not from the speed with which it closes: less than a quarter of the change is
         /// due to that. Of a contact that pushes.
         [[nodiscard]] bool forced() const { return approach <= 0.25 * change; }
@@ -278,12 +278,12 @@ private:
     [[nodiscard]] std::optional<double> collect_rows_at(double time, std::size_t block, Problem& problem);
     /// The same by the rows at the beginning and in the middle, if it is nearly as before; false if that cannot be.
     bool take_rows_at(double time, std::size_t block, Problem& problem);
-    /// Gives its rows the rates at that time after the beginning, s. point: where it is, or null.
-    void set_rates_at(double time, std::size_t block, const ContactPoint* point);
+    /// Gives its rows the rates at that time after the beginning, s.
+    void set_rates_at(double time, std::size_t block);
     /// Of a row of the problem besides impacts, m/s² or rad/s²; after time_meetings().
     [[nodiscard]] double smooth_acceleration(const Problem& problem, std::size_t row) const;
     /// What SmoothMotion::curve adds to the speed of a row of the problem at that time after the beginning.
-    [[nodiscard]] double bow_at(const Problem& problem, std::size_t row, double time) const;
+    [[nodiscard]] double deviation_at(const Problem& problem, std::size_t row, double time) const;
     void report_closing(const Contact& contact, StepReport& report) const;
     void set_normal(const UnilateralRows::Block& block, Contact& contact, double middle_speed) const;
     /// Contact::struck, and what follows for b and for what pushes.

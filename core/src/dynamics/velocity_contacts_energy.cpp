@@ -28,8 +28,8 @@ double VelocityContacts::work_of_block(std::size_t block, const Problem& problem
         if (contact.impact && i == 0) {
             speed = 0.5 * contact.impact->change - contact.impact->closing;
         } else if (contact.impact) {
-            speed += contact.bow_of(i) + 0.5 * (contact.impact->meets - contact.impact->flight) *
-                                             smooth_acceleration(problem, first_row_ + row);
+            speed += contact.deviation_of(i) + 0.5 * (contact.impact->meets - contact.impact->flight) *
+                                                   smooth_acceleration(problem, first_row_ + row);
         }
         sum += impulse * speed;
     }

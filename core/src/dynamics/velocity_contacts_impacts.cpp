@@ -70,17 +70,17 @@ std::optional<double> VelocityContacts::collect_rows_at(double time, std::size_t
     if (block < first_contact ||
         !system_.collect_contact({*begin_, smooth_, curve_, h_}, time, rows_.contacts()[block - first_contact], then_))
         return std::nullopt;
-    Contact& contact = contacts_[block];
     auto& D = problem.D;
-    const std::size_t first = first_row_ + contact.row;
+    const std::size_t first = first_row_ + contacts_[block].row;
     const auto begin = static_cast<std::ptrdiff_t>(D.row_start[first]),
                end = static_cast<std::ptrdiff_t>(
                    D.row_start[first + static_cast<std::size_t>(rows_.blocks()[block].cone.rows)]);
     if (!std::equal(D.column.begin() + begin, D.column.begin() + end, then_.column().begin(), then_.column().end()))
         return std::nullopt;
     std::copy(then_.value().begin(), then_.value().end(), D.value.begin() + begin);
-    contact.row_error = 0.0;
-    set_rates_at(time, block, &then_.contacts().front());
+    contacts_[block].row_error = 0.0;
+    for (std::size_t i = 0; i < then_.rows().size(); ++i)
+        rows_.rows()[contacts_[block].row + i].rate = then_.rows()[i].rate_now;
     return then_.rows().front().gap;
 }
 
@@ -123,17 +123,16 @@ bool VelocityContacts::take_rows_at(double time, std::size_t block, Problem& pro
         --e;
     }
     if (size > 0.0) contact.row_error = 0.5 * std::abs(share * (1.0 - share)) * change / size;
-    set_rates_at(time, block, nullptr);
+    set_rates_at(time, block);
     return true;
 }
 
 // Impacts are at an instant, whose rates are those of the prescribed motion then, where the contact is then.
-void VelocityContacts::set_rates_at(double time, std::size_t block, const ContactPoint* found) {
+void VelocityContacts::set_rates_at(double time, std::size_t block) {
     const Contact& contact = contacts_[block];
     const auto count = static_cast<std::size_t>(rows_.blocks()[block].cone.rows);
     const std::span rows = std::span(rows_.rows()).subspan(contact.row, count);
-    const bool before = contact.was_there && (!found || contact.nearly_as_before || contact.met_on_the_way);
-    const std::span then = before ? std::span(before_.rows()).subspan(contact.before, count) : rows;
+    const std::span then = std::span(before_.rows()).subspan(contact.before, count);
     const double share = time / (theta_ * h_);
     bool any = false;
     for (std::size_t i = 0; i < count; ++i) {
@@ -143,11 +142,10 @@ void VelocityContacts::set_rates_at(double time, std::size_t block, const Contac
     const std::size_t first_contact = rows_.blocks().size() - rows_.contacts().size();
     if (!any || block < first_contact) return;
     const std::size_t first_before = before_.blocks().size() - before_.contacts().size();
-    ContactPoint point =
-        found ? *found : before_.contacts()[find_before(rows_.blocks()[block].key)->block - first_before];
+    ContactPoint point = before_.contacts()[find_before(rows_.blocks()[block].key)->block - first_before];
     const ContactPoint& later = rows_.contacts()[block - first_contact];
     Eigen::Map<Eigen::Vector3d> normal(point.normal.data());
-    if (!found && !point.on_the_way) {
+    if (!point.on_the_way) {
         for (std::size_t i = 0; i < 3; ++i) {
             point.point_a[i] += share * (later.point_a[i] - point.point_a[i]);
             point.point_b[i] += share * (later.point_b[i] - point.point_b[i]);
@@ -229,7 +227,7 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         const double left = meeting ? 0.0 : open + (speed + 0.5 * (acceleration() + turning) * h_) * h_;
         std::optional<Impact> impact;
         const auto take_rows = [&](double then, double gap_then) {
-            speed = speed_of(begin_speeds_) + bow_at(problem, first_row_ + contact.row, then);
+            speed = speed_of(begin_speeds_) + deviation_at(problem, first_row_ + contact.row, then);
             gap = gap_then - (speed + 0.5 * acceleration() * then) * then;
             if (meeting) impact = meeting_from(std::max(gap, 0.0), speed, 0.0);
             contact.turns = false;
@@ -257,9 +255,9 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
             if (impact->again) contact.row_error += std::abs(contact.turning) * (h_ - impact->meets) / impact->change;
             contact.strikes = !contact.pushed || gap > 0.0;
             contact.turns = contact.turns && contact.pushed;
-            for (std::size_t i = 0; i < std::min<std::size_t>(block.cone.rows, contact.bow.size()); ++i)
-                contact.bow[i] = bow_at(problem, first_row_ + contact.row + i, impact->meets);
-            contact.normal = contact.bow[0] - impact->end_speed;
+            for (std::size_t i = 0; i < std::min<std::size_t>(block.cone.rows, contact.deviation.size()); ++i)
+                contact.deviation[i] = deviation_at(problem, first_row_ + contact.row + i, impact->meets);
+            contact.normal = contact.deviation[0] - impact->end_speed;
             contact.recovery = 0.0;
         } else if (gap > 0.0 && (!bounces || strikes())) {
             contact.normal = std::max(gap + drift, 0.0) / (theta_ * h_) - (bounces ? speed : 0.0);
@@ -296,7 +294,7 @@ double VelocityContacts::turn_error(const SparseMatrix& D, const Contact& contac
     return size > 0.0 ? std::sqrt(change / size) : 0.0;
 }
 
-double VelocityContacts::bow_at(const Problem& problem, std::size_t row, double time) const {
+double VelocityContacts::deviation_at(const Problem& problem, std::size_t row, double time) const {
     if (curve_.empty()) return 0.0;
     return time * (time - h_) * problem.D.row_times(static_cast<std::int32_t>(row), curve_.data());
 }
@@ -325,7 +323,7 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
         if (!(-change * (h_ - contact.impact->meets) > faint * contact.impact->closing)) continue;
         contact.impact = impact_within(h_, contact.before_impact, contact.before_impact.acceleration + change,
                                        restitution_of(k), contact.turning);
-        contact.normal = contact.bow[0] - contact.impact->end_speed;
+        contact.normal = contact.deviation[0] - contact.impact->end_speed;
         any = true;
     }
     if (largest == 0.0) return any;

@@ -140,6 +140,7 @@ bool MultibodySystem::collect_contact(const SmoothMotion& motion, double time, c
             pose = {mechanics::array(at.x), {turned.w(), turned.x(), turned.y(), turned.z()}};
         } else if (body.prescribed) {
             body.prescribed->place(motion.begin.t + time, at);
+            self.at_state[owner] = at;
             pose = body.prescribed->pose(motion.begin.t + time);
         } else {
             pose = body.parameters.pose;
