@@ -297,6 +297,24 @@ TEST(PlainMotion, ABallThatSlidesOffAnotherOneLetsGoInTime) {
     }
 }
 
+// At the ceiling it has less speed left than its weight takes in a step. It keeps none, and falls from there.
+TEST(PlainMotion, ABallThatJustReachesACeilingFallsFromIt) {
+    constexpr double g = 9.81, start = 3.0, end = 0.4, radius = 0.05;
+    for (const double beyond : {1e-6, 1e-5, 1e-4, 5e-4, 2e-3})
+        for (const double h : {1.0 / 60.0, 0.013, 0.01, 0.0041}) {
+            SCOPED_TRACE(fmt::format("it would rise by {} m more, step {}", beyond, h));
+            const double way = 0.5 * start * start / g - beyond, meets = (start - std::sqrt(2.0 * g * beyond)) / g;
+            auto run = run_of(fmt::format(
+                "step: {:.17g}\nend: {}\ngravity: [0, 0, {}]\nbodies:\n"
+                "- {{name: ceiling, fixed: true, position: [0, 0, {:.17g}], orientation: {{axis: [1, 0, 0], angle: "
+                "180}}, shapes: [{{plane: {{}}}}]}}\n"
+                "- {{name: ball, mass: 1, velocity: [0, 0, {}], shapes: [{{sphere: {{radius: {}}}}}]}}\n",
+                h, end, -g, way + radius, start, radius));
+            run.finish();
+            EXPECT_NEAR(run.pose("ball").position[2], way - 0.5 * g * (end - meets) * (end - meets), 1e-9);
+        }
+}
+
 // Free fall and Newton's law are parabolas, which steps that end at no impact follow to rounding: between bounces too.
 TEST(PlainMotion, ABallBouncesByItsRestitution) {
     struct Case {

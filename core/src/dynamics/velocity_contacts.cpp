@@ -68,10 +68,12 @@ namespace delassus {
 // know. A step with such a contact is cut between the two impacts (StepReport::cut), and in the second part both bodies
 // have the speeds with which they meet.
 //
-// Without restitution a contact strikes if it is faster at the beginning of the step than the step makes it, u⁻ < −|a|
-// h, with the largest a of the body in this step and the one before and of the surface. What is slower belongs to the
+// Without restitution a contact strikes if it closes faster at the beginning of the step than a step makes it, u⁻ < a h
+// with the a < 0 of the body, now or in the step before, or with that of the surface. What is slower belongs to the
 // smooth motion, as the next corner of what rolls: it lands by the last case, and its time would change positions by
-// O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of order 1.
+// O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of order 1. An a > 0 makes nothing
+// close: what it slows down grazes the surface within the step, and the last case does not see that. (What lost its
+// restitution lest it gain energy lands wherever it may.)
 //
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)

@@ -251,6 +251,9 @@ private:
         return restitution_ * rows_.blocks()[block].restitution;
     }
     [[nodiscard]] bool acts(const Contact& contact, const Solution& solution) const;
+    /// After a solve: an open contact without restitution that an impact closes within the step gets one of its own.
+    /// Whether it does.
+    bool strike_when_struck(const Problem& problem, const Solution& solution, std::size_t block);
     void find_passing(const Problem& problem, const Solution& solution);
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     /// Of rows in rows_ and before_, with means of the rates about these times, m/s or rad/s.

@@ -202,9 +202,10 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         });
         slowest = std::max(slowest, settings_.restitution_speed);
         const double last_pull = last_changes.empty() ? 0.0 : problem.D.row_times(row, last_changes.data());
+        const auto explains = [&](double change) { return block.restitution > 0.0 ? std::abs(change) : -change; };
         const auto strikes = [&] {
             return bounces ? speed < -slowest
-                           : speed < -h_ * std::max({std::abs(acceleration()), std::abs(pull), std::abs(last_pull)}) -
+                           : speed < -h_ * std::max({explains(acceleration()), std::abs(pull), explains(last_pull)}) -
                                          contact.resolution / h_;
         };
         if (!bounces && gap <= 0.0 && !strikes()) {
@@ -313,6 +314,7 @@ bool VelocityContacts::revise_impacts(Problem& problem, const Solution& solution
     bool any = false;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
+        any = strike_when_struck(problem, solution, k) || any;
         if (!acts(contact, solution)) continue;
         if (contact.impact->end_speed > 0.0) largest = std::max(largest, solution.lambda[first_row_ + contact.row]);
         double change = 0.0;
@@ -417,6 +419,30 @@ void VelocityContacts::find_struck(Problem& problem, double last_h) {
             contact.known[i] = contact.struck / last_h * contact.last[i];
         contact.goes_on = (h_ - contact.struck) / last_h;
     }
+}
+
+// With b = g(τ)/(h − τ) a contact that an impact closes at τ has gone over its gap at the end of the step, and would
+// still close: with a part of its impact, and in the next step the rest, which friction does not add up. But for its
+// own impulse it closes with s = D diag(H)⁻¹ Dᵀ λ − u⁺. So it meets at τ + g(τ)/s, and if that is in the step, strikes.
+// At a body that nothing has struck before it lands: the impulse passes through both, and has no time of its own.
+bool VelocityContacts::strike_when_struck(const Problem& problem, const Solution& solution, std::size_t block) {
+    Contact& contact = contacts_[block];
+    const std::size_t row = first_row_ + contact.row;
+    bool closed = contact.along_normal && !contact.pushed && !contact.impact && contact.struck < h_ &&
+                  rows_.blocks()[block].restitution == 0.0 && solution.lambda[row] > 0.0;
+    if (!closed) return false;
+    for_each_entry(problem.D, row, 1,
+                   [&](std::size_t, std::size_t column, double) { closed = closed && struck_[column] < h_; });
+    if (!closed) return false;
+    const double end_speed =
+        problem.D.row_times(static_cast<std::int32_t>(row), solution.x.data()) + rows_.rows()[contact.row].rate;
+    const double closing = mobility_of(problem.D, diagonal_, row) * solution.lambda[row] - end_speed;
+    const double meets = contact.struck + contact.gap_when_struck / closing;
+    if (!(closing > 0.0 && meets < h_)) return false;
+    contact.impact = Impact{.meets = meets, .closing = closing, .change = closing, .acts = meets};
+    contact.normal = 0.0;
+    contact.strikes = true;
+    return true;
 }
 
 bool VelocityContacts::acts(const Contact& contact, const Solution& solution) const {
