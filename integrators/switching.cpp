@@ -269,7 +269,7 @@ private:
                 if (one.reaction.force[0] != 0.0) ++report.active_blocks;
             }
         report.impact_speed = report.impact_time = 0.0;  // nobody has to look for them
-        report.second_impact_speed = report.second_impact_cut = report.cut = 0.0;
+        report.doubtful_speed = report.second_impact_cut = report.cut = 0.0;
         report.error.clear();
         if (errors_known_) report.error = errors_;
     }

@@ -192,6 +192,31 @@ TEST(ForcesAtImpacts, SlowBallsInARowSlideThroughSeveralImpactsOfAStep) {
     }
 }
 
+// The friction of the wall lifts the ball off the slope for a millisecond. Over a step its weight would hold it there.
+TEST(ForcesAtImpacts, WeightHoldsNothingAtAnImpact) {
+    constexpr double g = 9.81, slope = 0.3, radius = 0.1, start = 0.4;
+    const double down = g * std::sin(slope), way = 0.5 * start * start / (down * 5.0 / 7.0);
+    const auto place = [&](double beyond, double h) {
+        return place_after(
+            fmt::format("step: {:.17g}\nend: 0.6\ngravity: [{:.17g}, 0, {:.17g}]\nmaterials: {{m: {{friction: "
+                        "0.6}}}}\nbodies:\n"
+                        "- {{name: slope, fixed: true, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                        "- {{name: wall, fixed: true, position: [{:.17g}, 0, 0], orientation: {{axis: [0, 1, 0], "
+                        "angle: -90}}, shapes: [{{plane: {{}}, material: m}}]}}\n"
+                        "- {{name: ball, mass: 1, position: [0, 0, {}], velocity: [{}, 0, 0], angular_velocity: [0, "
+                        "{}, 0], shapes: [{{sphere: {{radius: {}}}, material: m}}]}}\n",
+                        h, -down, -g * std::cos(slope), way - beyond + radius, radius, start, start / radius, radius),
+            "ball");
+    };
+    for (const double beyond : {1e-4, 1e-3}) {
+        const double right = place(beyond, 1e-5)[0];
+        for (const double h : {1.0 / 60.0, 0.01, 0.0041}) {
+            SCOPED_TRACE(fmt::format("it would roll by {} m more, step {}", beyond, h));
+            EXPECT_NEAR(place(beyond, h)[0], right, 1e-4);
+        }
+    }
+}
+
 // v = v₀ − (c/m) x until a wall, and so again after it.
 TEST(ForcesAtImpacts, ADashpotTurnsRoundWithWhatBounces) {
     const double rate = 4.0, speed = 2.0, gap = 0.3177, restitution = 0.5, end = 1.0;

@@ -226,6 +226,16 @@ constexpr Thrown thrown[] = {
      "[0.044187, 0.009775, 0.028927], [0.035931, 0.002383, -0.017547], [-0.035931, -0.002383, 0.017547], [-0.046915, "
      "-0.015432, 0.000489], [0.046915, 0.015432, -0.000489], [-0.016536, 0.077644, 0.060403], [0.016536, -0.077644, "
      "-0.060403], [-0.16267, -0.113341, -0.010486], [0.16267, 0.113341, 0.010486]]}, material: m}]"},
+    // What presses has a gap that longer steps left, and is struck in a short one.
+    {"box that presses", 0.0, 0.0, 0.5, 5e-4, "[-6.072, -5.231, -5.658]",
+     "density: 3115.9, position: [0.72255, 0.56747, 0.99014], orientation: [-0.44878, 0.35244, -0.55111, -0.60882], "
+     "velocity: [-1.43097, 2.75674, -0.86753], angular_velocity: [5.94352, 7.11637, -11.62201], shapes: [{box: {size: "
+     "[0.151094, 0.150218, 0.103086]}, material: m}]"},
+    // A corner grazes the wall again while its weight takes the box away from it.
+    {"box that leaves", 0.0, 0.0, 0.5, 5e-4, "[0.03, 7.228, -6.633]",
+     "density: 1183.2, position: [0.38017, 0.44013, 0.89884], orientation: [-0.88455, -0.26426, 0.04149, -0.38212], "
+     "velocity: [0.16996, -2.2952, -0.71663], angular_velocity: [-4.8926, -4.04419, 5.30449], shapes: [{box: {size: "
+     "[0.100316, 0.149274, 0.147824]}, material: m}]"},
 };
 
 Vector3d thrown_to(const Thrown& it, double h) {

@@ -87,11 +87,11 @@ private:
         /// closed that no step of it knew, as it was too far to be found where the last one began.
         double closes_in = std::numeric_limits<double>::infinity();
 
-        /// Whether a contact closed in it that the method did not know of, or closed by what another impact did: the
-        /// whole and its halves may err alike.
+        /// Whether a contact closed in it that the method did not know of, or the speeds after its impacts are in
+        /// doubt: the whole and its halves may err alike.
         [[nodiscard]] bool missed() const {
             return closes_in < 0.0 ||
-                   std::max({whole.second_impact_speed, first.second_impact_speed, second.second_impact_speed}) > slow;
+                   std::max({whole.doubtful_speed, first.doubtful_speed, second.doubtful_speed}) > slow;
         }
     };
     [[nodiscard]] Trial take(const State& begin, double h, StepSolver& solver);

@@ -50,10 +50,12 @@ struct StepReport {
     // Of the fastest contact or stop that closed, that is, one that pushed in this step and not in the one before:
     double impact_speed = 0.0;  ///< with which it closed, in its unit a second; 0: none
     double impact_time = 0.0;   ///< when, after the beginning of the step
-    /// Where an impact follows another one on its bodies within the step, of which the method knew no meeting, or one
-    /// at another speed: the largest speed by which a contact may be wrong after it; 0: there is none.
-    double second_impact_speed = 0.0;
-    /// When, after the beginning, to cut the step between the first such impact and the one before it; 0: nowhere.
+    /// The largest speed by which a contact may be wrong after impacts of the step: where one follows another one on
+    /// its bodies, of which the method knew no meeting, or one at another speed, or where a contact that pushes gave
+    /// more than its impulse at the impact could be; 0: nowhere.
+    double doubtful_speed = 0.0;
+    /// When, after the beginning, to cut the step between the first impact that follows another one so and that one; 0:
+    /// nowhere.
     double second_impact_cut = 0.0;
     /// The same for the first that has more than a hundredth of the kinetic energy.
     double cut = 0.0;

@@ -186,7 +186,7 @@ void ThetaMethod::take_step(State& state, double h, StepSolver& solver, StepRepo
     result_ -= free_;
     if (position_error_.note({h, last_h_, result_, struck_, timed_, contacts_.all_bounce()}, report))
         contacts_.add_error(problem_, solution_, last_h_, report.error);
-    if (struck) contacts_.note_impacts(problem_, solution_, report);
+    if (struck) contacts_.note_impacts(problem_, solution_, last_h_, report);
     if (const auto moved = projection_.moved(); projected && !moved.empty()) {
         report.error.resize(moved.size(), 0.0);
         for (std::size_t i = 0; i < moved.size(); ++i) report.error[i] += std::abs(moved[i]);
@@ -367,7 +367,7 @@ void ThetaMethod::assemble(const State& begin, double h, bool coulomb) {
     solution_.lambda.assign(static_cast<std::size_t>(m_), 0.0);
     for (std::size_t i = 0; i < multipliers_.size(); ++i) solution_.lambda[i] = last_h_ * multipliers_[i];
     solution_.x.assign(guess_.begin(), guess_.end());
-    contacts_.append_to(problem_, solution_.lambda, coulomb);
+    contacts_.append_to(problem_, solution_.lambda, coulomb, chooses_steps_ ? last_h_ : 0.0);
     turning_spins_.find(spins_, problem_.D, m_);
 }
 

@@ -59,8 +59,9 @@ public:
 
     /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows (cones beyond theirs are those of
     /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
-    /// law, else De Saxcé's term stands in b. The rows of problem.D are used again until the next collect().
-    void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb);
+    /// law, else De Saxcé's term stands in b. last_h: the size of the step before, or 0. The rows of problem.D are used
+    /// again until the next collect().
+    void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb, double last_h = 0.0);
     /// After append_to(): whether an impact is possible in this step.
     [[nodiscard]] bool may_strike() const;
     /// Takes the rows of contacts and stops that do not push on out of a copy of the step's problem.
@@ -127,9 +128,9 @@ public:
     /// had pushed before: what lies on something when a run begins, or goes over an edge. Returns whether the answer
     /// changes by that.
     [[nodiscard]] bool make_persistent(const Solution& solution);
-    /// report.second_impact_speed and report.cut; and in report.error, unless that is empty, what these impacts make
-    /// the step err by, and rows of impacts that are not known at their time. solution: of the whole problem.
-    void note_impacts(const Problem& problem, const Solution& solution, StepReport& report) const;
+    /// report.doubtful_speed and report.cut; and in report.error, unless that is empty, what these impacts make
+    /// the step err by, and rows of impacts that are not known at their time. solution, last_h: as of add_error().
+    void note_impacts(const Problem& problem, const Solution& solution, double last_h, StepReport& report) const;
 
     /// The work of contacts and stops, Σ P·u at the mean velocities of the step, n, or those of impacts within it.
     /// solution: of the whole problem.
@@ -254,6 +255,10 @@ private:
     /// After a solve: an open contact without restitution that an impact closes within the step gets one of its own.
     /// Whether it does.
     bool strike_when_struck(const Problem& problem, const Solution& solution, std::size_t block);
+    /// Of a contact that pushed until an impact: what its impulse has of forces that it could not give at the impact.
+    [[nodiscard]] double lent_impulse(const Solution& solution, std::size_t block, double last_h) const;
+    /// Bounds the speed with which contacts that push close gaps that are left.
+    void press_on(const Problem& problem, double last_h);
     void find_passing(const Problem& problem, const Solution& solution);
     [[nodiscard]] const Before* find_before(std::uint64_t key) const;
     /// Of rows in rows_ and before_, with means of the rates about these times, m/s or rad/s.

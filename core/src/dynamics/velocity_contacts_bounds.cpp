@@ -164,7 +164,6 @@ bool VelocityContacts::go_on_after_bounces(Problem& problem, const Solution& sol
                     std::min(static_cast<std::size_t>(rows_.blocks()[k].cone.rows), contact.known.size()),
                     contact.known.begin());
         contact.normal = contact.impact->change - contact.impact->closing;
-        contact.strikes = false;
     }
     return true;
 }

@@ -490,9 +490,30 @@ std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(co
     return SecondImpact{struck, meets, share * closing, contact.change / solution.lambda[row]};
 }
 
+// At an impact a contact that pushes gives an impulse of its own cone, besides what forces press it with. Over a whole
+// step an answer may take more: friction that only the weight of the step pays for, or it holds by that weight what the
+// impact would have lifted. What the change of its impulse is away from the cone is lent by forces, and the speed after
+// the impact is off by what that makes.
+double VelocityContacts::lent_impulse(const Solution& solution, std::size_t block, double last_h) const {
+    const Contact& contact = contacts_[block];
+    if (all_bounce_ || !contact.along_normal || !contact.pushed || contact.impulsive || !(contact.struck < h_))
+        return 0.0;
+    const Cone& cone = rows_.blocks()[block].cone;
+    const double* impulse = solution.lambda.data() + first_row_ + contact.row;
+    const auto change = [&](std::size_t i) { return impulse[i] - h_ / last_h * contact.last[i]; };
+    const auto rows = std::min<std::size_t>(static_cast<std::size_t>(cone.rows), contact.last.size());
+    const double normal = change(0), friction = cone.kind == ConeKind::Friction ? cone.parameters[0] : 0.0;
+    double tangential = 0.0;
+    for (std::size_t i = 1; i < rows; ++i) tangential = std::hypot(tangential, change(i));
+    if (tangential <= friction * normal) return 0.0;
+    if (friction * tangential <= -normal) return std::hypot(normal, tangential);
+    return (tangential - friction * normal) / std::hypot(1.0, friction);
+}
+
 // A step that stays whole is off by such a speed, and in positions as if all through it. So it is where the rows of an
 // impulse are.
-void VelocityContacts::note_impacts(const Problem& problem, const Solution& solution, StepReport& report) const {
+void VelocityContacts::note_impacts(const Problem& problem, const Solution& solution, double last_h,
+                                    StepReport& report) const {
     constexpr double faint = 1e-2;
     std::optional<double> known;
     const auto kinetic = [&] {
@@ -507,9 +528,13 @@ void VelocityContacts::note_impacts(const Problem& problem, const Solution& solu
         const std::size_t row = first_row_ + contacts_[k].row;
         if (acts(contacts_[k], solution) && !report.error.empty())
             add_error_of(contacts_[k].row_error * solution.lambda[row], problem.D, row, report.error);
+        if (const double lent = lent_impulse(solution, k, last_h); lent > 0.0) {
+            report.doubtful_speed = std::max(report.doubtful_speed, lent * mobility_of(problem.D, diagonal_, row));
+            if (!report.error.empty()) add_error_of(lent, problem.D, row, report.error);
+        }
         const auto second = second_impact(problem, solution, k);
         if (!second) continue;
-        report.second_impact_speed = std::max(report.second_impact_speed, second->speed);
+        report.doubtful_speed = std::max(report.doubtful_speed, second->speed);
         const double impulse = second->speed / second->mobility, between = 0.5 * (second->after + second->meets);
         const auto cut_there = [between](double& cut) { cut = cut == 0.0 ? between : std::min(cut, between); };
         cut_there(report.second_impact_cut);
