@@ -54,7 +54,7 @@ struct StepReport {
     /// its bodies, of which the method knew no meeting, or one at another speed, or where a contact that pushes gave
     /// more than its impulse at the impact could be; 0: nowhere.
     double doubtful_speed = 0.0;
-    /// When, after the beginning, to cut the step between the first impact that follows another one so and that one; 0:
+    /// When, after the beginning, to cut the step between an impact and the first one that follows it in such a way; 0:
     /// nowhere.
     double second_impact_cut = 0.0;
     /// The same for the first that has more than a hundredth of the kinetic energy.

@@ -64,16 +64,16 @@ namespace delassus {
 // nodes) get D between those of the beginning and the middle.
 //
 // A body that is struck at τ moves as it did until then, so that its open contacts close by what comes after: g(τ) + (h
-// − τ) u⁺ ≥ 0, with D and the gap of τ. One that is closed by this would bounce with a speed that the step does not
-// know. A step with such a contact is cut between the two impacts (StepReport::cut), and in the second part both bodies
-// have the speeds with which they meet.
+// − τ) u⁺ ≥ 0, with D and the gap of τ. One that is closed by this strikes, if it has no restitution. Else it would
+// bounce with a speed that the step does not know: a step with such a contact is cut between the two impacts
+// (StepReport::cut), and in the second part both bodies have the speeds with which they meet.
 //
 // Without restitution a contact strikes if it closes faster at the beginning of the step than a step makes it, u⁻ < a h
 // with the a < 0 of the body, now or in the step before, or with that of the surface. What is slower belongs to the
 // smooth motion, as the next corner of what rolls: it lands by the last case, and its time would change positions by
 // O(h²). With D̄ of the meeting, which knows no turn after it, rolling would be of order 1. An a > 0 makes nothing
-// close: what it slows down grazes the surface within the step, and the last case does not see that. (What lost its
-// restitution lest it gain energy lands wherever it may.)
+// close: what it slows down grazes the surface within the step, and the last case does not see that. Where a bounce was
+// given up, since it gained energy, |a| is the bound.
 //
 // What a step leaves of the gap of a closed contact, O(h³) by the curvature of its motion, is undone in the positions
 // (position_projection.cpp), or by the row itself: `once`. A row that asks for u⁺ = −g⁺/(θ h), with g⁺ = g + h ((1 − θ)
@@ -407,7 +407,7 @@ void VelocityContacts::append_to(Problem& problem, std::vector<double>& lambda, 
     rows_.move_into(problem.D);
     axes_.stretch(first_row_, problem.D);
     set_compliance(problem, rows_.blocks(), compliances_);
-    if (last_h > 0.0) press_on(problem, last_h);
+    if (settings_.once && last_h > 0.0) press_on(problem, last_h);
 }
 
 // To close a gap of O(h³) that a longer step left may take more than a short one's force: then nothing would push in
@@ -417,7 +417,7 @@ void VelocityContacts::press_on(const Problem& problem, double last_h) {
     constexpr double part = 0.5;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
         Contact& contact = contacts_[k];
-        if (!settings_.once || !contact.along_normal || !contact.pushed || !(contact.normal > 0.0)) continue;
+        if (!contact.along_normal || !contact.pushed || !(contact.normal > 0.0)) continue;
         const std::size_t row = first_row_ + contact.row;
         const auto rows =
             std::min<std::size_t>(static_cast<std::size_t>(rows_.blocks()[k].cone.rows), contact.last.size());
@@ -564,30 +564,6 @@ void VelocityContacts::add_steady_impulse(const Problem& problem, const std::vec
             for (auto e = D.row_start[row]; e < D.row_start[row + 1]; ++e)
                 result[D.column[static_cast<std::size_t>(e)]] += D.value[static_cast<std::size_t>(e)] * lambda[row];
     }
-}
-
-// With the mean forces F of the step and F₋ of the one before, of size h₋, a force changes at the rate
-// r = 2 (F − F₋)/(h + h₋), and is F + ½ h r at the end. Where that is negative nothing pulls in its place: the step
-// takes E²/(2 |r|) too little of impulse with E = −F − ½ h r, and so gives a speed that is wrong for as long as the
-// motion goes on: it counts as if it were wrong over all of the step.
-void VelocityContacts::add_error(const Problem& problem, const Solution& solution, double last_h,
-                                 std::vector<double>& error) const {
-    const auto& D = problem.D;
-    for (const Contact& contact : contacts_) {
-        const std::size_t row = first_row_ + contact.row;
-        if (!contact.along_normal || !(solution.lambda[row] > 0.0)) continue;
-        if (contact.impact || !(contact.last[0] > 0.0)) continue;
-        const double force = solution.lambda[row] / h_, rate = 2.0 * (force - contact.last[0] / last_h) / (h_ + last_h);
-        const double pulls = -force - 0.5 * h_ * rate;
-        if (pulls > 0.0) add_error_of(0.5 * pulls * pulls / -rate, D, row, error);
-    }
-}
-
-void VelocityContacts::add_error_of(double impulse, const SparseMatrix& D, std::size_t row,
-                                    std::vector<double>& error) const {
-    for_each_entry(D, row, 1, [&](std::size_t, std::size_t column, double value) {
-        error[column] += h_ * std::abs(value) * impulse / diagonal_[column];
-    });
 }
 
 bool VelocityContacts::landed(const Solution& solution) const {

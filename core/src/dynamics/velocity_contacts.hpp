@@ -59,8 +59,8 @@ public:
 
     /// Appends D, cones and zeros of b to the problem, which holds the bilateral rows (cones beyond theirs are those of
     /// an earlier step), and to lambda the impulses of the last step as a start. coulomb: the solver knows Coulomb's
-    /// law, else De Saxcé's term stands in b. last_h: the size of the step before, or 0. The rows of problem.D are used
-    /// again until the next collect().
+    /// law, else De Saxcé's term stands in b. last_h: the size of the step before, where steps are chosen by their
+    /// error, else 0. The rows of problem.D are used again until the next collect().
     void append_to(Problem& problem, std::vector<double>& lambda, bool coulomb, double last_h = 0.0);
     /// After append_to(): whether an impact is possible in this step.
     [[nodiscard]] bool may_strike() const;
@@ -85,7 +85,7 @@ public:
     /// Whatever slides at the beginning of the step gets the impulse of sliding on, in a copy of the step's problem.
     void let_slide_on(Problem& problem) const;
     /// What turns round within the step gets the bounds of that time. sliding: the velocities at the end of the step if
-    /// it slid on, n; last_h: the size of the step before, or 0.
+    /// it slid on, n; last_h: the size of the step before, where steps are chosen by their error, else 0.
     void time_turns(Problem& problem, std::span<const double> sliding, double last_h);
     /// problem.a += Dᵀ of what contacts did until an impact or until their friction turned round.
     void add_known_impulses(Problem& problem) const;

@@ -2,7 +2,6 @@
 // Impacts at their time within a step; the derivation is in velocity_contacts.cpp.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -202,10 +201,10 @@ void VelocityContacts::time_meetings(Problem& problem, std::span<const double> s
         });
         slowest = std::max(slowest, settings_.restitution_speed);
         const double last_pull = last_changes.empty() ? 0.0 : problem.D.row_times(row, last_changes.data());
-        const auto explains = [&](double change) { return block.restitution > 0.0 ? std::abs(change) : -change; };
+        const auto closing = [&](double change) { return block.restitution > 0.0 ? std::abs(change) : -change; };
         const auto strikes = [&] {
             return bounces ? speed < -slowest
-                           : speed < -h_ * std::max({explains(acceleration()), std::abs(pull), explains(last_pull)}) -
+                           : speed < -h_ * std::max({closing(acceleration()), std::abs(pull), closing(last_pull)}) -
                                          contact.resolution / h_;
         };
         if (!bounces && gap <= 0.0 && !strikes()) {
@@ -422,9 +421,10 @@ void VelocityContacts::find_struck(Problem& problem, double last_h) {
 }
 
 // With b = g(τ)/(h − τ) a contact that an impact closes at τ has gone over its gap at the end of the step, and would
-// still close: with a part of its impact, and in the next step the rest, which friction does not add up. But for its
-// own impulse it closes with s = D diag(H)⁻¹ Dᵀ λ − u⁺. So it meets at τ + g(τ)/s, and if that is in the step, strikes.
-// At a body that nothing has struck before it lands: the impulse passes through both, and has no time of its own.
+// still close: with a part of its impact, and in the next step the rest; with friction the two are not the whole. But
+// for its own impulse it closes with s = D diag(H)⁻¹ Dᵀ λ − u⁺. So it meets at τ + g(τ)/s, and if that is in the step,
+// strikes. At a body that nothing has struck before it lands: the impulse passes through both, and has no time of its
+// own.
 bool VelocityContacts::strike_when_struck(const Problem& problem, const Solution& solution, std::size_t block) {
     Contact& contact = contacts_[block];
     const std::size_t row = first_row_ + contact.row;
@@ -458,89 +458,6 @@ bool VelocityContacts::any_bounce(const Solution& solution) const {
     for (std::size_t k = 0; k < contacts_.size(); ++k)
         if (rows_.blocks()[k].restitution > 0.0 && acts(contacts_[k], solution)) return true;
     return false;
-}
-
-// An open contact that was to stay open and pushes was closed by an impact at τ on one of its bodies. Without its own
-// impulse it would close with s = D diag(H)⁻¹ Dᵀ λ − u⁺ from then on, and meet at τ + (g + u⁻ τ)/s. Or it has an impact
-// of its own, after one on another contact of its bodies, and counts on a speed that it will not have. Bodies that rest
-// on others are not among them: there impacts have no order.
-std::optional<VelocityContacts::SecondImpact> VelocityContacts::second_impact(const Problem& problem,
-                                                                              const Solution& solution,
-                                                                              std::size_t block) const {
-    constexpr double least_part = 1e-6, faint = 1e-6;
-    const Contact& contact = contacts_[block];
-    const std::size_t row = first_row_ + contact.row;
-    double struck = contact.struck;
-    if (contact.impact && !struck_.empty())
-        for_each_entry(problem.D, row, 1,
-                       [&](std::size_t, std::size_t column, double) { struck = std::min(struck, struck_[column]); });
-    const double closing = contact.impact ? contact.impact->closing : contact.change - contact.end_speed;
-    const double share = contact.impact ? 1.0 : restitution_of(block);
-    if (contact.pushed || !(struck < h_) || share == 0.0 || !(solution.lambda[row] > 0.0) || !(closing > 0.0))
-        return std::nullopt;
-    const double meets = contact.impact ? contact.impact->meets : struck + contact.gap_when_struck / closing;
-    if (!(meets < h_) || meets - struck < least_part * h_) return std::nullopt;
-    const double own = mobility_of(problem.D, diagonal_, row);
-    const bool is_loaded = std::any_of(contacts_.begin(), contacts_.end(), [&](const Contact& other) {
-        const std::size_t number = first_row_ + other.row;
-        return other.along_normal && other.pushed && !other.impact && number != row && solution.lambda[number] > 0.0 &&
-               std::abs(coupling(problem.D, diagonal_, row, number)) > faint * own;
-    });
-    if (is_loaded) return std::nullopt;
-    return SecondImpact{struck, meets, share * closing, contact.change / solution.lambda[row]};
-}
-
-// At an impact a contact that pushes gives an impulse of its own cone, besides what forces press it with. Over a whole
-// step an answer may take more: friction that only the weight of the step pays for, or it holds by that weight what the
-// impact would have lifted. What the change of its impulse is away from the cone is lent by forces, and the speed after
-// the impact is off by what that makes.
-double VelocityContacts::lent_impulse(const Solution& solution, std::size_t block, double last_h) const {
-    const Contact& contact = contacts_[block];
-    if (all_bounce_ || !contact.along_normal || !contact.pushed || contact.impulsive || !(contact.struck < h_))
-        return 0.0;
-    const Cone& cone = rows_.blocks()[block].cone;
-    const double* impulse = solution.lambda.data() + first_row_ + contact.row;
-    const auto change = [&](std::size_t i) { return impulse[i] - h_ / last_h * contact.last[i]; };
-    const auto rows = std::min<std::size_t>(static_cast<std::size_t>(cone.rows), contact.last.size());
-    const double normal = change(0), friction = cone.kind == ConeKind::Friction ? cone.parameters[0] : 0.0;
-    double tangential = 0.0;
-    for (std::size_t i = 1; i < rows; ++i) tangential = std::hypot(tangential, change(i));
-    if (tangential <= friction * normal) return 0.0;
-    if (friction * tangential <= -normal) return std::hypot(normal, tangential);
-    return (tangential - friction * normal) / std::hypot(1.0, friction);
-}
-
-// A step that stays whole is off by such a speed, and in positions as if all through it. So it is where the rows of an
-// impulse are.
-void VelocityContacts::note_impacts(const Problem& problem, const Solution& solution, double last_h,
-                                    StepReport& report) const {
-    constexpr double faint = 1e-2;
-    std::optional<double> known;
-    const auto kinetic = [&] {
-        if (!known) {
-            std::vector<double> momentum(solution.x.size(), 0.0);
-            problem.H.multiply_add(1.0, solution.x.data(), momentum.data());
-            known = 0.5 * std::inner_product(momentum.begin(), momentum.end(), solution.x.begin(), 0.0);
-        }
-        return *known;
-    };
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        const std::size_t row = first_row_ + contacts_[k].row;
-        if (acts(contacts_[k], solution) && !report.error.empty())
-            add_error_of(contacts_[k].row_error * solution.lambda[row], problem.D, row, report.error);
-        if (const double lent = lent_impulse(solution, k, last_h); lent > 0.0) {
-            report.doubtful_speed = std::max(report.doubtful_speed, lent * mobility_of(problem.D, diagonal_, row));
-            if (!report.error.empty()) add_error_of(lent, problem.D, row, report.error);
-        }
-        const auto second = second_impact(problem, solution, k);
-        if (!second) continue;
-        report.doubtful_speed = std::max(report.doubtful_speed, second->speed);
-        const double impulse = second->speed / second->mobility, between = 0.5 * (second->after + second->meets);
-        const auto cut_there = [between](double& cut) { cut = cut == 0.0 ? between : std::min(cut, between); };
-        cut_there(report.second_impact_cut);
-        if (0.5 * impulse * second->speed > faint * kinetic()) cut_there(report.cut);
-        if (!report.error.empty()) add_error_of(impulse, problem.D, row, report.error);
-    }
 }
 
 // A contact with restitution that is left alone closes within the step if g + u⁻ t + ½ (u⁺ − u⁻) t²/h = 0 for a t < h.
