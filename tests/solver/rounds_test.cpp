@@ -17,11 +17,12 @@ namespace {
 
 /// A member that solves the problem after `needed` iterations, each of which costs `cost`.
 struct Counted {
-    std::int64_t first = 1;  ///< iterations of its first turn
+    double first = 1.0;  ///< iterations of its first turn
     double cost = 1.0;
     std::int64_t needed = std::numeric_limits<std::int64_t>::max();
     std::int64_t done = 0;
     bool always_passes = false;  ///< its forecasts say that it gets nowhere
+    bool passed = false;         ///< its last turn
 };
 
 struct Result {
@@ -37,8 +38,9 @@ Result run(std::vector<Counted>& counted, int rounds_that_better = 1000) {
     const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
         const double error = std::exp2(-std::min(turn.round, rounds_that_better - 1));
         Counted& member = counted[turn.member];
-        EXPECT_EQ(turn.start, turn.round == 0 ? std::nullopt : std::optional(turn.member));
-        if (member.always_passes && turn.may_pass) return {TurnEnd::Passed, error};
+        EXPECT_EQ(turn.start, member.done == 0 && !member.passed ? std::nullopt : std::optional(turn.member));
+        member.passed = member.always_passes && turn.may_pass;
+        if (member.passed) return {TurnEnd::Passed, error};
         const std::int64_t most = std::min(turn.iterations, member.needed - member.done);
         member.done += most;
         work += static_cast<double>(most) * member.cost;
@@ -55,17 +57,17 @@ TEST(Rounds, WorkIsBoundedByTheBestMember) {
         std::vector<Counted> members(1 + random() % 6);
         double unit = 0.0;
         for (Counted& member : members) {
-            member.first = 1 + static_cast<std::int64_t>(random() % 300);
+            member.first = std::pow(10.0, exponent(random) - 2.0);
             member.cost = std::pow(10.0, exponent(random) - 2.0);
             if (random() % 2 == 0) member.needed = static_cast<std::int64_t>(std::pow(10.0, exponent(random))) + 1;
             member.always_passes = pass && random() % 3 == 0;
-            unit += static_cast<double>(member.first) * member.cost;
+            unit += member.first * member.cost;
         }
         members[random() % members.size()].needed = 1 + static_cast<std::int64_t>(random() % 10000);
         double bound = std::numeric_limits<double>::infinity();
         for (const Counted& member : members) {
             if (member.needed == std::numeric_limits<std::int64_t>::max()) continue;
-            const double own = static_cast<double>(member.needed) / static_cast<double>(member.first);
+            const double own = static_cast<double>(member.needed) / member.first;
             bound = std::min(bound, unit * (1.0 + 2.0 * own) * (member.always_passes ? 3.0 : 1.0));
         }
         const Result result = run(members);
@@ -166,7 +168,7 @@ TEST(Rounds, TheWorkOfARoundDoesNotOverflow) {
         error *= 0.5;
         return {turn.round == 200 ? TurnEnd::Done : TurnEnd::Exhausted, error};
     }));
-    EXPECT_EQ(last, std::numeric_limits<std::int64_t>::max());
+    EXPECT_EQ(last, std::int64_t{1} << 62);
 }
 
 }  // namespace

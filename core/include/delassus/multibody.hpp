@@ -531,8 +531,8 @@ public:
     [[nodiscard]] double size_of_shapes() const;
     /// m: the largest extent of a body's shapes, of planes and terrains apart; 0 if it has no others.
     [[nodiscard]] double extent_of_shapes(BodyIndex body) const;
-    /// Bodies that overlap at a state, by pairs, ascending; h (s): of the step that begins there. What it finds is kept
-    /// for collect_unilateral() of the same state and step. Not those of nodes. team: threads that may share the work.
+    /// Bodies that overlap at a state, by pairs, ascending; h (s): of the step that begins there. Not those of nodes.
+    /// team: threads that may share the work.
     void collect_overlaps(const State& state, double h, const sdk::Team& team, std::vector<BodyOverlap>& overlaps);
     /// That of a contact alone; of depth 0 where its gap is open, or it is one of nodes.
     [[nodiscard]] BodyOverlap overlap_of(const ContactPoint& contact) const;

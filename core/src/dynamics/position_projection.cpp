@@ -9,6 +9,10 @@
 // as a whole. What is solved for is the speed x/h. g_least bounds how fast a penetration is undone that the step began
 // with. The energy that it gives is −f·x.
 //
+// What x moves may come into shapes that nothing was near to before, as in a pile where a ball pushed another one
+// aside: pairs that were not looked at. Then the same is asked for again from there, with their rows, until no such
+// pair lacks anything.
+//
 // A mechanism may start with bodies that overlap and that its joints do not let apart: then no x is there. And where
 // they let them apart by a long way only, that way is no answer either. So where a step begins with a penetration its
 // gaps are compliant, g + D_n x + E ν ≥ g_least with E = 10⁻³ D_n diag(H)⁻¹ D_nᵀ by rows: what can be undone is, but
@@ -34,11 +38,9 @@ PositionProjection::PositionProjection(DynamicalSystem& system)
       constraint_(static_cast<std::size_t>(m_)),
       ways_(system) {}
 
-/// The problem; whether there is anything to undo.
-bool PositionProjection::assemble(const State& end, double h, const VelocityContacts& contacts) {
-    double off = 0.0, least = 0.0;
-    if (m_ > 0) system_.constraint(end, constraint_.data());
-    for (const double C : constraint_) off = std::max(off, std::abs(C));
+/// What unilateral rows there are, and by how much the gaps of those lack that had no row in the problem so far.
+double PositionProjection::collect(const State& end, double h, const VelocityContacts& contacts) {
+    double least = 0.0;
     rows_.clear();
     if (contacts.any()) {
         rows_.measure_speeds_at(nullptr);
@@ -46,10 +48,19 @@ bool PositionProjection::assemble(const State& end, double h, const VelocityCont
         std::size_t row = 0;
         for (const auto& block : rows_.blocks()) {
             const double gap = rows_.rows()[row].gap;
-            if (block.along_normal() && gap < 0.0) least = std::max(least, contacts.least_gap(block.key) - gap);
+            if (block.along_normal() && gap < 0.0 && !keys_.contains(block.key))
+                least = std::max(least, contacts.least_gap(block.key) - gap);
             row += static_cast<std::size_t>(block.cone.rows);
         }
     }
+    return least;
+}
+
+/// The problem; whether there is anything to undo. least: of collect().
+bool PositionProjection::assemble(const State& end, double h, double least, const VelocityContacts& contacts) {
+    double off = 0.0;
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) off = std::max(off, std::abs(C));
     if (off <= resolution_ && least <= resolution_) return false;
     const auto m = static_cast<std::size_t>(m_);
     std::int32_t count = 0;
@@ -74,6 +85,7 @@ bool PositionProjection::assemble(const State& end, double h, const VelocityCont
             D_.add(target, rows_.column()[static_cast<std::size_t>(e)], rows_.value()[static_cast<std::size_t>(e)]);
         problem_.b.push_back(rows_.rows()[row].gap - contacts.least_gap(block.key));
         problem_.cones.push_back(Cone::nonnegative(1));
+        keys_.insert(block.key);
     });
     // What is off by rounding is left: rows that hold one body and imply one another would contradict each other by it.
     for (double& entry : problem_.b) entry = std::abs(entry) <= resolution_ ? 0.0 : entry / h;
@@ -116,34 +128,50 @@ void PositionProjection::solve(StepSolver& solver, StepReport& report) {
 void PositionProjection::project(const State& begin, State& end, double h, const Problem& problem,
                                  std::span<const double> left, const VelocityContacts& contacts, StepSolver& solver,
                                  StepReport& report, std::string_view method) {
+    constexpr int most_rounds = 8;
     moved_ = false;
-    if (n_ == 0 || !assemble(end, h, contacts)) return;
+    keys_.clear();
+    if (n_ == 0 || !assemble(end, h, collect(end, h, contacts), contacts)) return;
+    double off = 0.0;
+    for (const double C : constraint_) off = std::max(off, std::abs(C));
     problem_.name = "position";
     problem_.law = Law::Associated;
     problem_.H = problem.H;
-    if (contacts.begins_deep()) {
-        make_compliant();
-    } else if (problem_.E.rows > 0) {
-        problem_.E = {};
-    }
     problem_.a.assign(static_cast<std::size_t>(n_), 0.0);
-    solve(solver, report);
-    delta_ = solution_.x;
-    for (double& entry : delta_) entry *= h;
+    delta_.assign(static_cast<std::size_t>(n_), 0.0);
     moved_ = !contacts.begins_deep();
+    for (int round = 1;; ++round) {
+        if (contacts.begins_deep()) {
+            make_compliant();
+        } else if (problem_.E.rows > 0) {
+            problem_.E = {};
+        }
+        move(begin, end, h, solver, report, method);
+        if (round == most_rounds || keys_.empty()) break;
+        const double least = collect(end, h, contacts);
+        if (least <= resolution_ || !assemble(end, h, least, contacts)) break;
+    }
+    if (m_ == 0) return;
+    ways_.find(problem, begin, end, left);
+    require_nearer(begin, end, h, off, method);
+}
+
+/// By the answer to the problem.
+void PositionProjection::move(const State& begin, State& end, double h, StepSolver& solver, StepReport& report,
+                              std::string_view method) {
+    solve(solver, report);
+    for (double& entry : solution_.x) entry *= h;
+    for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] += solution_.x[i];
     const auto pushed = [](double impulse) { return impulse > 0.0; };
     if (std::any_of(solution_.lambda.begin() + m_, solution_.lambda.end(), pushed)) {
         force_.assign(static_cast<std::size_t>(n_), 0.0);
         system_.add_force(end, 1.0, force_.data());
         double work = 0.0;
-        for (std::size_t i = 0; i < force_.size(); ++i) work -= force_[i] * delta_[i];
+        for (std::size_t i = 0; i < force_.size(); ++i) work -= force_[i] * solution_.x[i];
         report.energy.recovered += std::max(work, 0.0);
     }
-    system_.increment(end.q.data(), delta_.data(), end.q.data());
+    system_.increment(end.q.data(), solution_.x.data(), end.q.data());
     require_finite(begin, end, h, method);
-    if (m_ == 0) return;
-    ways_.find(problem, begin, end, left);
-    require_nearer(begin, end, h, method);
 }
 
 void PositionProjection::project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report) {
@@ -167,10 +195,10 @@ void PositionProjection::project_velocities(State& end, const SparseMatrix& H, S
 
 // A linear step towards C = 0 takes most of C away, or the positions were too far off for it. What is below a
 // thousandth of a row's way, or 10⁴ times the resolution, may be the tolerance of the solver.
-void PositionProjection::require_nearer(const State& begin, const State& end, double h, std::string_view method) {
+void PositionProjection::require_nearer(const State& begin, const State& end, double h, double off,
+                                        std::string_view method) {
     constexpr double share_of_way = 1e-3;
-    double off = 0.0, left = 0.0;
-    for (const double C : constraint_) off = std::max(off, std::abs(C));
+    double left = 0.0;
     system_.constraint(end, constraint_.data());
     for (std::size_t row = 0; row < constraint_.size(); ++row) {
         const double C = std::abs(constraint_[row]);

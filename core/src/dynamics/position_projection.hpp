@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <unordered_set>
 #include <vector>
 
 #include "delassus/export.hpp"
@@ -35,16 +36,20 @@ public:
     void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 
 private:
-    [[nodiscard]] bool assemble(const State& end, double h, const VelocityContacts& contacts);
+    [[nodiscard]] double collect(const State& end, double h, const VelocityContacts& contacts);
+    [[nodiscard]] bool assemble(const State& end, double h, double least, const VelocityContacts& contacts);
     void make_compliant();
     void solve(StepSolver& solver, StepReport& report);
-    void require_nearer(const State& begin, const State& end, double h, std::string_view method);
+    void move(const State& begin, State& end, double h, StepSolver& solver, StepReport& report,
+              std::string_view method);
+    void require_nearer(const State& begin, const State& end, double h, double off, std::string_view method);
 
     DynamicalSystem& system_;
     std::vector<std::int32_t> blocks_;
     std::int32_t n_, m_;
     double resolution_;
     UnilateralRows rows_;
+    std::unordered_set<std::uint64_t> keys_;  // of the blocks that had rows in the problem
     MatrixAssembler D_;
     Problem problem_;
     Solution solution_;

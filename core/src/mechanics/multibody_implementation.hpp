@@ -101,7 +101,7 @@ struct MultibodySystem::Implementation {
     mutable std::vector<double> generalized_force;
     std::vector<Pose> poses;                      // of the detector's bodies; those of fixed ones stay
     std::vector<BodyDisplacement> displacements;  // of the same; fixed ones have none
-    /// What was detected last for collect_overlaps().
+    /// What was detected last.
     struct Detected {
         std::vector<Pose> poses;
         std::vector<BodyDisplacement> displacements;
@@ -299,8 +299,8 @@ struct MultibodySystem::Implementation {
     void predict_displacements(double h, const State& state);
     /// contacts ← also those on the ways to what is expected, of pairs of shapes that have none.
     void add_expected(std::vector<ContactPoint>& contacts, const sdk::Team& team) const;
-    /// Whether `detected` is of these poses and displacements.
-    [[nodiscard]] bool is_detected() const;
+    /// The contacts of `poses` and `displacements`, valid until the next call: `detected`, where that is of the same.
+    const std::vector<ContactPoint>& detect(const sdk::Team& team);
     [[nodiscard]] std::vector<std::int32_t> solids() const;
     void make_detector();
     void make_mesh_contacts();

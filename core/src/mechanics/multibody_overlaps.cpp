@@ -7,16 +7,21 @@
 
 namespace delassus {
 
-bool MultibodySystem::Implementation::is_detected() const {
+const std::vector<ContactPoint>& MultibodySystem::Implementation::detect(const sdk::Team& team) {
     const auto same_pose = [](const Pose& a, const Pose& b) {
         return a.position == b.position && a.orientation == b.orientation;
     };
     const auto same_displacement = [](const BodyDisplacement& a, const BodyDisplacement& b) {
         return a.translation == b.translation && a.rotation == b.rotation;
     };
-    return std::equal(poses.begin(), poses.end(), detected.poses.begin(), detected.poses.end(), same_pose) &&
-           std::equal(displacements.begin(), displacements.end(), detected.displacements.begin(),
-                      detected.displacements.end(), same_displacement);
+    if (!std::equal(poses.begin(), poses.end(), detected.poses.begin(), detected.poses.end(), same_pose) ||
+        !std::equal(displacements.begin(), displacements.end(), detected.displacements.begin(),
+                    detected.displacements.end(), same_displacement)) {
+        detector->detect(poses, envelope, detected.contacts, team, displacements);
+        detected.poses = poses;
+        detected.displacements = displacements;
+    }
+    return detected.contacts;
 }
 
 namespace {
@@ -87,13 +92,8 @@ void MultibodySystem::collect_overlaps(const State& state, double h, const sdk::
     self.place_for_step(state, h);
     self.place_shapes(state);
     self.predict_displacements(h, state);
-    if (!self.is_detected()) {
-        self.detector->detect(self.poses, self.envelope, self.detected.contacts, team, self.displacements);
-        self.detected.poses = self.poses;
-        self.detected.displacements = self.displacements;
-    }
     std::map<std::pair<BodyIndex, BodyIndex>, BodyOverlap> pairs;
-    for (const ContactPoint& contact : self.detected.contacts) {
+    for (const ContactPoint& contact : self.detect(team)) {
         const BodyOverlap own = overlap_of(contact);
         if (!(own.depth > 0.0)) continue;
         BodyOverlap& pair = pairs.try_emplace({own.a, own.b}, own).first->second;

@@ -101,11 +101,7 @@ void MultibodySystem::collect_unilateral(const State& state, double h, Unilatera
     if (self.detector) {
         self.place_shapes(state);
         self.predict_displacements(h, state);
-        if (self.is_detected()) {
-            rows.contacts() = self.detected.contacts;
-        } else {
-            self.detector->detect(self.poses, self.envelope, rows.contacts(), rows.team, self.displacements);
-        }
+        rows.contacts() = self.detect(rows.team);
         if (!self.expected.empty()) self.add_expected(rows.contacts(), rows.team);
         if (!self.prescribed.empty())
             std::erase_if(rows.contacts(), [&](const ContactPoint& contact) {

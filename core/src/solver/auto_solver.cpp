@@ -74,7 +74,7 @@ bool is_linear_step(const Order& order) {
 
 /// The solvers of the order that can take problems with these needs, then all others that can but for peers.
 std::vector<RankedSolver> members_of(const Registry& registry, const Order& order, std::uint64_t needs) {
-    constexpr std::int64_t of_a_stranger = 100;  // iterations of a solver of which nothing is known
+    constexpr double of_a_stranger = 100.0;  // iterations of a solver of which nothing is known
     std::vector<RankedSolver> members;
     for (const auto& ranked : order.solvers)
         if (can(registry, ranked.solver, needs_under(ranked.law, needs))) members.push_back(ranked);
@@ -143,9 +143,10 @@ public:
         bool has_start = settings.warm_start;
         std::vector<Solution> left(members.size());
         std::map<const Solver*, std::size_t> users;  // the member that used it last
+        bool hopes = false;                          // of the last turn
         const RoundsEnd end = run_rounds(members, [&](const Turn& turn) -> TurnResult {
             const RankedSolver& own = ranked[turn.member];
-            if (turn.work > 0.0 && runner.worst() <= acceptable_error(settings, turn.work)) {
+            if (turn.work > 0.0 && !hopes && runner.worst() <= acceptable_error(settings, turn.work)) {
                 report.near_goal = !(runner.worst() <= settings.tolerance);
                 return {TurnEnd::Done, runner.worst()};
             }
@@ -163,6 +164,7 @@ public:
             Solution& iterate = left[turn.member];
             iterate = turn.start ? left[*turn.start] : start;
             TurnResult result = runner.run(*solver, stage, iterate, turn.start || has_start);
+            hopes = result.hopes;
             if (own.law && result.end != TurnEnd::Done) {
                 start = iterate;
                 has_start = true;
@@ -198,7 +200,7 @@ private:
     void sharpen(const Prepared& problem, const Team& team, const SolveSettings& settings, bool begins_at_rest,
                  StageRunner& runner, SolveReport& report) {
         constexpr double least = 1e-6, rounding = 1e-5;
-        constexpr std::int64_t enough = 10;
+        constexpr double enough = 10.0;
         const auto newton = std::ranges::find_if(
             team.members, [](const Member& member) { return member.local && member.iterations >= enough; });
         if (settings.tolerance > least || newton == team.members.end()) return;
@@ -208,9 +210,9 @@ private:
         if (share <= (moves > 0.0 ? sharper : rounding)) return;
         Solver* solver = usable(team.ranked[static_cast<std::size_t>(newton - team.members.begin())], problem);
         if (!solver) return;
-        runner.run(
-            *solver,
-            {.reason = "sharper", .tighter = sharper * (moves > 0.0 ? 1.0 : share), .iterations = newton->iterations});
+        runner.run(*solver, {.reason = "sharper",
+                             .tighter = sharper * (moves > 0.0 ? 1.0 : share),
+                             .iterations = static_cast<std::int64_t>(newton->iterations)});
         report.status = Status::Solved;
     }
 

@@ -37,8 +37,9 @@ RankedSolver read_solver(const nlohmann::json& json) {
     ranked.solver = json.at("solver").get<std::string>();
     if (json.contains("options")) ranked.options = json.at("options").get<OptionTexts>();
     if (json.contains("law")) ranked.law = law_of(json.at("law").get<std::string>());
-    ranked.iterations = json.at("iterations").get<std::int64_t>();
-    if (ranked.iterations < 1) throw InputError(fmt::format("{} has {} iterations", ranked.solver, ranked.iterations));
+    ranked.iterations = json.at("iterations").get<double>();
+    if (!(ranked.iterations > 0.0))
+        throw InputError(fmt::format("{} has {} iterations", ranked.solver, ranked.iterations));
     return ranked;
 }
 

@@ -30,11 +30,11 @@ struct RankedSize {
     double rows_per_velocity = 0.0;
 };
 
-/// A solver with its options, and its iterations in the first round (rounds.hpp).
+/// A solver with its options, and its iterations in the first round (rounds.hpp), > 0.
 struct RankedSolver {
     std::string solver;
     OptionTexts options;
-    std::int64_t iterations = 0;
+    double iterations = 0.0;
     /// The law it solves with, if it is not the problem's: then it has one turn, in which it makes a start for those
     /// after it.
     std::optional<Law> law = {};

@@ -2,6 +2,7 @@
 #include "solver/rounds.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -19,10 +20,10 @@ struct Record {
     std::int64_t turn = 0;       // the number of its last turn; 0: it had none
 };
 
-/// 2ᵏ w, at most the largest number.
-std::int64_t doubled(std::int64_t iterations, int round) {
-    constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max();
-    return round > 62 || iterations > (most >> round) ? most : iterations << round;
+/// Of round k, at most 2⁶²: (2ᵏ − 1) w are before it, rounded down.
+std::int64_t iterations_of(int round, double first) {
+    const auto before = [first](int k) { return std::floor((std::exp2(k) - 1.0) * first); };
+    return static_cast<std::int64_t>(std::min(before(round + 1) - before(round), 0x1p62));
 }
 
 /// The member with the best iterate among those that others have left after this turn; none if no one has.
@@ -44,11 +45,21 @@ RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnRe
     std::int64_t turns = 0;
     double work = 0.0;
     for (int round = 0, stale = 0; stale < patience; ++round) {
-        bool worked = false, bettered = false;
+        bool worked = false, bettered = false, waits = false;
         for (std::size_t k = 0; k < members.size(); ++k) {
             Record& own = records[k];
             if (own.last == TurnEnd::Retired) continue;
-            Turn turn{k, round, doubled(members[k].iterations, round), work, own.last != TurnEnd::Passed, {}};
+            const double first = members[k].iterations;
+            Turn turn{.member = k,
+                      .round = round,
+                      .iterations = iterations_of(round, first),
+                      .work = work,
+                      .may_pass = own.last != TurnEnd::Passed,
+                      .start = {}};
+            if (turn.iterations < 1) {
+                waits = true;
+                continue;
+            }
             if (own.last == TurnEnd::Ended) {
                 turn.start = best_after(records, own.turn, k);
                 if (!turn.start || !members[k].can_start) continue;
@@ -62,7 +73,7 @@ RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnRe
             const TurnResult result = take(turn);
             if (result.end == TurnEnd::Done) return RoundsEnd::Done;
             worked = true;
-            work += static_cast<double>(result.iterations) / static_cast<double>(members[k].iterations);
+            work += static_cast<double>(result.iterations) / first;
             const bool in_vain = again && result.end == TurnEnd::Ended && !(result.error < better * begun);
             own.last = in_vain && !members[k].local ? TurnEnd::Retired : result.end;
             own.error = result.error;
@@ -72,6 +83,7 @@ RoundsEnd run_rounds(std::span<const Member> members, const std::function<TurnRe
                 own.lowest = own.error;
             }
         }
+        if (waits) continue;
         if (!worked) break;
         stale = bettered ? 0 : stale + 1;
     }

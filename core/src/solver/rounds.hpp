@@ -2,9 +2,11 @@
 // The principle of `auto`: the work that each solver gets doubles from round to round.
 //
 // Members take turns in a fixed order. In round k = 0, 1, … member i may work 2ᵏ wᵢ, counted in its own iterations, and
-// goes on from where it stopped. A member s that would solve the problem by itself with work B is through in the first
-// round k in which (2^(k+1) − 1) w_s ≥ B. The round before was not enough: (2ᵏ − 1) w_s < B. By then all members
-// together have worked at most (2^(k+1) − 1) W with W = Σ wᵢ (wᵢ in a common unit such as seconds), and so
+// goes on from where it stopped. By the end of the round that is (2^(k+1) − 1) wᵢ in all, rounded down: a member of
+// dear iterations, with wᵢ < 1, waits for its first turn. A member s that would solve the problem by itself with work B
+// is through in the first round k in which (2^(k+1) − 1) w_s ≥ B. The round before was not enough: (2ᵏ − 1) w_s < B. By
+// then all members together have worked at most (2^(k+1) − 1) W with W = Σ wᵢ (wᵢ in a common unit such as seconds),
+// and so
 //
 //     work of auto ≤ (1 + 2 B / w_s) W.
 //
@@ -23,9 +25,9 @@
 namespace delassus {
 
 struct Member {
-    std::int64_t iterations = 1;  ///< of its first turn, ≥ 1
-    bool can_start = true;        ///< it can begin at an iterate
-    bool local = false;           ///< it converges from near a solution: it begins at the best iterate of all members
+    double iterations = 1.0;  ///< of its first turn, > 0
+    bool can_start = true;    ///< it can begin at an iterate
+    bool local = false;       ///< it converges from near a solution: it begins at the best iterate of all members
 };
 
 /// What a member may do in its turn.
@@ -51,6 +53,7 @@ struct TurnResult {
     TurnEnd end;
     double error;                 ///< of the iterate that the member left; infinite or NaN if it is none
     std::int64_t iterations = 0;  ///< that the turn took
+    bool hopes = false;           ///< a forecast says that the member gets there in its next turn
 };
 
 /// How the rounds ended.

@@ -25,7 +25,11 @@ Forecast::Verdict Forecast::judge(std::int64_t iteration, double natural) {
     while (!over && next_ / 2 > iteration) next_ /= 2;
     const double now = std::log(std::max(natural, std::numeric_limits<double>::min()));
     const bool known = measured_ >= 2;
-    const bool reached = natural <= tolerance_ || (known && in_reach(iteration, natural, before_ - last_, last_ - now));
+    const auto reaches = [&](double turns) {
+        return natural <= tolerance_ || (known && in_reach(turns, iteration, natural, before_ - last_, last_ - now));
+    };
+    const bool reached = reaches(2.0);
+    hopes_ = over && reaches(5.0);
     failed_ = known && !reached ? failed_ + 1 : 0;
     before_ = std::exchange(last_, now);
     ++measured_;
@@ -33,10 +37,10 @@ Forecast::Verdict Forecast::judge(std::int64_t iteration, double natural) {
     return failed_ >= 2 ? Verdict::Pass : Verdict::GoOn;
 }
 
-bool Forecast::in_reach(std::int64_t iteration, double natural, double first, double second) const {
+bool Forecast::in_reach(double turns, std::int64_t iteration, double natural, double first, double second) const {
     if (!(second > 0.0)) return false;
     const double growth = first > 0.0 ? std::clamp(second / first, 1.0, 2.0) : 1.0;
-    const double limit = 2.0 * static_cast<double>(iterations_);
+    const double limit = turns * static_cast<double>(iterations_);
     double rest = std::log(natural / tolerance_), fall = growth * second;
     for (double k = static_cast<double>(iteration); k <= limit; k *= 2.0) {
         if (rest <= fall) return k * std::exp2(rest / fall) <= limit;
@@ -129,7 +133,8 @@ TurnResult StageRunner::run(Solver& solver, const Stage& stage, Solution& iterat
     add({result.solver, result.options, problem.law(), stage.reason, tolerance, status, result.message,
          result.iterations, result.seconds_setup + result.seconds_solve, error.natural},
         result);
-    return {end_of(status, verdict, other_law, solved, worst_of(error)), worst_of(error), result.iterations};
+    return {end_of(status, verdict, other_law, solved, worst_of(error)), worst_of(error), result.iterations,
+            forecast.hopes()};
 }
 
 TurnEnd StageRunner::end_of(Status status, Forecast::Verdict verdict, bool other_law, bool solved, double error) {

@@ -48,14 +48,18 @@ public:
     [[nodiscard]] bool due(std::int64_t iteration) const { return iteration >= next_; }
     /// Takes the error at an iteration that is due.
     DELASSUS_API Verdict judge(std::int64_t iteration, double natural);
+    /// At the end of a turn: whether the next one would do, of twice the iterations and at most four times.
+    [[nodiscard]] bool hopes() const { return hopes_; }
 
 private:
-    /// Whether the tolerance would be reached in twice the iterations, from this error after falls of r₁ and r₂.
-    [[nodiscard]] bool in_reach(std::int64_t iteration, double natural, double first, double second) const;
+    /// Whether the tolerance would be reached in so many turns, from this error after falls of r₁ and r₂.
+    [[nodiscard]] bool in_reach(double turns, std::int64_t iteration, double natural, double first,
+                                double second) const;
 
     double tolerance_;
     std::int64_t iterations_, next_;
     int measured_ = 0, failed_ = 0;
+    bool hopes_ = false;
     double before_ = 0.0, last_ = 0.0;  // ln e
 };
 
