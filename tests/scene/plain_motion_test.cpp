@@ -210,12 +210,12 @@ TEST(PlainMotion, ABallThatIsMovedAsideDoesNotEndInAnother) {
             "  - {{plane: {{}}, material: m, position: [{}, {}, 0], orientation: {{axis: [{}], angle: 90}}}}\n", x, y,
             axis);
     for (int k = 0; k < 200; ++k) {
+        const int column = k / 5 % 5, row = k % 5, layer = k / 25;
         const double aside = 0.025 * (k * 7919 % 101 / 101.0 - 0.5), along = 0.025 * (k * 6101 % 103 / 103.0 - 0.5);
         text += fmt::format(
             "- {{name: b{}, density: 1000, position: [{:.6f}, {:.6f}, {:.4f}], shapes: [{{sphere: "
             "{{radius: 0.1}}, material: m}}]}}\n",
-            k, -wall + 0.135 + 0.23 * (k / 5 % 5) + aside, -wall + 0.135 + 0.23 * (k % 5) + along,
-            0.12 + 0.25 * (k / 25));
+            k, -wall + 0.135 + 0.23 * column + aside, -wall + 0.135 + 0.23 * row + along, 0.12 + 0.25 * layer);
     }
     auto run = run_of(text);
     run.finish();
