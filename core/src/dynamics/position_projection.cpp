@@ -38,9 +38,11 @@ PositionProjection::PositionProjection(DynamicalSystem& system)
       constraint_(static_cast<std::size_t>(m_)),
       ways_(system) {}
 
-/// What unilateral rows there are, and by how much the gaps of those lack that had no row in the problem so far.
-double PositionProjection::collect(const State& end, double h, const VelocityContacts& contacts) {
-    double least = 0.0;
+/// Measures constraints and gaps, whose rows it collects.
+PositionProjection::Lack PositionProjection::measure(const State& end, double h, const VelocityContacts& contacts) {
+    Lack lack;
+    if (m_ > 0) system_.constraint(end, constraint_.data());
+    for (const double C : constraint_) lack.constraints = std::max(lack.constraints, std::abs(C));
     rows_.clear();
     if (contacts.any()) {
         rows_.measure_speeds_at(nullptr);
@@ -48,27 +50,22 @@ double PositionProjection::collect(const State& end, double h, const VelocityCon
         std::size_t row = 0;
         for (const auto& block : rows_.blocks()) {
             const double gap = rows_.rows()[row].gap;
-            if (block.along_normal() && gap < 0.0 && !keys_.contains(block.key))
-                least = std::max(least, contacts.least_gap(block.key) - gap);
+            if (block.along_normal() && gap < 0.0 && !std::ranges::binary_search(keys_, block.key))
+                lack.gaps = std::max(lack.gaps, contacts.least_gap(block.key) - gap);
             row += static_cast<std::size_t>(block.cone.rows);
         }
     }
-    return least;
+    return lack;
 }
 
-/// The problem; whether there is anything to undo. least: of collect().
-bool PositionProjection::assemble(const State& end, double h, double least, const VelocityContacts& contacts) {
-    double off = 0.0;
-    if (m_ > 0) system_.constraint(end, constraint_.data());
-    for (const double C : constraint_) off = std::max(off, std::abs(C));
-    if (off <= resolution_ && least <= resolution_) return false;
-    const auto m = static_cast<std::size_t>(m_);
+/// The problem, of what was measured.
+void PositionProjection::assemble(const State& end, double h, const Lack& lack, const VelocityContacts& contacts) {
     std::int32_t count = 0;
     problem_.b.assign(constraint_.begin(), constraint_.end());
     problem_.cones.clear();
     for (const std::int32_t rows : blocks_) problem_.cones.push_back(Cone::free(rows));
-    // Gaps wider than this are out of reach of what moves by about `off` and `least`.
-    const double reach = 10.0 * std::max(off, least) + resolution_;
+    // Gaps wider than this are out of reach of what moves by about what lacks.
+    const double reach = 10.0 * std::max(lack.constraints, lack.gaps) + resolution_;
     const auto for_each_near = [&](const auto& visit) {
         std::size_t row = 0;
         for (const auto& block : rows_.blocks()) {
@@ -85,12 +82,12 @@ bool PositionProjection::assemble(const State& end, double h, double least, cons
             D_.add(target, rows_.column()[static_cast<std::size_t>(e)], rows_.value()[static_cast<std::size_t>(e)]);
         problem_.b.push_back(rows_.rows()[row].gap - contacts.least_gap(block.key));
         problem_.cones.push_back(Cone::nonnegative(1));
-        keys_.insert(block.key);
+        keys_.push_back(block.key);
     });
+    std::ranges::sort(keys_);
     // What is off by rounding is left: rows that hold one body and imply one another would contradict each other by it.
     for (double& entry : problem_.b) entry = std::abs(entry) <= resolution_ ? 0.0 : entry / h;
     D_.finish_into(problem_.D);
-    return problem_.b.size() > m || off > resolution_;
 }
 
 /// E of the gaps, behind rows without one.
@@ -131,9 +128,10 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     constexpr int most_rounds = 8;
     moved_ = false;
     keys_.clear();
-    if (n_ == 0 || !assemble(end, h, collect(end, h, contacts), contacts)) return;
-    double off = 0.0;
-    for (const double C : constraint_) off = std::max(off, std::abs(C));
+    if (n_ == 0) return;
+    Lack lack = measure(end, h, contacts);
+    if (std::max(lack.constraints, lack.gaps) <= resolution_) return;
+    const double off = lack.constraints;
     problem_.name = "position";
     problem_.law = Law::Associated;
     problem_.H = problem.H;
@@ -141,6 +139,7 @@ void PositionProjection::project(const State& begin, State& end, double h, const
     delta_.assign(static_cast<std::size_t>(n_), 0.0);
     moved_ = !contacts.begins_deep();
     for (int round = 1;; ++round) {
+        assemble(end, h, lack, contacts);
         if (contacts.begins_deep()) {
             make_compliant();
         } else if (problem_.E.rows > 0) {
@@ -148,8 +147,8 @@ void PositionProjection::project(const State& begin, State& end, double h, const
         }
         move(begin, end, h, solver, report, method);
         if (round == most_rounds || keys_.empty()) break;
-        const double least = collect(end, h, contacts);
-        if (least <= resolution_ || !assemble(end, h, least, contacts)) break;
+        lack = measure(end, h, contacts);
+        if (lack.gaps <= resolution_) break;
     }
     if (m_ == 0) return;
     ways_.find(problem, begin, end, left);

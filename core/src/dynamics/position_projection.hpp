@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <unordered_set>
 #include <vector>
 
 #include "delassus/export.hpp"
@@ -36,8 +35,12 @@ public:
     void project_velocities(State& end, const SparseMatrix& H, StepSolver& solver, StepReport& report);
 
 private:
-    [[nodiscard]] double collect(const State& end, double h, const VelocityContacts& contacts);
-    [[nodiscard]] bool assemble(const State& end, double h, double least, const VelocityContacts& contacts);
+    /// By how much constraints are off, and by how much the gaps lack that had no row in the problem so far.
+    struct Lack {
+        double constraints = 0.0, gaps = 0.0;
+    };
+    [[nodiscard]] Lack measure(const State& end, double h, const VelocityContacts& contacts);
+    void assemble(const State& end, double h, const Lack& lack, const VelocityContacts& contacts);
     void make_compliant();
     void solve(StepSolver& solver, StepReport& report);
     void move(const State& begin, State& end, double h, StepSolver& solver, StepReport& report,
@@ -49,7 +52,7 @@ private:
     std::int32_t n_, m_;
     double resolution_;
     UnilateralRows rows_;
-    std::unordered_set<std::uint64_t> keys_;  // of the blocks that had rows in the problem
+    std::vector<std::uint64_t> keys_;  // of the blocks that had rows in the problem, ascending
     MatrixAssembler D_;
     Problem problem_;
     Solution solution_;

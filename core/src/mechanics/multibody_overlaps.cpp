@@ -7,23 +7,6 @@
 
 namespace delassus {
 
-const std::vector<ContactPoint>& MultibodySystem::Implementation::detect(const sdk::Team& team) {
-    const auto same_pose = [](const Pose& a, const Pose& b) {
-        return a.position == b.position && a.orientation == b.orientation;
-    };
-    const auto same_displacement = [](const BodyDisplacement& a, const BodyDisplacement& b) {
-        return a.translation == b.translation && a.rotation == b.rotation;
-    };
-    if (!std::equal(poses.begin(), poses.end(), detected.poses.begin(), detected.poses.end(), same_pose) ||
-        !std::equal(displacements.begin(), displacements.end(), detected.displacements.begin(),
-                    detected.displacements.end(), same_displacement)) {
-        detector->detect(poses, envelope, detected.contacts, team, displacements);
-        detected.poses = poses;
-        detected.displacements = displacements;
-    }
-    return detected.contacts;
-}
-
 namespace {
 
 using mechanics::Quaterniond;

@@ -15,6 +15,8 @@ namespace delassus {
 /// the share that a turn has in all the work: V ≥ 1/w, and so
 ///
 ///     ε ≤ L (η/L)^min(1, 1/w),      η after the first turn, √(η L) after two, ever nearer to L.
+///
+/// AutoSolver asks only where no forecast says that the next turn of the last member gets to η.
 inline double acceptable_error(const SolveSettings& settings, double work) {
     const double loosest = settings.loosest;
     if (!(loosest > settings.tolerance)) return settings.tolerance;

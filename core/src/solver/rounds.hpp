@@ -59,7 +59,9 @@ struct TurnResult {
 /// How the rounds ended.
 enum class RoundsEnd {
     Done,
-    Stale,  ///< no member bettered its own error, above rounding, by a tenth in three rounds, or none had a turn
+    /// No member bettered its own error, above rounding, by a tenth in three rounds in which none waited, or none had a
+    /// turn.
+    Stale,
 };
 
 /// Runs the rounds. take: runs a turn. A member that ended by itself begins next at the best iterate that another

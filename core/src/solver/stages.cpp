@@ -29,7 +29,7 @@ Forecast::Verdict Forecast::judge(std::int64_t iteration, double natural) {
         return natural <= tolerance_ || (known && in_reach(turns, iteration, natural, before_ - last_, last_ - now));
     };
     const bool reached = reaches(2.0);
-    hopes_ = over && reaches(5.0);
+    hopes_ = over && reaches(1.0 + 2.0 * 2.0);
     failed_ = known && !reached ? failed_ + 1 : 0;
     before_ = std::exchange(last_, now);
     ++measured_;

@@ -48,7 +48,7 @@ public:
     [[nodiscard]] bool due(std::int64_t iteration) const { return iteration >= next_; }
     /// Takes the error at an iteration that is due.
     DELASSUS_API Verdict judge(std::int64_t iteration, double natural);
-    /// At the end of a turn: whether the next one would do, of twice the iterations and at most four times.
+    /// At the end of a turn: whether the next one would do, which has twice the iterations and may go on to 4 K.
     [[nodiscard]] bool hopes() const { return hopes_; }
 
 private:
