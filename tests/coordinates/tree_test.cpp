@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cmath>
+#include <utility>
 
 #include "delassus/error.hpp"
 #include "delassus/joint_coordinates.hpp"
@@ -58,6 +59,11 @@ struct Mechanism {
         spring.stiffness = 30.0;
         spring.damping = 2.0;
         spring.rest_length = 1.0;
+        system.add_spring(spring);
+        std::swap(spring.first, spring.second);
+        std::swap(spring.first_point, spring.second_point);
+        spring.second = bodies[1];
+        spring.second_point = {0.9, 0.4, 0.1};
         system.add_spring(spring);
         BushingParameters bushing;
         bushing.second = bodies[1];
@@ -217,6 +223,27 @@ TEST(Tree, RowsBetweenBranchesDoNotReachTheTrunk) {
     joints.add_constraint_jacobian(displaced(joints), 0, assembler);
     const SparseMatrix& D = assembler.finish();
     EXPECT_EQ(D.column, (std::vector<std::int32_t>{1, 2, 3}));  // not the trunk's own
+}
+
+// Also where the joint names the later body first.
+TEST(Tree, SpringsAndDampersOfJointsActOnTheirCoordinateAlone) {
+    Mechanism mechanism(JointKind::Revolute);
+    const BodyIndex last = mechanism.system.add_body(tumbling("last", {2.5, 0.3, 0.2}));
+    JointParameters sprung = joint_of(JointKind::Revolute, last, mechanism.bodies[3], {2.2, 0.1, 0.1});
+    sprung.turn.stiffness = 7.0;
+    sprung.turn.damping = 0.3;
+    mechanism.system.add_joint(sprung);
+    mechanism.system.finish();
+    mechanism.system.assemble();
+    JointCoordinates joints(mechanism.system);
+    const State state = displaced(joints);
+    MatrixAssembler assembler;
+    assembler.begin(joints.n(), joints.n());
+    joints.add_stiffness(state, 2.0, Tangent::Symmetric, assembler);
+    joints.add_damping(state, 10.0, Tangent::Symmetric, assembler);
+    const SparseMatrix& H = assembler.finish();
+    ASSERT_EQ(H.column, std::vector<std::int32_t>{joints.n() - 1});
+    EXPECT_NEAR(H.value[0], 2.0 * 7.0 + 10.0 * 0.3, 1e-12);
 }
 
 // Limits, friction and a limited motor: D_A = D̄_A J, with the same gaps, cones and keys.

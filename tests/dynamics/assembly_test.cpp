@@ -2,6 +2,7 @@
 // Matrices and unilateral rows that are assembled again and again.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 
 #include "delassus/dynamical_system.hpp"
@@ -26,6 +27,35 @@ TEST(MatrixAssembler, FillsAMatrixOfAnyContent) {
         EXPECT_EQ(matrix.value, (std::vector<double>{1.0 * scale, 3.0 * scale}));
     }
     EXPECT_EQ(assembler.patterns(), 1);
+}
+
+TEST(MatrixAssembler, AddsProductsOrKeepsThem) {
+    const std::array<std::int32_t, 2> columns{0, 2};
+    const std::array<double, 2> g{1.0, -3.0};
+    for (const bool keeps : {false, true}) {
+        MatrixAssembler assembler;
+        if (keeps) assembler.keep_products();
+        for (const double factor : {2.0, 5.0}) {
+            assembler.begin(3, 3);
+            assembler.add(1, 1, 1.0);
+            assembler.add_product(columns, g, factor);
+            const SparseMatrix& matrix = assembler.finish();
+            int kept = 0;
+            assembler.for_each_product([&](auto places, auto values, double weight) {
+                ++kept;
+                EXPECT_TRUE(std::ranges::equal(places, columns));
+                EXPECT_TRUE(std::ranges::equal(values, g));
+                EXPECT_EQ(weight, factor);
+            });
+            EXPECT_EQ(kept, keeps ? 1 : 0);
+            if (keeps) {
+                EXPECT_EQ(matrix.value, std::vector<double>{1.0});
+            } else {
+                EXPECT_EQ(matrix.column, (std::vector<std::int32_t>{0, 2, 1, 0, 2}));
+                EXPECT_EQ(matrix.value, (std::vector<double>{factor, -3.0 * factor, 1.0, -3.0 * factor, 9.0 * factor}));
+            }
+        }
+    }
 }
 
 TEST(UnilateralRows, SortTheColumnsOfARow) {

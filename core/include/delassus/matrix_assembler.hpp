@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "delassus/export.hpp"
@@ -42,6 +43,27 @@ public:
             for (std::int32_t j = 0; j < columns; ++j) add(row + i, column + j, factor * block[i * columns + j]);
     }
 
+    /// Adds factor · g gᵀ, where g has these values in these columns, which ascend.
+    void add_product(std::span<const std::int32_t> columns, std::span<const double> g, double factor) {
+        if (keeps_products_) {
+            products_.push_back({factor, product_columns_.size(), columns.size()});
+            product_columns_.insert(product_columns_.end(), columns.begin(), columns.end());
+            product_values_.insert(product_values_.end(), g.begin(), g.end());
+            return;
+        }
+        for (std::size_t i = 0; i < columns.size(); ++i)
+            for (std::size_t j = 0; j < columns.size(); ++j) add(columns[i], columns[j], factor * (g[i] * g[j]));
+    }
+    /// From now on products are not added: for_each_product() has them.
+    void keep_products() { keeps_products_ = true; }
+    /// visit(columns, g, factor) for those of this assembly.
+    template <class Visit>
+    void for_each_product(Visit&& visit) const {
+        for (const Product& product : products_)
+            visit(std::span(product_columns_).subspan(product.first, product.size),
+                  std::span(product_values_).subspan(product.first, product.size), product.factor);
+    }
+
     /// Adds factor · matrix, of the size of this one.
     DELASSUS_API void add_matrix(const SparseMatrix& matrix, double factor = 1.0);
 
@@ -69,6 +91,14 @@ private:
     std::vector<std::int32_t> slot_;  // of each place in the matrix's values
     std::size_t count_ = 0;
     bool repeats_ = false;  // all places so far are those of the last assembly
+    struct Product {
+        double factor;
+        std::size_t first, size;
+    };
+    bool keeps_products_ = false;
+    std::vector<Product> products_;
+    std::vector<std::int32_t> product_columns_;
+    std::vector<double> product_values_;
     std::int64_t patterns_ = 0;
     SparseMatrix matrix_;
 };

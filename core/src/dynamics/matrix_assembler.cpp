@@ -14,6 +14,9 @@ void MatrixAssembler::begin(std::int32_t rows, std::int32_t columns) {
     matrix_.rows = rows;
     matrix_.columns = columns;
     count_ = 0;
+    products_.clear();
+    product_columns_.clear();
+    product_values_.clear();
 }
 
 void MatrixAssembler::add_matrix(const SparseMatrix& matrix, double factor) {

@@ -30,6 +30,8 @@ struct JointCoordinates::Implementation {
         state.q.assign(static_cast<std::size_t>(system.position_size()), 0.0);
         state.v.assign(n, 0.0);
         force.assign(n, 0.0);
+        stiffness.keep_products();
+        damping.keep_products();
         link_at.assign(n / 6, 0);
         for (std::size_t k = 1; k < tree.links().size(); ++k) {
             link_at[static_cast<std::size_t>(tree.links()[k].body_column / 6)] = k;
@@ -69,7 +71,7 @@ struct JointCoordinates::Implementation {
     State state;  // of the bodies
     std::vector<double> force, rates;
     // One for each matrix of the bodies, so that its pattern lasts from call to call.
-    MatrixAssembler stiffness, damping, gyroscopic, pull_of_rows, rows, joint_rows;
+    MatrixAssembler stiffness, damping, turned_damping, gyroscopic, pull_of_rows, rows, joint_rows;
     UnilateralRows body_rows;
     State then;  // of collect_contact()
     std::vector<double> way_then;
@@ -84,10 +86,31 @@ struct JointCoordinates::Implementation {
         double value;
     };
     std::vector<Entry> entries;
-    std::vector<std::pair<std::int32_t, Vector6>> way, other_way;
-    std::vector<std::int32_t> other_bodies, reached;
-    std::vector<char> reaches;
-    std::vector<Vector6> pushed;
+    std::vector<std::pair<std::int32_t, Vector6>> way;
+    std::vector<std::pair<std::int32_t, mechanics::Matrix6>> blocks;
+    /// Of project_matrix(): the forces on a link and on what it carries, by columns of J.
+    struct Carried {
+        std::vector<std::pair<std::int32_t, mechanics::Spatial>> columns;
+        std::vector<std::int32_t> place;  // in `columns`, by column; -1: none
+
+        void clear() {
+            for (const auto& [column, wrench] : columns) place[static_cast<std::size_t>(column)] = -1;
+            columns.clear();
+        }
+        void add(std::int32_t column, const mechanics::Spatial& more) {
+            const auto at = static_cast<std::size_t>(column);
+            if (at >= place.size()) place.resize(at + 1, -1);
+            if (place[at] < 0) {
+                place[at] = static_cast<std::int32_t>(columns.size());
+                columns.emplace_back(column, more);
+                return;
+            }
+            auto& known = columns[static_cast<std::size_t>(place[at])].second;
+            known.angular += more.angular;
+            known.linear += more.linear;
+        }
+    };
+    std::vector<Carried> carried;
 
     /// A body that a free joint holds and that carries none: its gyroscopic torque is that of free_spins().
     [[nodiscard]] bool spins_alone(std::size_t k) const {
@@ -196,43 +219,62 @@ struct JointCoordinates::Implementation {
         }
     }
 
-    /// H += factor · Jᵀ A J, or Jᵀ A ∂(J u)/∂q; A: of the bodies.
+    /// H += factor · Jᵀ A J, A: of the bodies.
+    void project(MatrixAssembler& A, double factor, MatrixAssembler& H) {
+        project_matrix(A.finish(), factor, false, H);
+        A.for_each_product([&](std::span<const std::int32_t> columns, std::span<const double> g, double weight) {
+            project_row(columns, g);
+            for (const auto& [row, own] : entries)
+                for (const auto& [column, other] : entries) H.add(row, column, factor * weight * (own * other));
+        });
+    }
+
+    /// H += factor · Jᵀ A J, or Jᵀ A ∂(J u)/∂q; A: of the bodies. As forces do, the columns of A J go from each body to
+    /// the ground, and each link takes of them what acts along its own freedoms.
     void project_matrix(const SparseMatrix& A, double factor, bool along_velocities, MatrixAssembler& H) {
-        const auto blocks = static_cast<std::size_t>(A.rows / 6);
-        reaches.assign(static_cast<std::size_t>(tree.n()), 0);
-        pushed.assign(reaches.size(), Vector6::Zero());
-        for (std::size_t row = 0; row < blocks; ++row) {
-            // A times the columns of J that reach these six rows, each once.
-            reached.clear();
-            other_bodies.clear();
-            const auto begin = static_cast<std::size_t>(A.row_start[6 * row]),
-                       end = static_cast<std::size_t>(A.row_start[6 * row + 6]);
-            for (std::size_t e = begin; e < end; ++e)
-                if (other_bodies.empty() || other_bodies.back() != A.column[e] / 6)
-                    other_bodies.push_back(A.column[e] / 6);
-            std::sort(other_bodies.begin(), other_bodies.end());
-            other_bodies.erase(std::unique(other_bodies.begin(), other_bodies.end()), other_bodies.end());
-            for (const std::int32_t body : other_bodies) {
-                mechanics::Matrix6 block = mechanics::Matrix6::Zero();
-                for (std::size_t i = 0; i < 6; ++i)
-                    for (auto e = static_cast<std::size_t>(A.row_start[6 * row + i]);
-                         e < static_cast<std::size_t>(A.row_start[6 * row + i + 1]); ++e)
-                        if (A.column[e] / 6 == body) block(static_cast<Eigen::Index>(i), A.column[e] % 6) += A.value[e];
+        if (A.column.empty()) return;
+        const std::size_t links = tree.links().size();
+        carried.resize(links);
+        for (Carried& one : carried) one.clear();
+        for (std::int32_t row = 0; row < A.rows / 6; ++row) {
+            const std::size_t own = link_at[static_cast<std::size_t>(row)];
+            const Matrix3d& turn = tree.motion(own).A;
+            find_blocks(A, row);
+            for (const auto& [body, block] : blocks) {
                 const std::size_t other = link_at[static_cast<std::size_t>(body)];
-                columns_of(other, other_way);
-                for (auto& [j, J] : other_way) {
-                    if (!reaches[static_cast<std::size_t>(j)]) reached.push_back(j);
-                    reaches[static_cast<std::size_t>(j)] = 1;
-                    pushed[static_cast<std::size_t>(j)] +=
-                        block * (along_velocities ? derivatives.turned_velocity(other, j) : J);
+                columns_of(other, way);
+                for (const auto& [j, J] : way) {
+                    const Vector6 pull = block * (along_velocities ? derivatives.turned_velocity(other, j) : J);
+                    carried[own].add(j, {turn * pull.tail<3>(), pull.head<3>()});
                 }
             }
-            if (reached.empty()) continue;
-            columns_of(link_at[row], way);
-            for (const std::int32_t j : reached) {
-                for (const auto& [i, own] : way) H.add(i, j, factor * own.dot(pushed[static_cast<std::size_t>(j)]));
-                pushed[static_cast<std::size_t>(j)].setZero();
-                reaches[static_cast<std::size_t>(j)] = 0;
+        }
+        for (std::size_t k = links; k-- > 1;) {
+            const Link& link = tree.links()[k];
+            const LinkMotion& motion = tree.motion(k);
+            for (const auto& [j, wrench] : carried[k].columns) {
+                for (std::int32_t i = 0; i < link.freedoms; ++i)
+                    H.add(
+                        link.column + i, j,
+                        factor * (motion.angular.col(i).dot(wrench.angular) + motion.linear.col(i).dot(wrench.linear)));
+                if (link.parent > 0)
+                    carried[static_cast<std::size_t>(link.parent)].add(
+                        j, {wrench.angular + motion.d.cross(wrench.linear), wrench.linear});
+            }
+        }
+    }
+
+    /// blocks ← those of the six rows of a body, by the bodies of their columns.
+    void find_blocks(const SparseMatrix& A, std::int32_t row) {
+        blocks.clear();
+        for (std::int32_t i = 0; i < 6; ++i) {
+            const auto at = static_cast<std::size_t>(6 * row + i);
+            for (auto e = static_cast<std::size_t>(A.row_start[at]); e < static_cast<std::size_t>(A.row_start[at + 1]);
+                 ++e) {
+                const std::int32_t body = A.column[e] / 6;
+                auto found = std::ranges::find(blocks, body, &std::pair<std::int32_t, mechanics::Matrix6>::first);
+                if (found == blocks.end()) found = blocks.insert(found, {body, mechanics::Matrix6::Zero()});
+                found->second(i, A.column[e] % 6) += A.value[e];
             }
         }
     }
@@ -479,13 +521,13 @@ void JointCoordinates::inverse_tangent(const double* delta, std::vector<Diagonal
 
 void JointCoordinates::add_mass(const State& state, double factor, MatrixAssembler& M) const {
     auto& self = *implementation_;
-    self.tree.place(state.q.data(), nullptr);
+    self.tree.place(state.q.data());
     self.tree.add_mass(factor, M);
 }
 
 void JointCoordinates::multiply_mass(const State& state, double factor, const double* x, double* result) const {
     auto& self = *implementation_;
-    self.tree.place(state.q.data(), nullptr);
+    self.tree.place(state.q.data());
     self.tree.multiply_mass(factor, x, result);
 }
 
@@ -515,13 +557,13 @@ void JointCoordinates::add_stiffness(const State& state, double factor, Tangent 
     if (forces) {
         self.stiffness.begin(n, n);
         self.bodies.add_stiffness(self.state, 1.0, tangent, self.stiffness);
-        self.project_matrix(self.stiffness.finish(), factor, false, H);
+        self.project(self.stiffness, factor, H);
     }
     if (!exact || !self.turns) return;
     if (forces) {
-        self.damping.begin(n, n);
-        self.bodies.add_damping(self.state, 1.0, tangent, self.damping);
-        self.project_matrix(self.damping.finish(), factor, true, H);
+        self.turned_damping.begin(n, n);
+        self.bodies.add_damping(self.state, 1.0, tangent, self.turned_damping);
+        self.project_matrix(self.turned_damping.finish(), factor, true, H);
         self.derivatives.geometry(self.forces_beside_weight().data(), self.adder(-factor, H));
     }
     self.derivatives.positions(self.adder(factor, H));
@@ -534,7 +576,7 @@ void JointCoordinates::add_damping(const State& state, double factor, Tangent ta
     if (self.bodies.has_stiffness()) {
         self.damping.begin(n, n);
         self.bodies.add_damping(self.state, 1.0, tangent, self.damping);
-        self.project_matrix(self.damping.finish(), factor, false, H);
+        self.project(self.damping, factor, H);
     }
     if (tangent != Tangent::Exact || !self.turns) return;
     self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
@@ -584,7 +626,7 @@ void JointCoordinates::add_stiff_tangent(const State& state, std::span<const std
     self.place(state);
     self.stiffness.begin(self.bodies.n(), self.bodies.n());
     self.bodies.add_stiff_tangent(self.state, stiff, of_stiffness, of_damping, self.stiffness);
-    self.project_matrix(self.stiffness.finish(), 1.0, false, H);
+    self.project(self.stiffness, 1.0, H);
 }
 
 void JointCoordinates::add_gyroscopic_damping(const State& state, double factor, Tangent tangent,
@@ -643,7 +685,7 @@ void JointCoordinates::add_inertial_stiffness(const State& state, const double* 
                                               Tangent tangent, MatrixAssembler& H) const {
     auto& self = *implementation_;
     if (!self.turns || tangent != Tangent::Exact) return;
-    self.tree.place(state.q.data(), nullptr);
+    self.tree.place(state.q.data());
     self.derivatives.set_acceleration(acceleration);
     self.derivatives.positions(self.adder(factor, H));
 }

@@ -267,8 +267,20 @@ Quaterniond quaternion_at(const double* q) {
 
 }  // namespace
 
+void KinematicTree::place(const double* q) {
+    if (placed_q_.empty() || !std::equal(placed_q_.begin(), placed_q_.end(), q)) place(q, nullptr);
+}
+
 void KinematicTree::place(const double* all_q, const double* all_v) {
     static constexpr double still[LinkMotion::most] = {};
+    const auto stands = [](double speed) { return speed == 0.0; };
+    const bool same =
+        !placed_q_.empty() && std::equal(placed_q_.begin(), placed_q_.end(), all_q) &&
+        (all_v ? std::equal(placed_v_.begin(), placed_v_.end(), all_v) : std::ranges::all_of(placed_v_, stands));
+    if (same) return;
+    placed_q_.assign(all_q, all_q + position_size_);
+    placed_v_.assign(static_cast<std::size_t>(n_), 0.0);
+    if (all_v) std::copy_n(all_v, n_, placed_v_.begin());
     for (std::size_t k = 1; k < links_.size(); ++k) {
         const Link& link = links_[k];
         LinkMotion& own = motions_[k];

@@ -101,8 +101,10 @@ public:
 
     // ---- At the state of the last place() ----
 
-    /// v may be null: the tree then stands still.
+    /// v may be null: the tree then stands still. What is placed so already stays.
     void place(const double* q, const double* v);
+    /// Where velocities do not matter.
+    void place(const double* q);
     [[nodiscard]] const LinkMotion& motion(std::size_t link) const { return motions_[link]; }
     /// q and v of the bodies.
     void write(State& bodies) const;
@@ -138,6 +140,8 @@ private:
     void gather(double factor, double* result);
     /// The inertia of a link about its mass centre in the axes of the world.
     [[nodiscard]] Matrix3d inertia(std::size_t link) const;
+
+    std::vector<double> placed_q_, placed_v_;  ///< of the last place()
 
     /// An articulated inertia: torque and force of the angular and the linear acceleration.
     struct Articulated {

@@ -332,15 +332,11 @@ void MultibodySystem::add_stiffness(const State& state, double factor, Tangent t
     for (const auto& spring : self.springs) {
         const auto columns = spring.row.columns(self.at, true);
         spring.row.gradient(self.at, columns, self.gradient);
-        if (spring.definite && tangent == Tangent::Symmetric) {
-            const RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose();
-            add_local(columns, K, factor, tangent, H);
-            continue;
-        }
+        add_row_product(columns, self.gradient, factor * spring.stiffness, H);
+        if (spring.definite && tangent == Tangent::Symmetric) continue;
         spring.row.hessian(self.at, columns, self.hessian);
         const RowVector turning = self.hessian.transpose() * velocities_of(columns, self.at);
-        RowMatrix K = spring.stiffness * self.gradient * self.gradient.transpose() +
-                      tension(spring, columns, self.gradient, self.at, state.t) * self.hessian;
+        RowMatrix K = tension(spring, columns, self.gradient, self.at, state.t) * self.hessian;
         K += spring.damping * self.gradient * turning.transpose();
         add_local(columns, K, factor, tangent, H);
     }
@@ -390,8 +386,7 @@ void MultibodySystem::add_damping(const State& state, double factor, Tangent tan
         if (spring.damping == 0.0) continue;
         const auto columns = spring.row.columns(self.at);
         spring.row.gradient(self.at, columns, self.gradient);
-        const RowMatrix R = spring.damping * self.gradient * self.gradient.transpose();
-        add_local(columns, R, factor, tangent, H);
+        add_row_product(columns, self.gradient, factor * spring.damping, H);
     }
     for (const auto& damper : self.turn_dampers)
         add_damper(
@@ -477,8 +472,7 @@ void MultibodySystem::add_stiff_tangent(const State& state, std::span<const std:
     const auto& self = *implementation_;
     self.place(state);
     for_each_spring(self, stiff, [&](const auto& spring, const RowColumns& columns) {
-        const RowMatrix outer = self.gradient * self.gradient.transpose();
-        add_local(columns, outer, of_stiffness * spring.stiffness + of_damping * spring.damping, Tangent::Symmetric, H);
+        add_row_product(columns, self.gradient, of_stiffness * spring.stiffness + of_damping * spring.damping, H);
     });
 }
 

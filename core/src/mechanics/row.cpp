@@ -192,6 +192,23 @@ void Row::hessian(const Placements& at, const RowColumns& columns, RowMatrix& re
     }
 }
 
+void add_row_product(const RowColumns& columns, const RowVector& g, double factor, MatrixAssembler& H) {
+    std::array<std::int32_t, 6 * RowColumns::most> place{};
+    std::array<double, 6 * RowColumns::most> value{};
+    std::array<std::size_t, RowColumns::most> order{0, 1, 2, 3};
+    const auto bodies = static_cast<std::size_t>(columns.bodies);
+    for (std::size_t k = 1; k < bodies; ++k)
+        for (std::size_t i = k; i > 0 && columns.column[order[i]] < columns.column[order[i - 1]]; --i)
+            std::swap(order[i], order[i - 1]);
+    std::size_t count = 0;
+    for (const std::size_t k : std::span(order).first(bodies))
+        for (int i = 0; i < 6 && columns.column[k] >= 0; ++i, ++count) {
+            place[count] = columns.column[k] + i;
+            value[count] = g[6 * static_cast<Eigen::Index>(k) + i];
+        }
+    H.add_product(std::span(place).first(count), std::span(value).first(count), factor);
+}
+
 void add_local(const RowColumns& columns, const RowMatrix& matrix, double factor, Tangent tangent, MatrixAssembler& H) {
     for (int a = 0; a < columns.bodies; ++a)
         for (int b = 0; b < columns.bodies; ++b) {

@@ -108,6 +108,8 @@ struct Row {
     void hessian(const Placements& at, const RowColumns& columns, RowMatrix& result) const;
 };
 
+/// H += factor · g gᵀ, over columns. Columns of prescribed bodies are left out.
+void add_row_product(const RowColumns& columns, const RowVector& g, double factor, MatrixAssembler& H);
 /// H += factor · matrix, over columns; its symmetric part if asked. Columns of prescribed bodies are left out.
 void add_local(const RowColumns& columns, const RowMatrix& matrix, double factor, Tangent tangent, MatrixAssembler& H);
 

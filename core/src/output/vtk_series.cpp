@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include "output/surfaces.hpp"
 #include "support/atomic_file.hpp"
@@ -15,35 +16,49 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the files say that they are little-endian");
 
+template <class Number>
+constexpr std::string_view vtk_type = std::is_same_v<Number, float> ? "Float32" : "Int32";
+
 /// The appended section of a VTK file: arrays as raw bytes, each after its length.
 class Appended {
 public:
+    /// The element of an array of so many values, whose bytes come after those of the arrays before it: add().
     template <class Number>
-    std::string add(std::string_view name, std::string_view type, int components, const std::vector<Number>& values) {
-        const std::string element =
+    std::string element(std::string_view name, int components, std::size_t count) {
+        const std::string text =
             fmt::format(R"(<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="appended" offset="{}"/>)",
-                        type, name, components, bytes_.size());
-        const auto length = static_cast<std::uint64_t>(values.size() * sizeof(Number));
-        bytes_.append(reinterpret_cast<const char*>(&length), sizeof length);
-        bytes_.append(reinterpret_cast<const char*>(values.data()), length);
-        return element + "\n";
+                        vtk_type<Number>, name, components, end_);
+        end_ += sizeof(std::uint64_t) + count * sizeof(Number);
+        return text + "\n";
     }
-    [[nodiscard]] const std::string& bytes() const { return bytes_; }
+    /// Of all arrays that have an element.
+    [[nodiscard]] std::size_t size() const { return end_; }
+
+    template <class Number>
+    static void add(const std::vector<Number>& values, std::string& bytes) {
+        const auto length = static_cast<std::uint64_t>(values.size() * sizeof(Number));
+        bytes.append(reinterpret_cast<const char*>(&length), sizeof length);
+        bytes.append(reinterpret_cast<const char*>(values.data()), length);
+    }
 
 private:
-    std::string bytes_;
+    std::size_t end_ = 0;
 };
 
-/// A file of one piece. head: the piece's counts, as attributes; body: its elements.
-std::string polydata(double t, const std::string& head, const std::string& body, const Appended& data) {
+/// A file of one piece up to its appended section. head: the piece's counts, as attributes; body: its elements.
+std::string polydata(double t, std::string_view head, std::string_view body) {
     return fmt::format(
-               "<?xml version=\"1.0\"?>\n"
-               "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-               "<PolyData>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
-               "format=\"ascii\">{:.17g}</DataArray>\n</FieldData>\n<Piece {}>\n",
-               t, head) +
-           body + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_" + data.bytes() +
-           "\n</AppendedData>\n</VTKFile>\n";
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+        "<PolyData>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
+        "format=\"ascii\">{:.17g}</DataArray>\n</FieldData>\n<Piece {}>\n{}</Piece>\n</PolyData>\n"
+        "<AppendedData encoding=\"raw\">\n_",
+        t, head, body);
+}
+constexpr std::string_view end_of_file = "\n</AppendedData>\n</VTKFile>\n";
+
+void add_point(const Vector3& point, std::vector<float>& points) {
+    for (const double x : point) points.push_back(static_cast<float>(x));
 }
 
 /// How far from the origin bodies and shapes reach at the start: the size at which planes are drawn.
@@ -64,6 +79,50 @@ VtkSeries::VtkSeries(std::filesystem::path folder, std::string name, const Multi
     elements_ = system.element_surface();
     loose_nodes_ = system.loose_nodes();
     cables_ = system.cables();
+    find_cells();
+}
+
+// The cells come in the order that VTK wants them in: vertices, lines, polygons. Their corners are numbers of points:
+// bodies, nodes, surfaces of shapes.
+void VtkSeries::find_cells() {
+    std::vector<std::int32_t> body, vertices, vertex_ends, lines, line_ends, corners, corner_ends;
+    const std::int32_t bodies = system_.body_count(), first_node = bodies;
+    const auto add_cell = [&](const auto& points, std::int32_t first, std::int32_t of, auto& all, auto& ends) {
+        for (const std::int32_t point : points) all.push_back(first + point);
+        ends.push_back(static_cast<std::int32_t>(all.size()));
+        body.push_back(of);
+    };
+    for (BodyIndex i = 0; i < bodies; ++i) add_cell(std::array{i}, 0, i, vertices, vertex_ends);
+    for (const auto node : loose_nodes_) add_cell(std::array{node}, first_node, bodies, vertices, vertex_ends);
+    for (const auto& cable : cables_) add_cell(cable, first_node, bodies, lines, line_ends);
+    std::int32_t point_count = first_node + system_.node_count();
+    for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+        for (const auto& triangle : surfaces_[i].triangles)
+            add_cell(triangle, point_count, system_.shapes()[i].body, corners, corner_ends);
+        point_count += static_cast<std::int32_t>(surfaces_[i].vertices.size());
+    }
+    for (const auto& triangle : elements_) add_cell(triangle, first_node, bodies, corners, corner_ends);
+
+    counts_ = fmt::format(
+        R"(NumberOfPoints="{}" NumberOfVerts="{}" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="{}")",
+        point_count, vertex_ends.size(), line_ends.size(), corner_ends.size());
+    Appended data;
+    const auto add = [&](const char* section, const auto& points, const auto& ends) {
+        elements_xml_ += fmt::format("<{}>\n", section);
+        elements_xml_ += data.element<std::int32_t>("connectivity", 1, points.size());
+        elements_xml_ += data.element<std::int32_t>("offsets", 1, ends.size());
+        elements_xml_ += fmt::format("</{}>\n", section);
+        for (const auto* array : {&points, &ends}) Appended::add(*array, cells_);
+    };
+    add("Verts", vertices, vertex_ends);
+    add("Lines", lines, line_ends);
+    add("Polys", corners, corner_ends);
+    elements_xml_ += "<CellData>\n" + data.element<std::int32_t>("body", 1, body.size());
+    Appended::add(body, cells_);
+    elements_xml_ += data.element<float>("speed", 1, body.size()) + "</CellData>\n";
+    elements_xml_ +=
+        "<Points>\n" + data.element<float>("points", 3, 3 * static_cast<std::size_t>(point_count)) + "</Points>\n";
+    frame_bytes_ = data.size() + 1024;
 }
 
 std::string VtkSeries::file_name(std::int64_t number) const {
@@ -87,78 +146,41 @@ std::int64_t VtkSeries::picture_bytes() const {
 
 void VtkSeries::write(std::int64_t number, const State& state) const {
     std::vector<float> points, speed;
-    std::vector<std::int32_t> vertices, vertex_ends, lines, line_ends, corners, corner_ends, body_of_cell;
-    const auto add_point = [&](const Vector3& point) {
-        for (const double x : point) points.push_back(static_cast<float>(x));
-    };
-    const auto add_cell = [&](BodyIndex body) {
-        body_of_cell.push_back(body);
-        double v = 0.0;
-        if (body != world_body) {
-            const auto velocity = system_.velocities(state, body)[0];
-            v = std::hypot(velocity[0], velocity[1], velocity[2]);
-        }
-        speed.push_back(static_cast<float>(v));
-    };
-    // Cells made of nodes belong to no body and have the mean speed of their nodes.
+    std::vector<float> of_body;
+    // Cells made of nodes have the mean speed of their nodes.
     const auto add_node_cell = [&](const auto& nodes) {
         double v = 0.0;
         for (const auto node : nodes) {
             const Vector3 w = system_.node_velocity(state, node);
             v += std::hypot(w[0], w[1], w[2]) / static_cast<double>(nodes.size());
         }
-        body_of_cell.push_back(system_.body_count());
         speed.push_back(static_cast<float>(v));
     };
-    // The cells come in the order that VTK wants them in: vertices, lines, polygons.
     for (BodyIndex body = 0; body < system_.body_count(); ++body) {
-        vertices.push_back(body);
-        vertex_ends.push_back(body + 1);
-        add_point(system_.pose(state, body).position);
-        add_cell(body);
+        add_point(system_.pose(state, body).position, points);
+        const Vector3 v = system_.velocities(state, body)[0];
+        of_body.push_back(static_cast<float>(std::hypot(v[0], v[1], v[2])));
     }
-    const auto first_node = static_cast<std::int32_t>(points.size() / 3);
-    for (std::int32_t node = 0; node < system_.node_count(); ++node) add_point(system_.node_position(state, node));
-    for (const auto node : loose_nodes_) {
-        vertices.push_back(first_node + node);
-        vertex_ends.push_back(static_cast<std::int32_t>(vertices.size()));
-        add_node_cell(std::array{node});
-    }
-    for (const auto& cable : cables_) {
-        for (const auto node : cable) lines.push_back(first_node + node);
-        line_ends.push_back(static_cast<std::int32_t>(lines.size()));
-        add_node_cell(cable);
-    }
+    for (std::int32_t node = 0; node < system_.node_count(); ++node)
+        add_point(system_.node_position(state, node), points);
+    speed = of_body;
+    for (const auto node : loose_nodes_) add_node_cell(std::array{node});
+    for (const auto& cable : cables_) add_node_cell(cable);
     for (std::size_t i = 0; i < surfaces_.size(); ++i) {
         const BodyIndex body = system_.shapes()[i].body;
         const Pose pose = body == world_body ? Pose{} : system_.pose(state, body);
-        const auto first = static_cast<std::int32_t>(points.size() / 3);
-        for (const auto& vertex : surfaces_[i].vertices) add_point(transformed(pose, vertex));
-        for (const auto& triangle : surfaces_[i].triangles) {
-            for (const auto corner : triangle) corners.push_back(first + corner);
-            corner_ends.push_back(static_cast<std::int32_t>(corners.size()));
-            add_cell(body);
-        }
+        for (const auto& vertex : surfaces_[i].vertices) add_point(transformed(pose, vertex), points);
+        speed.insert(speed.end(), surfaces_[i].triangles.size(),
+                     body == world_body ? 0.0F : of_body[static_cast<std::size_t>(body)]);
     }
-    for (const auto& triangle : elements_) {
-        for (const auto node : triangle) corners.push_back(first_node + node);
-        corner_ends.push_back(static_cast<std::int32_t>(corners.size()));
-        add_node_cell(triangle);
-    }
-    Appended data;
-    const std::string head = fmt::format(
-        R"(NumberOfPoints="{}" NumberOfVerts="{}" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="{}")",
-        points.size() / 3, vertex_ends.size(), line_ends.size(), corner_ends.size());
-    std::string xml = "<CellData>\n" + data.add("body", "Int32", 1, body_of_cell) +
-                      data.add("speed", "Float32", 1, speed) + "</CellData>\n";
-    xml += "<Points>\n" + data.add("points", "Float32", 3, points) + "</Points>\n";
-    xml += "<Verts>\n" + data.add("connectivity", "Int32", 1, vertices) + data.add("offsets", "Int32", 1, vertex_ends) +
-           "</Verts>\n";
-    xml += "<Lines>\n" + data.add("connectivity", "Int32", 1, lines) + data.add("offsets", "Int32", 1, line_ends) +
-           "</Lines>\n";
-    xml += "<Polys>\n" + data.add("connectivity", "Int32", 1, corners) + data.add("offsets", "Int32", 1, corner_ends) +
-           "</Polys>\n";
-    write_file_atomically(folder_ / file_name(number), polydata(state.t, head, xml, data));
+    for (const auto& triangle : elements_) add_node_cell(triangle);
+    std::string file = polydata(state.t, counts_, elements_xml_);
+    file.reserve(file.size() + frame_bytes_);
+    file += cells_;
+    Appended::add(speed, file);
+    Appended::add(points, file);
+    file += end_of_file;
+    write_file_atomically(folder_ / file_name(number), file);
 }
 
 void VtkSeries::write_contacts(std::int64_t number, double t, const std::vector<ContactRecord>& contacts) const {
@@ -176,16 +198,26 @@ void VtkSeries::write_contacts(std::int64_t number, double t, const std::vector<
         vertices.push_back(static_cast<std::int32_t>(i));
         ends.push_back(static_cast<std::int32_t>(i + 1));
     }
-    Appended data;
     const std::string head = fmt::format(
         R"(NumberOfPoints="{0}" NumberOfVerts="{0}" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="0")",
         contacts.size());
-    std::string xml = "<PointData>\n" + data.add("force", "Float32", 3, force) + data.add("gap", "Float32", 1, gap) +
-                      data.add("first", "Int32", 1, first) + data.add("second", "Int32", 1, second) + "</PointData>\n";
-    xml += "<Points>\n" + data.add("points", "Float32", 3, points) + "</Points>\n";
-    xml += "<Verts>\n" + data.add("connectivity", "Int32", 1, vertices) + data.add("offsets", "Int32", 1, ends) +
-           "</Verts>\n";
-    write_file_atomically(folder_ / contacts_file_name(number), polydata(t, head, xml, data));
+    Appended data;
+    std::string bytes;
+    const auto element = [&](const char* name, int components, const auto& values) {
+        Appended::add(values, bytes);
+        return data.element<typename std::decay_t<decltype(values)>::value_type>(name, components, values.size());
+    };
+    std::string xml = "<PointData>\n" + element("force", 3, force);
+    xml += element("gap", 1, gap);
+    xml += element("first", 1, first);
+    xml += element("second", 1, second) + "</PointData>\n";
+    xml += "<Points>\n" + element("points", 3, points) + "</Points>\n";
+    xml += "<Verts>\n" + element("connectivity", 1, vertices);
+    xml += element("offsets", 1, ends) + "</Verts>\n";
+    std::string file = polydata(t, head, xml);
+    file += bytes;
+    file += end_of_file;
+    write_file_atomically(folder_ / contacts_file_name(number), file);
 }
 
 void write_vtk_collection(const std::filesystem::path& file, const std::string& folder,

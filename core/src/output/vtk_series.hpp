@@ -34,6 +34,8 @@ public:
     [[nodiscard]] std::string contacts_file_name(std::int64_t number) const;
 
 private:
+    void find_cells();
+
     std::filesystem::path folder_;
     std::string name_;
     const MultibodySystem& system_;
@@ -41,6 +43,9 @@ private:
     std::vector<std::array<std::int32_t, 3>> elements_;  // surface of the elements, triangles of nodes
     std::vector<std::int32_t> loose_nodes_;
     std::vector<std::array<std::int32_t, 2>> cables_;
+    // Of a file, what is the same in every frame: the counts and elements of its piece, the bytes of its cells.
+    std::string counts_, elements_xml_, cells_;
+    std::size_t frame_bytes_ = 0;  // of all arrays
 };
 
 /// One system's part of a collection.
