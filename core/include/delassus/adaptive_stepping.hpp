@@ -103,6 +103,11 @@ private:
     void find_held(const Trial& trial);
     /// By which a trial errs where sliding turns round in it.
     void note_turns(const State& begin, Trial& trial, double h, StepSolver& solver);
+    /// Keys of what touches at one end of a trial, by the rows there, or pushes in the half at that end; ascending.
+    [[nodiscard]] std::vector<std::uint64_t> find_touching(const UnilateralRows& rows, const StepReport& half) const;
+    /// By what accelerations change from the beginning of a trial until its end, times its size h: of the velocity, by
+    /// its size, that changes most.
+    [[nodiscard]] double jump_in(const State& begin, const Trial& trial, double h, StepSolver& solver);
     /// The longest trial before an impact that comes at `impact` in one of size h. h ← its size; 0: there is none.
     [[nodiscard]] Trial until_impact(const State& begin, double impact, double& h, StepSolver& solver);
     [[nodiscard]] double error_of(const State& begin, const State& whole, const State& halves, double h,

@@ -95,6 +95,15 @@ void for_each_sliding(const UnilateralRows& rows, Act act) {
     }
 }
 
+/// Ascending.
+std::vector<std::uint64_t> keys_that_push(const StepReport& report) {
+    std::vector<std::uint64_t> keys;
+    for (const auto& [key, force] : report.reactions)
+        if (force[0] > 0.0) keys.push_back(key);
+    std::ranges::sort(keys);
+    return keys;
+}
+
 }  // namespace
 
 StepControl StepControl::within(double limit, double h) {
@@ -257,6 +266,11 @@ void AdaptiveStepping::count(const StepReport& report) {
 // where bodies part. An edge is passed once, so that what a short step errs by may be what a hundredth of the longest
 // step may.
 //
+// Where other contacts carry a body than before, as where it goes from one ground to another one with more friction or
+// less, forces jump likewise, and in the first or the last quarter of a step the whole and both halves see one of the
+// two alone. So where what touches is not the same at both ends, it is asked what acts shortly after each of them, too,
+// if nothing strikes there: a change of acceleration a makes a speed wrong by a quarter of a h at most.
+//
 // ---- Where dry friction turns round ----
 //
 // A method takes friction by the speed at the end of a step: where the sliding turns round within it, after u₋/|a₋|,
@@ -281,10 +295,7 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     double fastest = 0.0;
     for (std::size_t i = 0; i < v.size(); ++i) fastest = std::max(fastest, std::abs(v[i]) / size(i));
     trial.slow = control_.slow * std::max(1.0, rounding_of_speed * fastest * control_.unit / control_.absolute);
-    pushed_.clear();
-    for (const auto& [key, force] : trial.second.reactions)
-        if (force[0] > 0.0) pushed_.push_back(key);
-    std::sort(pushed_.begin(), pushed_.end());
+    pushed_ = keys_that_push(trial.second);
     const auto pushed = [this](const UnilateralRows::Block& block) {
         return std::binary_search(pushed_.begin(), pushed_.end(), block.key);
     };
@@ -294,7 +305,7 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
         trial.error = std::max(trial.error, once * share_of_wrong_speed * beyond / trial.slow);
     };
     system_.collect_unilateral(trial.end, moment(), rows_);
-    const bool steady = trial.second.impact_speed == 0.0;
+    const bool steady = trial.second.impact_speed <= trial.slow;
     for_each_normal(rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
         if (pushed(block)) {
             if (steady) {
@@ -306,11 +317,55 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
             trial.closes_in = std::min(trial.closes_in, -gap / speed);
         }
     });
-    if (!steady || trial.first.impact_speed > 0.0) return;
+    if (!steady || trial.first.impact_speed > trial.slow) return;
     note_turns(begin, trial, h, solver);
     for_each_normal(begin_rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
         if (std::abs(gap) <= system_.gap_resolution() && !pushed(block)) note(-speed);
     });
+    if (find_touching(begin_rows_, trial.first) == find_touching(rows_, trial.second)) return;
+    const double allowed = control_.absolute / control_.unit;
+    trial.error = std::max(trial.error, once * share_of_wrong_speed * jump_in(begin, trial, h, solver) / allowed);
+}
+
+std::vector<std::uint64_t> AdaptiveStepping::find_touching(const UnilateralRows& rows, const StepReport& half) const {
+    std::vector<std::uint64_t> keys = keys_that_push(half);
+    const std::size_t pushing = keys.size();
+    std::size_t row = 0;
+    for (const auto& block : rows.blocks()) {
+        const bool near = block.along_normal() && rows.rows()[row].gap <= system_.gap_resolution();
+        if (near && !std::binary_search(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(pushing), block.key))
+            keys.push_back(block.key);
+        row += static_cast<std::size_t>(block.cone.rows);
+    }
+    std::ranges::sort(keys);
+    return keys;
+}
+
+double AdaptiveStepping::jump_in(const State& begin, const Trial& trial, double h, StepSolver& solver) {
+    constexpr double share_of_look = 0.125;
+    std::array<std::vector<double>, 4> accelerations;
+    const auto set = [&](std::size_t k, const std::vector<double>& from, const std::vector<double>& to, double time) {
+        accelerations[k].resize(from.size());
+        for (std::size_t i = 0; i < from.size(); ++i) accelerations[k][i] = (to[i] - from[i]) / time;
+    };
+    set(1, begin.v, trial.middle, 0.5 * h);
+    set(2, trial.middle, trial.end.v, 0.5 * h);
+    const auto look = [&](std::size_t k, const State& from, std::size_t otherwise) {
+        State state = from;
+        const StepReport report = stepper_.step(state, share_of_look * h, solver);
+        count(report);
+        set(k, from.v, state.v, share_of_look * h);
+        if (report.impact_speed > trial.slow) accelerations[k] = accelerations[otherwise];
+    };
+    stepper_.load(trial.memory);
+    look(3, trial.end, 2);
+    stepper_.load(memory_);
+    look(0, begin, 1);
+    double worst = 0.0;
+    for (std::size_t k = 0; k + 1 < accelerations.size(); ++k)
+        for (std::size_t i = 0; i < begin.v.size(); ++i)
+            worst = std::max(worst, h * std::abs(accelerations[k + 1][i] - accelerations[k][i]) / size(i));
+    return worst;
 }
 
 // rows_ are those of trial.end.
@@ -356,17 +411,27 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
         count(stepper_.step(state, 0.5 * h, solver));
         after = std::move(state.v);
     };
+    // What time prescribes of a row changes the speed that is wanted of a motor, by so much until the end.
+    const auto drift_of = [&](const UnilateralRows::Block& block, std::size_t row) {
+        double drift = 0.0;
+        if (block.along_normal()) return drift;
+        for_each_sliding(rows_, [&](const UnilateralRows::Block& other, std::size_t first, std::size_t) {
+            if (other.key == block.key) drift = rows_.rows()[first].rate_now - begin_rows_.rows()[row].rate_now;
+        });
+        return drift;
+    };
     // Of two sliding speeds with these products: what the second may be off by where they oppose each other.
     const auto turned = [](double product, double square, double other_square) {
         return product < 0.0 ? std::sqrt(std::min(square, other_square)) : 0.0;
     };
     for_each_sliding(begin_rows_, [&](const UnilateralRows::Block& block, std::size_t first, std::size_t rows) {
         if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) return;
+        const double drift = drift_of(block, first);
         double bb = 0.0, bm = 0.0, be = 0.0, mm = 0.0, me = 0.0, ee = 0.0;  // of begin, middle and end
         for (std::size_t row = first; row < first + rows; ++row) {
             const double b = speed_now(begin_rows_, row, begin.v.data()),
-                         m = speed_now(begin_rows_, row, trial.middle.data()),
-                         e = speed_now(begin_rows_, row, trial.end.v.data());
+                         m = speed_now(begin_rows_, row, trial.middle.data()) + 0.5 * drift,
+                         e = speed_now(begin_rows_, row, trial.end.v.data()) + drift;
             bb += b * b;
             bm += b * m;
             be += b * e;
@@ -380,8 +445,8 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
             if (after.empty()) go_on();
             double ma = 0.0, aa = 0.0;
             for (std::size_t row = first; row < first + rows; ++row) {
-                const double a = speed_now(begin_rows_, row, after.data());
-                ma += a * speed_now(begin_rows_, row, trial.middle.data());
+                const double a = speed_now(begin_rows_, row, after.data()) + 1.5 * drift;
+                ma += a * (speed_now(begin_rows_, row, trial.middle.data()) + 0.5 * drift);
                 aa += a * a;
             }
             speed = std::max(speed, turned(ma, mm, aa));

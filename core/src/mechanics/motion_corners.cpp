@@ -16,17 +16,20 @@ std::vector<double> jumps_of(const Motion& motion) {
     constexpr double near = 1e-6, share = 1e-3;
     const std::vector<double>& corners = motion.corners;
     std::vector<bool> jumps(corners.size(), false);
-    for (const auto* part : {&motion.value, &motion.rate, &motion.acceleration}) {
-        if (!*part) continue;
+    for (const auto* function : {&motion.value, &motion.rate, &motion.acceleration}) {
+        if (!*function) continue;
         std::vector<double> change(corners.size());
         double scale = 0.0;
         for (std::size_t i = 0; i < corners.size(); ++i) {
             double spacing = motion.period > 0.0 ? motion.period : 1.0;
             if (i > 0) spacing = std::min(spacing, corners[i] - corners[i - 1]);
             if (i + 1 < corners.size()) spacing = std::min(spacing, corners[i + 1] - corners[i]);
-            const double before = (*part)(corners[i] - near * spacing), after = (*part)(corners[i] + near * spacing);
+            const double before = (*function)(corners[i] - near * spacing),
+                         after = (*function)(corners[i] + near * spacing);
             change[i] = std::abs(after - before);
             scale = std::max({scale, std::abs(before), std::abs(after)});
+            for (const double share_of_piece : {0.25, 0.5, 0.75})
+                scale = std::max(scale, std::abs((*function)(corners[i] + share_of_piece * spacing)));
         }
         for (std::size_t i = 0; i < corners.size(); ++i) jumps[i] = jumps[i] || change[i] > share * scale;
     }
@@ -56,8 +59,18 @@ void MotionCorners::add(const Motion& motion) {
     if (!motion.is_constant) varies_ = true;
     if (motion.oscillation_period > 0.0)
         shortest_oscillation_ = std::min(shortest_oscillation_, motion.oscillation_period);
+    if (motion.passage > 0.0) passages_.push_back({motion.corners[0], motion.corners[0] + motion.passage});
     all_.add(motion.corners, motion.period);
     jumps_.add(jumps_of(motion), motion.period);
+}
+
+// What is shorter than some steps begins with one.
+double MotionCorners::longest_step(double t) const {
+    constexpr double share = 0.25, share_of_passage = 0.125;
+    double longest = share * shortest_oscillation_;
+    for (const auto& [begin, end] : passages_)
+        if (t < end) longest = std::min(longest, std::max(begin - t, share_of_passage * (end - begin)));
+    return longest;
 }
 
 double MotionCorners::Times::after(double t) const {

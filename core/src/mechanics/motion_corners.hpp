@@ -21,8 +21,9 @@ public:
     [[nodiscard]] double after(double t) const { return all_.after(t); }
     /// The first after t at which a value, a rate or an acceleration jumps, s; infinity if there is none.
     [[nodiscard]] double jump_after(double t) const { return jumps_.after(t); }
-    /// The shortest Motion::oscillation_period, s; infinity if there is none.
-    [[nodiscard]] double shortest_oscillation() const { return shortest_oscillation_; }
+    /// A step from t on that resolves every Motion::oscillation_period and Motion::passage, s; infinity if there are
+    /// none.
+    [[nodiscard]] double longest_step(double t) const;
     /// Whether there is a motion of which nothing is known.
     [[nodiscard]] bool unknown() const { return unknown_; }
     /// Whether something changes with time.
@@ -40,7 +41,11 @@ private:
         void add(std::vector<double> times, double period);
         [[nodiscard]] double after(double t) const;
     };
+    struct Passage {
+        double begin, end;
+    };
     Times all_, jumps_;
+    std::vector<Passage> passages_;
     double shortest_oscillation_ = std::numeric_limits<double>::infinity();
     bool unknown_ = false, varies_ = false;
 };

@@ -234,7 +234,9 @@ Motion Motion::ramp(double from, double to, double start, double duration, int s
         power *= duration;
     }
     shape[0] = from;
-    return motion_of({{start, start + duration}, {shape}, false});
+    Motion motion = motion_of({{start, start + duration}, {shape}, false});
+    motion.passage = duration;
+    return motion;
 }
 
 }  // namespace delassus

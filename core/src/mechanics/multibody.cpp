@@ -557,9 +557,9 @@ double MultibodySystem::next_jump(double t) const {
     return implementation_->motion_corners.jump_after(t);
 }
 double MultibodySystem::longest_step(double t) const {
-    constexpr double share_of_oscillation = 0.25, largest_turn = 1.0;
+    constexpr double largest_turn = 1.0;
     const auto& self = *implementation_;
-    double longest = share_of_oscillation * self.motion_corners.shortest_oscillation();
+    double longest = self.motion_corners.longest_step(t);
     for (const BodyIndex index : self.uneven)
         longest = std::min(
             longest, largest_turn / std::abs(self.bodies[static_cast<std::size_t>(index)].prescribed->turning_rate(t)));
