@@ -102,9 +102,8 @@ TEST(JumpingForces, ARampIsShorterThanAStep) {
     }
 }
 
-// A ball lies on a plate that goes down or up by a ramp of d s. It lets go where the plate's acceleration D (60 s − 180
-// s²
-// + 120 s³)/d² passes −g.
+// A ball lies on a plate that goes down or up by D in a ramp of duration d. It lets go where the acceleration of the
+// plate, D (60 s − 180 s² + 120 s³)/d² at the share s of d, passes −g.
 TEST(JumpingForces, APlateLeavesWhatLiesOnIt) {
     for (const auto& [way, d] : {std::pair{-1.0, 0.3}, {0.05, 0.05}, {0.05, 0.01}}) {
         SCOPED_TRACE(fmt::format("{} m in {} s", way, d));

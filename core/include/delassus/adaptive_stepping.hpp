@@ -104,7 +104,8 @@ private:
     /// By which a trial errs where sliding turns round in it.
     void note_turns(const State& begin, Trial& trial, double h, StepSolver& solver);
     /// Keys of what touches at one end of a trial, by the rows there, or pushes in the half at that end; ascending.
-    [[nodiscard]] std::vector<std::uint64_t> find_touching(const UnilateralRows& rows, const StepReport& half) const;
+    [[nodiscard]] std::vector<std::uint64_t> find_touching(const UnilateralRows& rows,
+                                                           std::vector<std::uint64_t> pushing) const;
     /// By what accelerations change from the beginning of a trial until its end, times its size h: of the velocity, by
     /// its size, that changes most.
     [[nodiscard]] double jump_in(const State& begin, const Trial& trial, double h, StepSolver& solver);

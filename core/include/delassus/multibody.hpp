@@ -56,9 +56,8 @@ struct Motion {
     /// are. Where a motion is not, no step looks ahead of what is shown.
     bool foreseeable = false;
     double oscillation_period = 0.0;  ///< s; 0: the functions do not oscillate
-    /// From the first corner on, in which it goes from one constant to another, s; 0: it does not.
-    double passage = 0.0;
-    bool is_constant = false;  ///< the value never changes; of constant() alone
+    double ramp_duration = 0.0;       ///< s, from the first corner on; 0: the functions are no ramp
+    bool is_constant = false;         ///< the value never changes; of constant() alone
     DELASSUS_API static Motion constant(double value);
     DELASSUS_API static Motion linear(double start, double rate);
     /// offset + amplitude sin(2π frequency t + phase)

@@ -322,23 +322,22 @@ void AdaptiveStepping::look_at_contacts(const State& begin, Trial& trial, double
     for_each_normal(begin_rows_, v, [&](const UnilateralRows::Block& block, double gap, double speed) {
         if (std::abs(gap) <= system_.gap_resolution() && !pushed(block)) note(-speed);
     });
-    if (find_touching(begin_rows_, trial.first) == find_touching(rows_, trial.second)) return;
+    if (find_touching(begin_rows_, keys_that_push(trial.first)) == find_touching(rows_, pushed_)) return;
     const double allowed = control_.absolute / control_.unit;
     trial.error = std::max(trial.error, once * share_of_wrong_speed * jump_in(begin, trial, h, solver) / allowed);
 }
 
-std::vector<std::uint64_t> AdaptiveStepping::find_touching(const UnilateralRows& rows, const StepReport& half) const {
-    std::vector<std::uint64_t> keys = keys_that_push(half);
-    const std::size_t pushing = keys.size();
+std::vector<std::uint64_t> AdaptiveStepping::find_touching(const UnilateralRows& rows,
+                                                           std::vector<std::uint64_t> pushing) const {
     std::size_t row = 0;
     for (const auto& block : rows.blocks()) {
-        const bool near = block.along_normal() && rows.rows()[row].gap <= system_.gap_resolution();
-        if (near && !std::binary_search(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(pushing), block.key))
-            keys.push_back(block.key);
+        if (block.along_normal() && rows.rows()[row].gap <= system_.gap_resolution()) pushing.push_back(block.key);
         row += static_cast<std::size_t>(block.cone.rows);
     }
-    std::ranges::sort(keys);
-    return keys;
+    std::ranges::sort(pushing);
+    const auto repeated = std::ranges::unique(pushing);
+    pushing.erase(repeated.begin(), repeated.end());
+    return pushing;
 }
 
 double AdaptiveStepping::jump_in(const State& begin, const Trial& trial, double h, StepSolver& solver) {
@@ -412,13 +411,13 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
         after = std::move(state.v);
     };
     // What time prescribes of a row changes the speed that is wanted of a motor, by so much until the end.
-    const auto drift_of = [&](const UnilateralRows::Block& block, std::size_t row) {
-        double drift = 0.0;
-        if (block.along_normal()) return drift;
+    const auto change_of_rate = [&](const UnilateralRows::Block& block, std::size_t row) {
+        double change = 0.0;
+        if (block.along_normal()) return change;
         for_each_sliding(rows_, [&](const UnilateralRows::Block& other, std::size_t first, std::size_t) {
-            if (other.key == block.key) drift = rows_.rows()[first].rate_now - begin_rows_.rows()[row].rate_now;
+            if (other.key == block.key) change = rows_.rows()[first].rate_now - begin_rows_.rows()[row].rate_now;
         });
-        return drift;
+        return change;
     };
     // Of two sliding speeds with these products: what the second may be off by where they oppose each other.
     const auto turned = [](double product, double square, double other_square) {
@@ -426,12 +425,12 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
     };
     for_each_sliding(begin_rows_, [&](const UnilateralRows::Block& block, std::size_t first, std::size_t rows) {
         if (block.along_normal() && !std::binary_search(pushed_.begin(), pushed_.end(), block.key)) return;
-        const double drift = drift_of(block, first);
+        const double rate = change_of_rate(block, first);
         double bb = 0.0, bm = 0.0, be = 0.0, mm = 0.0, me = 0.0, ee = 0.0;  // of begin, middle and end
         for (std::size_t row = first; row < first + rows; ++row) {
             const double b = speed_now(begin_rows_, row, begin.v.data()),
-                         m = speed_now(begin_rows_, row, trial.middle.data()) + 0.5 * drift,
-                         e = speed_now(begin_rows_, row, trial.end.v.data()) + drift;
+                         m = speed_now(begin_rows_, row, trial.middle.data()) + 0.5 * rate,
+                         e = speed_now(begin_rows_, row, trial.end.v.data()) + rate;
             bb += b * b;
             bm += b * m;
             be += b * e;
@@ -445,8 +444,8 @@ void AdaptiveStepping::note_turns(const State& begin, Trial& trial, double h, St
             if (after.empty()) go_on();
             double ma = 0.0, aa = 0.0;
             for (std::size_t row = first; row < first + rows; ++row) {
-                const double a = speed_now(begin_rows_, row, after.data()) + 1.5 * drift;
-                ma += a * (speed_now(begin_rows_, row, trial.middle.data()) + 0.5 * drift);
+                const double a = speed_now(begin_rows_, row, after.data()) + 1.5 * rate;
+                ma += a * (speed_now(begin_rows_, row, trial.middle.data()) + 0.5 * rate);
                 aa += a * a;
             }
             speed = std::max(speed, turned(ma, mm, aa));

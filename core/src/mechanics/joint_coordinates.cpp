@@ -12,6 +12,7 @@
 #include "mechanics/kinematic_tree.hpp"
 #include "mechanics/model.hpp"
 #include "mechanics/tree_derivatives.hpp"
+#include "mechanics/tree_projection.hpp"
 
 namespace delassus {
 
@@ -21,22 +22,20 @@ using mechanics::LinkMotion;
 using mechanics::Matrix3d;
 using mechanics::Quaterniond;
 using mechanics::Vector3d;
-using mechanics::Vector6;
 
 struct JointCoordinates::Implementation {
     explicit Implementation(MultibodySystem& system)
-        : bodies(system), tree(system), derivatives(tree, [this](std::size_t k) { return spins_alone(k); }) {
+        : bodies(system),
+          tree(system),
+          derivatives(tree, [this](std::size_t k) { return spins_alone(k); }),
+          projection(tree, derivatives, system.n()) {
         const auto n = static_cast<std::size_t>(system.n());
         state.q.assign(static_cast<std::size_t>(system.position_size()), 0.0);
         state.v.assign(n, 0.0);
         force.assign(n, 0.0);
         stiffness.keep_products();
         damping.keep_products();
-        link_at.assign(n / 6, 0);
-        for (std::size_t k = 1; k < tree.links().size(); ++k) {
-            link_at[static_cast<std::size_t>(tree.links()[k].body_column / 6)] = k;
-            turns = turns || !spins_alone(k);
-        }
+        for (std::size_t k = 1; k < tree.links().size(); ++k) turns = turns || !spins_alone(k);
         std::vector<bool> in_trees(static_cast<std::size_t>(system.joint_count()), false);
         for (const Link& link : tree.links()) {
             if (link.joint < 0) continue;
@@ -56,10 +55,10 @@ struct JointCoordinates::Implementation {
     MultibodySystem& bodies;
     mechanics::KinematicTree tree;
     mechanics::TreeDerivatives derivatives;
+    mechanics::TreeProjection projection;
     State start;
-    std::vector<std::int32_t> held;    // rows that the trees hold
-    bool turns = false;                // a link with a joint, whose forces depend on the state
-    std::vector<std::size_t> link_at;  // by the body's column / 6
+    std::vector<std::int32_t> held;  // rows that the trees hold
+    bool turns = false;              // a link with a joint, whose forces depend on the state
     // Angles over whole turns in q of the bodies, and in q of the trees: coordinates, and at the end of q those of
     // joints that no tree holds.
     struct AngleOfJoint {
@@ -76,42 +75,6 @@ struct JointCoordinates::Implementation {
     State then;  // of collect_contact()
     std::vector<double> way_then;
     std::vector<FreeSpin> body_spins;
-    struct Loaded {
-        std::size_t link;
-        mechanics::Spatial wrench;
-    };
-    std::vector<Loaded> loaded;
-    struct Entry {
-        std::int32_t column;
-        double value;
-    };
-    std::vector<Entry> entries;
-    std::vector<std::pair<std::int32_t, Vector6>> way;
-    std::vector<std::pair<std::int32_t, mechanics::Matrix6>> blocks;
-    /// Of project_matrix(): the forces on a link and on what it carries, by columns of J.
-    struct Carried {
-        std::vector<std::pair<std::int32_t, mechanics::Spatial>> columns;
-        std::vector<std::int32_t> place;  // in `columns`, by column; -1: none
-
-        void clear() {
-            for (const auto& [column, wrench] : columns) place[static_cast<std::size_t>(column)] = -1;
-            columns.clear();
-        }
-        void add(std::int32_t column, const mechanics::Spatial& more) {
-            const auto at = static_cast<std::size_t>(column);
-            if (at >= place.size()) place.resize(at + 1, -1);
-            if (place[at] < 0) {
-                place[at] = static_cast<std::int32_t>(columns.size());
-                columns.emplace_back(column, more);
-                return;
-            }
-            auto& known = columns[static_cast<std::size_t>(place[at])].second;
-            known.angular += more.angular;
-            known.linear += more.linear;
-        }
-    };
-    std::vector<Carried> carried;
-
     /// A body that a free joint holds and that carries none: its gyroscopic torque is that of free_spins().
     [[nodiscard]] bool spins_alone(std::size_t k) const {
         return tree.links()[k].kind == LinkJoint::Free && tree.links()[k].leaf;
@@ -125,8 +88,8 @@ struct JointCoordinates::Implementation {
             for (std::int32_t i = 0; i < block.cone.rows; ++i, ++row) {
                 const auto begin = static_cast<std::size_t>(body_rows.row_start()[row]),
                            end = static_cast<std::size_t>(body_rows.row_start()[row + 1]);
-                project_row(body_rows.column().subspan(begin, end - begin),
-                            body_rows.value().subspan(begin, end - begin));
+                const auto entries = projection.row(body_rows.column().subspan(begin, end - begin),
+                                                    body_rows.value().subspan(begin, end - begin));
                 for (const auto& [column, value] : entries) own.entry(column, value);
                 const auto& of_bodies = body_rows.rows()[row];
                 own.end_row(of_bodies.gap, of_bodies.rate, of_bodies.rate_now);
@@ -153,130 +116,6 @@ struct JointCoordinates::Implementation {
     void write(const double* q, State& of_bodies) const {
         tree.write(of_bodies);
         for (const auto& angle : angles) of_bodies.q[angle.of_bodies] = q[angle.own];
-    }
-
-    /// entries ← those of a row, in ascending columns, from its entries in columns of bodies: columns ascend there. A
-    /// row that only what links do to each other enters ends where their ways to the ground meet.
-    void project_row(std::span<const std::int32_t> column, std::span<const double> value) {
-        constexpr double rounding = 1e-12;
-        loaded.clear();
-        entries.clear();
-        for (std::size_t e = 0; e < column.size();) {
-            const std::int32_t first = column[e] / 6 * 6;
-            Vector6 g = Vector6::Zero();
-            for (; e < column.size() && column[e] < first + 6; ++e) g[column[e] - first] += value[e];
-            const std::size_t link = link_at[static_cast<std::size_t>(first / 6)];
-            loaded.push_back({link, {tree.motion(link).A * g.tail<3>(), g.head<3>()}});
-        }
-        std::sort(loaded.begin(), loaded.end(), [](const Loaded& a, const Loaded& b) { return a.link < b.link; });
-        while (!loaded.empty()) {
-            const auto [k, wrench] = loaded.back();
-            loaded.pop_back();
-            const Link& link = tree.links()[k];
-            const LinkMotion& motion = tree.motion(k);
-            for (std::int32_t j = link.freedoms; j-- > 0;) {
-                const double entry =
-                    motion.angular.col(j).dot(wrench.angular) + motion.linear.col(j).dot(wrench.linear);
-                // What a joint does not move by more than rounding it does not move: a row of rounding has no answer.
-                const double size = motion.angular.col(j).norm() * wrench.angular.norm() +
-                                    motion.linear.col(j).norm() * wrench.linear.norm();
-                entries.push_back({link.column + j, std::abs(entry) <= rounding * size ? 0.0 : entry});
-            }
-            if (link.parent == 0) continue;
-            const auto parent = static_cast<std::size_t>(link.parent);
-            const mechanics::Spatial moved{wrench.angular + motion.d.cross(wrench.linear), wrench.linear};
-            auto at = std::lower_bound(loaded.begin(), loaded.end(), parent,
-                                       [](const Loaded& one, std::size_t wanted) { return one.link < wanted; });
-            if (at == loaded.end() || at->link != parent) {
-                loaded.insert(at, {parent, moved});
-                continue;
-            }
-            const double torque = at->wrench.angular.norm() + moved.angular.norm();
-            const double push = at->wrench.linear.norm() + moved.linear.norm();
-            at->wrench.angular += moved.angular;
-            at->wrench.linear += moved.linear;
-            if (at->wrench.angular.norm() <= rounding * torque && at->wrench.linear.norm() <= rounding * push)
-                loaded.erase(at);
-        }
-        std::reverse(entries.begin(), entries.end());
-    }
-
-    /// The columns of J of a link's body, (v in the world, ω in the frame of the body), on its way to the ground.
-    void columns_of(std::size_t k, std::vector<std::pair<std::int32_t, Vector6>>& columns) const {
-        columns.clear();
-        const LinkMotion& body = tree.motion(k);
-        Vector3d arm = Vector3d::Zero();  // from the link on the way
-        for (std::size_t at = k; at > 0; at = static_cast<std::size_t>(tree.links()[at].parent)) {
-            const Link& link = tree.links()[at];
-            const LinkMotion& motion = tree.motion(at);
-            for (std::int32_t j = 0; j < link.freedoms; ++j) {
-                const Vector3d axis = motion.angular.col(j);
-                Vector6 column;
-                column << motion.linear.col(j) + axis.cross(arm), body.A.transpose() * axis;
-                columns.emplace_back(link.column + j, column);
-            }
-            arm += motion.d;
-        }
-    }
-
-    /// H += factor · Jᵀ A J, A: of the bodies.
-    void project(MatrixAssembler& A, double factor, MatrixAssembler& H) {
-        project_matrix(A.finish(), factor, false, H);
-        A.for_each_product([&](std::span<const std::int32_t> columns, std::span<const double> g, double weight) {
-            project_row(columns, g);
-            for (const auto& [row, own] : entries)
-                for (const auto& [column, other] : entries) H.add(row, column, factor * weight * (own * other));
-        });
-    }
-
-    /// H += factor · Jᵀ A J, or Jᵀ A ∂(J u)/∂q; A: of the bodies. As forces do, the columns of A J go from each body to
-    /// the ground, and each link takes of them what acts along its own freedoms.
-    void project_matrix(const SparseMatrix& A, double factor, bool along_velocities, MatrixAssembler& H) {
-        if (A.column.empty()) return;
-        const std::size_t links = tree.links().size();
-        carried.resize(links);
-        for (Carried& one : carried) one.clear();
-        for (std::int32_t row = 0; row < A.rows / 6; ++row) {
-            const std::size_t own = link_at[static_cast<std::size_t>(row)];
-            const Matrix3d& turn = tree.motion(own).A;
-            find_blocks(A, row);
-            for (const auto& [body, block] : blocks) {
-                const std::size_t other = link_at[static_cast<std::size_t>(body)];
-                columns_of(other, way);
-                for (const auto& [j, J] : way) {
-                    const Vector6 pull = block * (along_velocities ? derivatives.turned_velocity(other, j) : J);
-                    carried[own].add(j, {turn * pull.tail<3>(), pull.head<3>()});
-                }
-            }
-        }
-        for (std::size_t k = links; k-- > 1;) {
-            const Link& link = tree.links()[k];
-            const LinkMotion& motion = tree.motion(k);
-            for (const auto& [j, wrench] : carried[k].columns) {
-                for (std::int32_t i = 0; i < link.freedoms; ++i)
-                    H.add(
-                        link.column + i, j,
-                        factor * (motion.angular.col(i).dot(wrench.angular) + motion.linear.col(i).dot(wrench.linear)));
-                if (link.parent > 0)
-                    carried[static_cast<std::size_t>(link.parent)].add(
-                        j, {wrench.angular + motion.d.cross(wrench.linear), wrench.linear});
-            }
-        }
-    }
-
-    /// blocks ← those of the six rows of a body, by the bodies of their columns.
-    void find_blocks(const SparseMatrix& A, std::int32_t row) {
-        blocks.clear();
-        for (std::int32_t i = 0; i < 6; ++i) {
-            const auto at = static_cast<std::size_t>(6 * row + i);
-            for (auto e = static_cast<std::size_t>(A.row_start[at]); e < static_cast<std::size_t>(A.row_start[at + 1]);
-                 ++e) {
-                const std::int32_t body = A.column[e] / 6;
-                auto found = std::ranges::find(blocks, body, &std::pair<std::int32_t, mechanics::Matrix6>::first);
-                if (found == blocks.end()) found = blocks.insert(found, {body, mechanics::Matrix6::Zero()});
-                found->second(i, A.column[e] % 6) += A.value[e];
-            }
-        }
     }
 
     /// What the bodies' add_force() has but for weight and gyroscopic torques, which are the recursion's.
@@ -557,13 +396,13 @@ void JointCoordinates::add_stiffness(const State& state, double factor, Tangent 
     if (forces) {
         self.stiffness.begin(n, n);
         self.bodies.add_stiffness(self.state, 1.0, tangent, self.stiffness);
-        self.project(self.stiffness, factor, H);
+        self.projection.add_matrix(self.stiffness, factor, H);
     }
     if (!exact || !self.turns) return;
     if (forces) {
         self.turned_damping.begin(n, n);
         self.bodies.add_damping(self.state, 1.0, tangent, self.turned_damping);
-        self.project_matrix(self.turned_damping.finish(), factor, true, H);
+        self.projection.add_matrix_along_velocities(self.turned_damping.finish(), factor, H);
         self.derivatives.geometry(self.forces_beside_weight().data(), self.adder(-factor, H));
     }
     self.derivatives.positions(self.adder(factor, H));
@@ -576,7 +415,7 @@ void JointCoordinates::add_damping(const State& state, double factor, Tangent ta
     if (self.bodies.has_stiffness()) {
         self.damping.begin(n, n);
         self.bodies.add_damping(self.state, 1.0, tangent, self.damping);
-        self.project(self.damping, factor, H);
+        self.projection.add_matrix(self.damping, factor, H);
     }
     if (tangent != Tangent::Exact || !self.turns) return;
     self.derivatives.set_motion(state.v.data(), Vector3d(self.bodies.gravity().data()));
@@ -626,7 +465,7 @@ void JointCoordinates::add_stiff_tangent(const State& state, std::span<const std
     self.place(state);
     self.stiffness.begin(self.bodies.n(), self.bodies.n());
     self.bodies.add_stiff_tangent(self.state, stiff, of_stiffness, of_damping, self.stiffness);
-    self.project(self.stiffness, 1.0, H);
+    self.projection.add_matrix(self.stiffness, 1.0, H);
 }
 
 void JointCoordinates::add_gyroscopic_damping(const State& state, double factor, Tangent tangent,
@@ -638,7 +477,7 @@ void JointCoordinates::add_gyroscopic_damping(const State& state, double factor,
     self.bodies.add_gyroscopic_damping(self.state, factor, tangent, self.gyroscopic);
     const SparseMatrix& R = self.gyroscopic.finish();
     for (std::int32_t row = 0; row < n; ++row) {
-        const std::size_t k = self.link_at[static_cast<std::size_t>(row / 6)];
+        const std::size_t k = self.projection.link_at(row);
         if (!self.spins_alone(k)) continue;
         const Link& link = self.tree.links()[k];
         for (auto e = R.row_start[static_cast<std::size_t>(row)]; e < R.row_start[static_cast<std::size_t>(row) + 1];
@@ -674,7 +513,7 @@ void JointCoordinates::free_spins(const State& state, double h, std::vector<Free
     self.place(state);
     self.bodies.free_spins(self.state, h, self.body_spins);
     for (FreeSpin spin : self.body_spins) {
-        const std::size_t k = self.link_at[static_cast<std::size_t>(spin.column / 6)];
+        const std::size_t k = self.projection.link_at(spin.column);
         if (!self.spins_alone(k)) continue;
         spin.column = self.tree.links()[k].column + 3;
         spins.push_back(spin);
@@ -711,9 +550,9 @@ void JointCoordinates::add_constraint_jacobian(const State& state, std::int32_t 
     for (std::int32_t row = 0; row < J.rows; ++row) {
         const auto begin = static_cast<std::size_t>(J.row_start[static_cast<std::size_t>(row)]),
                    end = static_cast<std::size_t>(J.row_start[static_cast<std::size_t>(row) + 1]);
-        self.project_row(std::span(J.column).subspan(begin, end - begin),
-                         std::span(J.value).subspan(begin, end - begin));
-        for (const auto& [column, value] : self.entries) D.add(first_row + row, column, value);
+        const auto entries = self.projection.row(std::span(J.column).subspan(begin, end - begin),
+                                                 std::span(J.value).subspan(begin, end - begin));
+        for (const auto& [column, value] : entries) D.add(first_row + row, column, value);
     }
 }
 
@@ -744,7 +583,7 @@ void JointCoordinates::add_constraint_stiffness(const State& state, const double
     self.pull_of_rows.begin(n, n);
     self.bodies.add_constraint_stiffness(self.state, lambda, 1.0, tangent, self.pull_of_rows);
     self.derivatives.set_motion(state.v.data(), Vector3d::Zero());
-    self.project_matrix(self.pull_of_rows.finish(), factor, false, H);
+    self.projection.add_matrix(self.pull_of_rows, factor, H);
     self.rows.begin(m(), n);
     self.bodies.add_constraint_jacobian(self.state, 0, self.rows);
     self.force.assign(self.force.size(), 0.0);

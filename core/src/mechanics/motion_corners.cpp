@@ -59,17 +59,17 @@ void MotionCorners::add(const Motion& motion) {
     if (!motion.is_constant) varies_ = true;
     if (motion.oscillation_period > 0.0)
         shortest_oscillation_ = std::min(shortest_oscillation_, motion.oscillation_period);
-    if (motion.passage > 0.0) passages_.push_back({motion.corners[0], motion.corners[0] + motion.passage});
+    if (motion.ramp_duration > 0.0) ramps_.push_back({motion.corners[0], motion.corners[0] + motion.ramp_duration});
     all_.add(motion.corners, motion.period);
     jumps_.add(jumps_of(motion), motion.period);
 }
 
-// What is shorter than some steps begins with one.
+// A ramp that is shorter than some steps begins with one.
 double MotionCorners::longest_step(double t) const {
-    constexpr double share = 0.25, share_of_passage = 0.125;
-    double longest = share * shortest_oscillation_;
-    for (const auto& [begin, end] : passages_)
-        if (t < end) longest = std::min(longest, std::max(begin - t, share_of_passage * (end - begin)));
+    constexpr double share_of_oscillation = 0.25, share_of_ramp = 0.125;
+    double longest = share_of_oscillation * shortest_oscillation_;
+    for (const auto& [begin, end] : ramps_)
+        if (t < end) longest = std::min(longest, std::max(begin - t, share_of_ramp * (end - begin)));
     return longest;
 }
 

@@ -21,8 +21,8 @@ public:
     [[nodiscard]] double after(double t) const { return all_.after(t); }
     /// The first after t at which a value, a rate or an acceleration jumps, s; infinity if there is none.
     [[nodiscard]] double jump_after(double t) const { return jumps_.after(t); }
-    /// A step from t on that resolves every Motion::oscillation_period and Motion::passage, s; infinity if there are
-    /// none.
+    /// A step from t on that resolves every Motion::oscillation_period and Motion::ramp_duration, s; infinity if there
+    /// are none.
     [[nodiscard]] double longest_step(double t) const;
     /// Whether there is a motion of which nothing is known.
     [[nodiscard]] bool unknown() const { return unknown_; }
@@ -41,11 +41,11 @@ private:
         void add(std::vector<double> times, double period);
         [[nodiscard]] double after(double t) const;
     };
-    struct Passage {
+    struct Ramp {
         double begin, end;
     };
     Times all_, jumps_;
-    std::vector<Passage> passages_;
+    std::vector<Ramp> ramps_;
     double shortest_oscillation_ = std::numeric_limits<double>::infinity();
     bool unknown_ = false, varies_ = false;
 };

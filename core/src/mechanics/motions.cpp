@@ -235,7 +235,7 @@ Motion Motion::ramp(double from, double to, double start, double duration, int s
     }
     shape[0] = from;
     Motion motion = motion_of({{start, start + duration}, {shape}, false});
-    motion.passage = duration;
+    motion.ramp_duration = duration;
     return motion;
 }
 

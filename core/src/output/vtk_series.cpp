@@ -31,9 +31,6 @@ public:
         end_ += sizeof(std::uint64_t) + count * sizeof(Number);
         return text + "\n";
     }
-    /// Of all arrays that have an element.
-    [[nodiscard]] std::size_t size() const { return end_; }
-
     template <class Number>
     static void add(const std::vector<Number>& values, std::string& bytes) {
         const auto length = static_cast<std::uint64_t>(values.size() * sizeof(Number));
@@ -122,7 +119,6 @@ void VtkSeries::find_cells() {
     elements_xml_ += data.element<float>("speed", 1, body.size()) + "</CellData>\n";
     elements_xml_ +=
         "<Points>\n" + data.element<float>("points", 3, 3 * static_cast<std::size_t>(point_count)) + "</Points>\n";
-    frame_bytes_ = data.size() + 1024;
 }
 
 std::string VtkSeries::file_name(std::int64_t number) const {
@@ -145,8 +141,8 @@ std::int64_t VtkSeries::picture_bytes() const {
 }
 
 void VtkSeries::write(std::int64_t number, const State& state) const {
-    std::vector<float> points, speed;
-    std::vector<float> of_body;
+    constexpr std::size_t beside_arrays = 256;  // bytes: their lengths, and the end of the file
+    std::vector<float> points, speed, of_body;
     // Cells made of nodes have the mean speed of their nodes.
     const auto add_node_cell = [&](const auto& nodes) {
         double v = 0.0;
@@ -175,7 +171,7 @@ void VtkSeries::write(std::int64_t number, const State& state) const {
     }
     for (const auto& triangle : elements_) add_node_cell(triangle);
     std::string file = polydata(state.t, counts_, elements_xml_);
-    file.reserve(file.size() + frame_bytes_);
+    file.reserve(file.size() + static_cast<std::size_t>(picture_bytes()) + beside_arrays);
     file += cells_;
     Appended::add(speed, file);
     Appended::add(points, file);

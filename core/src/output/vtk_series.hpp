@@ -45,7 +45,6 @@ private:
     std::vector<std::array<std::int32_t, 2>> cables_;
     // Of a file, what is the same in every frame: the counts and elements of its piece, the bytes of its cells.
     std::string counts_, elements_xml_, cells_;
-    std::size_t frame_bytes_ = 0;  // of all arrays
 };
 
 /// One system's part of a collection.
